@@ -17,6 +17,7 @@ use simulator::RunFolder;
 use simulator::seal::Checked;
 use terminal::OutputError;
 
+use crate::experiment::equal_arms;
 use crate::kind::Kind;
 use crate::{named, remarks};
 
@@ -57,7 +58,6 @@ fn describe(path: &Path) -> miette::Result<String> {
     if path.is_dir() {
         return describe_run(path);
     }
-
     let kind = Kind::of(path)?;
     if matches!(kind, Kind::Launch | Kind::Scenario) {
         // As `cars run` and `cars launch` name it.
@@ -159,6 +159,7 @@ fn describe_experiment(path: &Path) -> miette::Result<String> {
         experiment,
         set: Vec::new(),
         robots: Robots::InProcess,
+        origin: None,
     })?;
     let needs_processes = plan.needs_processes()?;
     if needs_processes.is_none() {
@@ -171,6 +172,9 @@ fn describe_experiment(path: &Path) -> miette::Result<String> {
     let measures = count(experiment.measures.len(), "measure", "measures");
     let seeds = experiment.seeds.len();
     let mut text = format!("{arms}, {conditions}, {seeds} seeds, {measures}");
+    for (one, other) in plan.equal_arms() {
+        text += &format!("; {}", equal_arms(one, other));
+    }
     if let Some(reason) = needs_processes {
         text += &format!("; to be played with --processes: {reason}");
     }

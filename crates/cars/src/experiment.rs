@@ -32,6 +32,8 @@ const MAX_JOBS: u64 = 1024;
 const MIN_SEEDS: u64 = 2;
 /// Most seeds of an option.
 const MAX_SEEDS: u64 = 100_000;
+/// So many units take their time at the end, too.
+const MANY: usize = 20_000;
 /// Units that are named where there are more of them.
 const NAMED: usize = 10;
 
@@ -277,8 +279,14 @@ impl PlanArgs {
         let plan = Plan::new(&request)?;
         plan.check()?;
         plan.check_begins()?;
+        if self.out.is_none() {
+            plan.check_origin(&folder)?;
+        }
 
-        for change in plan.changes_since(&folder)? {
+        for (one, other) in plan.equal_arms() {
+            terminal::note(equal_arms(one, other));
+        }
+        for change in plan.changes_since(&folder) {
             terminal::note(change);
         }
 
@@ -332,8 +340,16 @@ impl PlanArgs {
             experiment,
             set: self.set.clone(),
             robots,
+            origin: self.file.canonicalize().ok(),
         })
     }
+}
+
+/// That two arms play the same runs, for people.
+pub(crate) fn equal_arms(one: &str, other: &str) -> String {
+    format!(
+        "the arms \"{one}\" and \"{other}\" play the same runs under every condition: there is no difference between them"
+    )
 }
 
 /// Plays those of these units that have not been played.
@@ -389,6 +405,12 @@ fn be_quiet_about_units() {
 /// Writes the results into their folder and prints them. The exit status is 1 if a unit is missing, failed, or gave different
 /// runs; otherwise it is that of the worst verdict about what the experiment file expects.
 fn conclude(results: &Results, folder: &Path, is_json: bool) -> miette::Result<ExitCode> {
+    let played = results.outcomes.len();
+    if played >= MANY {
+        terminal::note(format_args!(
+            "{played} units: tables and estimates are made, which takes a while"
+        ));
+    }
     results.write(folder)?;
     Provenance::here().write(folder)?;
     if is_json {
@@ -413,13 +435,14 @@ fn conclude(results: &Results, folder: &Path, is_json: bool) -> miette::Result<E
 
 /// Names the expectations of the experiment that runs have not met, and returns the worst verdict.
 fn name_verdicts(results: &Results) -> Verdict {
-    let mut worst = Verdict::Pass;
+    let mut worst = Verdict::NotAsked;
     for judged in results.judged() {
         let verdict = judged.verdict();
         worst = worst.max(verdict);
 
         let units = match verdict {
             Verdict::Pass => continue,
+            Verdict::NotAsked => &judged.not_asked,
             Verdict::Undecided => &judged.undecided,
             Verdict::Fail => &judged.failed,
         };
@@ -448,6 +471,10 @@ fn name_defects(results: &Results) {
             results.plan.units(),
             results.missing[0]
         ));
+    }
+
+    for sentence in &results.never_occurred {
+        terminal::note(sentence);
     }
 
     for unit in results.conflicts.iter().take(NAMED) {

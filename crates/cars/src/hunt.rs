@@ -1,6 +1,6 @@
 //! `cars hunt`: draws fault plans until an expectation fails, and shrinks what it finds to a scenario file.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -11,7 +11,8 @@ use config::units::Time;
 use config::{Changes, Override};
 use indicatif::{ProgressBar, ProgressStyle};
 use lab::hunt::{
-    Budget, Coverage, Feature, Finding, Kind, Options, Progress, Report, Subject, hunt as go,
+    Budget, Coverage, Fate, Feature, Finding, Kind, Link, Options, Progress, Report, Subject,
+    hunt as go,
 };
 use lab::shell;
 use miette::IntoDiagnostic;
@@ -22,6 +23,8 @@ use crate::named;
 
 /// Time for which a hunt draws plans if neither a time nor a number of plans is given, seconds.
 const DEFAULT_S: f64 = 60.0;
+/// Most texts of the commands of a link with one fate that are printed.
+const MOST_TEXTS: usize = 5;
 /// Set by Ctrl-C: the hunt ends with what it has found.
 static STOP: AtomicBool = AtomicBool::new(false);
 
@@ -187,7 +190,9 @@ fn in_words(report: &Report) -> String {
     text += "\n";
     for expectation in &report.expectations {
         let mut findings = report.findings.iter();
-        if !findings.any(|finding| finding.expectation == *expectation) {
+        if report.plans > report.not_set_up && report.never_asked.contains(expectation) {
+            text += &format!("never asked: {expectation}\n");
+        } else if !findings.any(|finding| finding.expectation == *expectation) {
             text += &format!("not seen to fail: {expectation}\n");
         }
     }
@@ -219,6 +224,7 @@ fn finding_in_words(finding: &Finding) -> String {
 fn coverage_in_words(coverage: &Coverage) -> String {
     let mut faults = Vec::new();
     let mut others = String::new();
+    let texts = frequent_texts(coverage);
     for (feature, plans) in coverage.features() {
         let line = match feature {
             Feature::Fault { kind } => {
@@ -226,6 +232,9 @@ fn coverage_in_words(coverage: &Coverage) -> String {
                 continue;
             }
             Feature::Message { link, text, fate } => {
+                if !texts[&(link, fate)].contains(&text.as_str()) {
+                    continue;
+                }
                 format!("{} -> {}: {text}: {fate}", link.from, link.to)
             }
             Feature::QueryLost { link } => format!("{} -> {}: query lost", link.from, link.to),
@@ -235,8 +244,37 @@ fn coverage_in_words(coverage: &Coverage) -> String {
         others += &format!("{plans:>8}  {line}\n");
     }
 
+    let mut left_out = 0;
+    for (feature, _) in coverage.features() {
+        if let Feature::Message { link, text, fate } = feature {
+            left_out += usize::from(!texts[&(link, fate)].contains(&text.as_str()));
+        }
+    }
+    if left_out > 0 {
+        others += &format!("{left_out:>8}  further texts of commands and their fates\n");
+    }
+
     format!(
         "plans  in which it occurred\n{others}\nkinds of faults, in plans: {}\n",
         faults.join(", ")
     )
+}
+
+/// The most frequent texts of the commands of each link that had the same fate: robots choose texts freely.
+fn frequent_texts(coverage: &Coverage) -> BTreeMap<(&Link, &Fate), Vec<&str>> {
+    let mut all: BTreeMap<(&Link, &Fate), Vec<(u64, &str)>> = BTreeMap::new();
+    for (feature, plans) in coverage.features() {
+        if let Feature::Message { link, text, fate } = feature {
+            let texts = all.entry((link, fate)).or_default();
+            texts.push((plans, text));
+        }
+    }
+
+    let mut frequent = BTreeMap::new();
+    for (message, mut texts) in all {
+        texts.sort_by_key(|(plans, _)| std::cmp::Reverse(*plans));
+        texts.truncate(MOST_TEXTS);
+        frequent.insert(message, texts.into_iter().map(|(_, text)| text).collect());
+    }
+    frequent
 }

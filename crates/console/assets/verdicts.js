@@ -7,7 +7,7 @@ import { html, render } from "./vendor/lit-html.js";
 /** @typedef {import("./types/messages.js").Verdict} Verdict */
 
 /** A mark for each verdict, so that it does not depend on color. @type {Record<Verdict | "open", string>} */
-const MARKS = { pass: "✓", fail: "✗", undecided: "?", open: "…" };
+const MARKS = { pass: "✓", fail: "✗", undecided: "?", not_asked: "–", open: "…" };
 
 /**
  * @param {HTMLElement} place
@@ -20,7 +20,7 @@ export function renderVerdicts(place, store) {
   const entries = standings.map(({ expectation, verdict }) => {
     const stands = verdict ?? "open";
     return html`<li class="verdict ${stands}" data-testid="verdict">
-      <span class="mark" aria-hidden="true">${MARKS[stands]}</span> <span class="word">${stands}</span> <span>${expectation}</span></li>`;
+      <span class="mark" aria-hidden="true">${MARKS[stands]}</span> <span class="word">${stands.replace("_", " ")}</span> <span>${expectation}</span></li>`;
   });
   render(html`${entries}`, place);
 }

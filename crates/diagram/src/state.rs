@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use protocol::event::Cause;
 use protocol::messages::FaultKind;
 use protocol::{Event, RobotName, Seq, Tick};
+use timeline::{Kind, States, Stay};
 
 use crate::items::{
     Absence, Band, BandKind, Change, Command, CommandEnd, Cut, Fault, Items, Joined, Missed,
@@ -16,6 +17,8 @@ use crate::items::{
 pub struct State {
     /// The robots, by name. A name that first occurs in an event is added.
     robots: BTreeMap<RobotName, RobotState>,
+    /// Their emotions and behaviors, and whether they take part.
+    states: States,
     /// Commands under way, by sender and number.
     commands: BTreeMap<(RobotName, Seq), Command>,
     cuts: BTreeMap<(RobotName, RobotName), Cut>,
@@ -28,10 +31,6 @@ pub struct State {
 /// What is in progress at a robot, each with the tick in which it began.
 #[derive(Debug, Clone, Default)]
 struct RobotState {
-    emotion: Option<(String, Tick)>,
-    behavior: Option<(String, Tick)>,
-    /// Since when it does not take part.
-    lost: Option<Tick>,
     /// The last ticks that it missed.
     missed: Option<Period>,
     faults: Vec<(FaultKind, Tick)>,
@@ -63,11 +62,11 @@ impl State {
 
     /// Applies an event. What is over with it goes to `items`.
     pub(crate) fn apply(&mut self, tick: Tick, event: &Event, items: &mut Items) {
+        self.apply_to_states(tick, event, items);
         match event {
             Event::Joined {
                 robot, generation, ..
             } => {
-                self.end_absence(robot, tick, items);
                 if tick > 0 || generation.is_some() {
                     items.joined.push(Joined {
                         robot: robot.clone(),
@@ -76,14 +75,7 @@ impl State {
                     });
                 }
             }
-            Event::Lost { robot } => self.lose(robot, tick, items),
             Event::Missed { robot } => self.miss(robot, tick, items),
-            Event::Emotion { robot, to, .. } => {
-                self.change(robot, BandKind::Emotion, to, tick, items);
-            }
-            Event::Behavior { robot, to, .. } => {
-                self.change(robot, BandKind::Behavior, to, tick, items);
-            }
             Event::Fault {
                 robot,
                 kind,
@@ -121,6 +113,9 @@ impl State {
                 set: set.clone(),
             }),
             Event::Init { .. }
+            | Event::Lost { .. }
+            | Event::Emotion { .. }
+            | Event::Behavior { .. }
             | Event::DoneLate { .. }
             | Event::Blocked { .. }
             | Event::Say { .. }
@@ -134,17 +129,7 @@ impl State {
     /// one, which is known only then; the same with lost queries.
     pub(crate) fn add_unfinished(&self, items: &mut Items) {
         for (name, robot) in &self.robots {
-            if robot.lost.is_none() {
-                let emotion = robot.emotion.as_ref();
-                items
-                    .bands
-                    .extend(emotion.map(|state| band(name, BandKind::Emotion, state, None)));
-                let behavior = robot.behavior.as_ref();
-                items
-                    .bands
-                    .extend(behavior.map(|state| band(name, BandKind::Behavior, state, None)));
-            }
-            if let Some(begin) = robot.lost {
+            if let Some(begin) = self.states.lost_since(name) {
                 items.absences.push(Absence {
                     robot: name.clone(),
                     period: since(begin),
@@ -165,6 +150,13 @@ impl State {
             }
         }
 
+        for stay in self.states.lasting(Tick::MAX) {
+            let begin = stay.begin;
+            let mut lasting = band(stay);
+            lasting.period = since(begin);
+            items.bands.push(lasting);
+        }
+
         items.commands.extend(self.commands.values().cloned());
         items.cuts.extend(self.cuts.values().cloned());
         items.queries.extend(self.queries.values().cloned());
@@ -182,66 +174,29 @@ impl State {
         self.robots.entry(name.clone()).or_default()
     }
 
-    fn change(
-        &mut self,
-        name: &RobotName,
-        kind: BandKind,
-        to: &str,
-        tick: Tick,
-        items: &mut Items,
-    ) {
-        let robot = self.robot(name);
-        let is_absent = robot.lost.is_some();
-        let place = match kind {
-            BandKind::Emotion => &mut robot.emotion,
-            BandKind::Behavior => &mut robot.behavior,
-        };
-
-        let before = place.replace((to.to_owned(), tick));
-        if let Some(before) = before
-            && !is_absent
+    /// Applies an event to the states of the robots. A robot that is back ends its absence.
+    fn apply_to_states(&mut self, tick: Tick, event: &Event, items: &mut Items) {
+        if let Event::Joined { robot, .. } = event
+            && let Some(begin) = self.states.lost_since(robot)
         {
-            items.bands.push(band(name, kind, &before, Some(tick)));
+            items.absences.push(Absence {
+                robot: robot.clone(),
+                period: Period {
+                    begin,
+                    end: Some(tick),
+                },
+            });
         }
-    }
-
-    fn lose(&mut self, name: &RobotName, tick: Tick, items: &mut Items) {
-        let robot = self.robot(name);
-        if robot.lost.is_some() {
-            return;
+        if let Event::Joined { robot, .. }
+        | Event::Lost { robot }
+        | Event::Emotion { robot, .. }
+        | Event::Behavior { robot, .. } = event
+        {
+            self.robot(robot);
         }
 
-        robot.lost = Some(tick);
-        let bands = [
-            (BandKind::Emotion, &robot.emotion),
-            (BandKind::Behavior, &robot.behavior),
-        ];
-        for (kind, state) in bands {
-            let ended = state
-                .as_ref()
-                .map(|state| band(name, kind, state, Some(tick)));
-            items.bands.extend(ended);
-        }
-    }
-
-    /// A robot is back. Its emotion and its behavior go on unless an event changes them.
-    fn end_absence(&mut self, name: &RobotName, tick: Tick, items: &mut Items) {
-        let robot = self.robot(name);
-        let Some(begin) = robot.lost.take() else {
-            return;
-        };
-
-        let states = [&mut robot.emotion, &mut robot.behavior];
-        for (_, begin) in states.into_iter().flatten() {
-            *begin = tick;
-        }
-        items.absences.push(Absence {
-            robot: name.clone(),
-            period: Period {
-                begin,
-                end: Some(tick),
-            },
-        });
+        let over = self.states.apply(tick, event);
+        items.bands.extend(over.into_iter().map(band));
     }
 
     fn miss(&mut self, name: &RobotName, tick: Tick, items: &mut Items) {
@@ -397,12 +352,17 @@ fn only(tick: Tick) -> Period {
     }
 }
 
-fn band(robot: &RobotName, kind: BandKind, state: &(String, Tick), end: Option<Tick>) -> Band {
-    let (name, begin) = state;
+fn band(stay: Stay) -> Band {
     Band {
-        robot: robot.clone(),
-        kind,
-        name: name.clone(),
-        period: Period { begin: *begin, end },
+        robot: stay.robot,
+        kind: match stay.kind {
+            Kind::Emotion => BandKind::Emotion,
+            Kind::Behavior => BandKind::Behavior,
+        },
+        name: stay.state,
+        period: Period {
+            begin: stay.begin,
+            end: Some(stay.end),
+        },
     }
 }

@@ -34,6 +34,7 @@ fn main() -> miette::Result<()> {
         experiment,
         set: Vec::new(),
         robots: Robots::InProcess,
+        origin: None,
     })?;
 
     let mut bare = Vec::new();

@@ -19,6 +19,7 @@ mod script;
 mod setting;
 mod store;
 pub mod submit;
+mod unheard;
 mod unit;
 
 pub use observe::Measure;

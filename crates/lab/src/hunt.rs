@@ -126,6 +126,8 @@ pub struct Report {
     pub ticks: Tick,
     /// Expectations that were checked.
     pub expectations: BTreeSet<String>,
+    /// Those of them that were asked in no run: what they are expected after did not happen.
+    pub never_asked: BTreeSet<String>,
     /// What was found, one for each cause for which an expectation fails.
     pub findings: Vec<Finding>,
     /// Number of plans that failed and were not shrunk, because there were too many findings already.
@@ -192,6 +194,7 @@ pub fn hunt(
             not_set_up: 0,
             ticks: 0,
             expectations: wanted.clone(),
+            never_asked: wanted.clone(),
             findings: Vec::new(),
             not_shrunk: 0,
             coverage: Coverage::default(),
@@ -314,6 +317,10 @@ impl Hunt<'_> {
             };
 
             self.report.ticks += played.ticks;
+            let not_asked = &played.not_asked;
+            self.report
+                .never_asked
+                .retain(|name| not_asked.contains(name));
             let features = std::mem::take(&mut played.features);
             if self.report.coverage.add(features) > 0 {
                 self.corpus.push(case.faults.clone());

@@ -8,6 +8,12 @@ use simulator::summary::{Judged, RobotSummary};
 
 /// Width of a full bar, characters.
 const BAR: usize = 10;
+/// Most texts of commands that are shown of a robot.
+const MOST_TEXTS: usize = 5;
+/// The time in which a robot takes no part.
+const ABSENT: &str = "(takes no part)";
+/// Times that differ by less are equal, seconds.
+const ROUNDING_S: f64 = 1e-6;
 /// A robot is named if the clock waited this long for it at a time, seconds of wall clock.
 const NOTICED_S: f64 = 0.5;
 /// Heads of the columns of [`rows`].
@@ -48,8 +54,8 @@ pub fn rows(summary: &Summary) -> Vec<[String; 5]> {
     for (name, robot) in &summary.robots {
         rows.push([
             name.to_string(),
-            shares(&robot.emotions_s, None),
-            shares(&robot.behaviors_s, Some(&robot.entered)),
+            shares(&robot.emotions_s, summary.time_s, None),
+            shares(&robot.behaviors_s, summary.time_s, Some(&robot.entered)),
             commands(robot),
             moves(robot),
         ]);
@@ -63,7 +69,7 @@ pub fn rows(summary: &Summary) -> Vec<[String; 5]> {
 pub fn verdicts(expectations: &BTreeMap<String, Judged>) -> Vec<String> {
     let mut lines = Vec::new();
     for (name, judged) in expectations {
-        let verdict = judged.verdict.name();
+        let verdict = judged.verdict;
         let mut line = format!("{verdict:<9}  {name}");
         if judged.verdict != Verdict::Pass {
             line += &format!(": {}", judged.because);
@@ -89,12 +95,24 @@ pub fn held_up(summary: &Summary) -> Vec<String> {
     lines
 }
 
-/// Shares of the time, the largest first: a bar, the percentage, and the number of times that the state was entered.
-fn shares(times_s: &BTreeMap<String, f64>, entered: Option<&BTreeMap<String, u64>>) -> String {
-    let total_s: f64 = times_s.values().sum();
-    let width = times_s.keys().map(String::len).max().unwrap_or(0);
-    let mut sorted: Vec<(&String, &f64)> = times_s.iter().collect();
-    sorted.sort_by(|a, b| b.1.total_cmp(a.1));
+/// Shares of the time of the run, the largest first: a bar, the percentage, and the number of times that the state was entered; then
+/// that in which the robot took no part.
+fn shares(
+    times_s: &BTreeMap<String, f64>,
+    total_s: f64,
+    entered: Option<&BTreeMap<String, u64>>,
+) -> String {
+    let mut sorted: Vec<(&str, f64)> = Vec::new();
+    for (state, time_s) in times_s {
+        sorted.push((state, *time_s));
+    }
+    sorted.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let absent_s = total_s - times_s.values().sum::<f64>();
+    if absent_s > ROUNDING_S {
+        sorted.push((ABSENT, absent_s));
+    }
+    let width = sorted.iter().map(|(state, _)| state.len()).max();
+    let width = width.unwrap_or(0);
 
     let mut lines = Vec::new();
     for (state, time_s) in sorted {
@@ -122,9 +140,17 @@ fn bar(share: f64) -> String {
 }
 
 fn commands(robot: &RobotSummary) -> String {
+    let mut sent: Vec<(&String, &u64)> = robot.sent.iter().collect();
+    sent.sort_by(|one, other| other.1.cmp(one.1));
+    let (shown, others) = sent.split_at(sent.len().min(MOST_TEXTS));
+
     let mut lines = Vec::new();
-    for (command, count) in &robot.sent {
+    for (command, count) in shown {
         lines.push(format!("{count} {command}"));
+    }
+    if !others.is_empty() {
+        let count: u64 = others.iter().map(|(_, count)| **count).sum();
+        lines.push(format!("{count} with {} further texts", others.len()));
     }
     lines.push(format!("{} received", robot.received));
     if robot.dropped > 0 {

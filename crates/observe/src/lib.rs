@@ -4,6 +4,7 @@ pub mod expect;
 pub mod measure;
 mod pattern;
 mod probe;
+pub mod words;
 
 use protocol::messages::{Point, StateVariables};
 use protocol::{Event, RobotName, Tick};
@@ -12,6 +13,7 @@ pub use expect::{Expectation, Judgment, Watch, Watches};
 pub use measure::{Kind, Measure, MeasureError, Measured};
 pub use pattern::{Pattern, PatternError};
 pub use probe::Probe;
+pub use words::Words;
 
 /// A complete tick of a run, or its end.
 pub struct Observation<'a> {

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
 use crate::pattern::Pattern;
+use crate::words::{self, Word};
 
 /// Longest name of a measure, bytes.
 const MAX_NAME_BYTES: usize = 100;
@@ -111,7 +112,7 @@ pub enum OfDurations {
     Count,
 }
 
-/// The states of a robot whose share is measured.
+/// The states of a robot whose share of the time of the run is measured. While it takes no part, it is in none.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(try_from = "RawShare")]
 pub struct Share {
@@ -285,12 +286,20 @@ pub enum MeasureError {
     /// It names a part of the run and counts no events.
     #[error("`when` is for `count` only")]
     NoEvents,
-    /// Its name is empty, or too long, or has control characters.
-    #[error("a name has 1 to {MAX_NAME_BYTES} bytes, and no control characters")]
+    /// Its name is empty, or too long, or has control characters or blanks around it.
+    #[error(
+        "a name has 1 to {MAX_NAME_BYTES} bytes, no control characters, and no blanks before or after it"
+    )]
     Name,
     /// A share names no states.
     #[error("`share` names either `emotion` or `behavior`, with one word or several")]
     NoStates,
+    /// Two events that may be those of different robots.
+    #[error(
+        "`{0}` and `{1}` leave open whose events they are, so those of different robots would make pairs: name `{2}` in both, or \
+         write `{2} = \"*\"` for every robot"
+    )]
+    Open(&'static str, &'static str, &'static str),
     /// A variable of a robot that is not `ROBOT.VARIABLE`.
     #[error("\"{0}\" is not a state variable of a robot, such as \"Butler.served\"")]
     NoVariable(String),
@@ -352,6 +361,16 @@ impl TryFrom<RawMeasure> for Measure {
             return Err(MeasureError::NoEvents);
         }
 
+        if let Some(time) = &raw.time
+            && let Some(after) = &time.get_ref().after
+        {
+            check_pair(("after", after), ("to", &time.get_ref().to), &["robot"])?;
+        }
+        if let Some(between) = &raw.between {
+            let Between { begin, end, .. } = between.get_ref();
+            check_pair(("begin", begin), ("end", end), &["robot", "from", "to"])?;
+        }
+
         let when = raw.when;
         let kinds = [
             raw.summary.map(|path| spanned(path, Kind::Summary)),
@@ -382,6 +401,21 @@ impl TryFrom<RawMeasure> for Measure {
     }
 }
 
+/// Checks that two patterns, each with its key, say whose events they are where both could: events of different robots make no
+/// pair unless that is wanted.
+fn check_pair(
+    (key, one): (&'static str, &Pattern),
+    (other_key, other): (&'static str, &Pattern),
+    fields: &[&'static str],
+) -> Result<(), MeasureError> {
+    for field in fields {
+        if one.leaves_open(field) && other.leaves_open(field) {
+            return Err(MeasureError::Open(key, other_key, field));
+        }
+    }
+    Ok(())
+}
+
 fn spanned<T>(raw: Spanned<T>, kind: impl FnOnce(T) -> Kind) -> (Kind, Range<usize>) {
     let span = raw.span();
     (kind(raw.into_inner()), span)
@@ -393,7 +427,8 @@ fn spanned<T>(raw: Spanned<T>, kind: impl FnOnce(T) -> Kind) -> (Kind, Range<usi
 /// [`MeasureError::Name`].
 pub fn check_name(name: &str) -> Result<(), MeasureError> {
     let is_short = (1..=MAX_NAME_BYTES).contains(&name.len());
-    if is_short && !name.chars().any(char::is_control) {
+    let is_bare = name.trim() == name;
+    if is_short && is_bare && !name.chars().any(char::is_control) {
         return Ok(());
     }
     Err(MeasureError::Name)
@@ -504,6 +539,54 @@ impl Measure {
         self.span.clone()
     }
 
+    /// The words that robots choose and that it names.
+    pub(crate) fn words(&self) -> Vec<Word> {
+        let share = match &self.kind {
+            Kind::Count(count) => return count.pattern.words(),
+            Kind::Time(time) => {
+                let mut named = time.to.words();
+                named.extend(time.after.iter().flat_map(Pattern::words));
+                return named;
+            }
+            Kind::Between(between) => {
+                let mut named = between.begin.words();
+                named.extend(between.end.words());
+                return named;
+            }
+            Kind::Share(share) => share,
+            Kind::Summary(_) | Kind::Variable(_) | Kind::Stalled(_) => return Vec::new(),
+        };
+
+        let (kind, states) = match &share.states {
+            States::Emotions(states) => (words::Kind::Emotion, states),
+            States::Behaviors(states) => (words::Kind::Behavior, states),
+        };
+        let mut named = Vec::new();
+        for state in states {
+            named.push(Word {
+                kind,
+                robots: vec![share.robot.to_string()],
+                word: state.clone(),
+            });
+        }
+        named
+    }
+
+    /// The state variables that it needs: robots and names.
+    #[must_use]
+    pub fn variables(&self) -> Vec<(&RobotName, &str)> {
+        match &self.kind {
+            Kind::Variable(variable) => vec![(&variable.robot, variable.name.as_str())],
+            Kind::Stalled(stalled) => {
+                let progress = stalled.progress.iter();
+                progress
+                    .map(|counter| (&counter.robot, counter.variable.as_str()))
+                    .collect()
+            }
+            _ => Vec::new(),
+        }
+    }
+
     /// The robots that it names. A run has the number only if its roster has them.
     #[must_use]
     pub fn robots(&self) -> Vec<&str> {
@@ -583,6 +666,19 @@ mod tests {
     #[test]
     fn what_cannot_be_measured_is_refused() {
         for (text, reason) in [
+            (
+                "between = { begin = { event = 'behavior', to = 'X' }, end = { event = 'behavior', from = 'X' }, as = 'sum' }",
+                "name `robot` in both, or write `robot = \"*\"`",
+            ),
+            (
+                "between = { begin = { event = 'command_sent', from = 'A' }, end = { event = 'command_delivered', from = 'A' }, \
+                 as = 'sum' }",
+                "name `to` in both",
+            ),
+            (
+                "time = { after = { event = 'lost' }, to = { event = 'joined' } }",
+                "`after` and `to` leave open whose events they are",
+            ),
             ("", "exactly one of"),
             (
                 "summary = 'a'\nstalled = { progress = ['A.x'], for = '1 s' }",
@@ -647,7 +743,10 @@ mod tests {
             let error = measure(text).unwrap_err();
             assert!(error.contains(reason), "{text}: {error}");
         }
-        assert!(toml::from_str::<Measure>("name = ''\nsummary = 'ticks'").is_err());
+        for name in ["", " ", "\u{a0}", " x", "x "] {
+            let text = format!("name = '{name}'\nsummary = 'ticks'");
+            assert!(toml::from_str::<Measure>(&text).is_err(), "{name:?}");
+        }
         assert!(toml::from_str::<Measure>("name = \"a\\nb\"\nsummary = 'ticks'").is_err());
     }
 }

@@ -7,8 +7,10 @@ use protocol::{Event, RobotName};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use crate::words::{self, Word};
+
 /// A set of events, in a file `{ event = "behavior", robot = "Butler", to = "EXCHANGE" }`. A field with a list of values matches
-/// each of them; a field that is not named matches everything.
+/// each of them; a field that is not named matches everything, and so does the robot `"*"`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "BTreeMap<String, Value>", into = "Value")]
 pub struct Pattern {
@@ -16,9 +18,12 @@ pub struct Pattern {
     fields: BTreeMap<String, Wanted>,
 }
 
-/// The values of a field that match.
+/// The values of a field that match; empty for every robot.
 #[derive(Debug, Clone, PartialEq)]
 struct Wanted(Vec<Value>);
+
+/// Every robot, as the value of a field.
+const EVERY_ROBOT: &str = "*";
 
 /// A pattern that no event can match.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -199,6 +204,10 @@ impl TryFrom<BTreeMap<String, Value>> for Pattern {
             if values.is_empty() {
                 return Err(PatternError::NoValue { kind, field });
             }
+            if *domain == Domain::Robot && values == [EVERY_ROBOT] {
+                fields.insert(field, Wanted(Vec::new()));
+                continue;
+            }
             if let Some(value) = values.iter().find(|value| !domain.has(value)) {
                 return Err(PatternError::UnknownValue {
                     kind,
@@ -230,6 +239,7 @@ impl From<Pattern> for Value {
         table.insert("event".to_owned(), Self::String(pattern.kind));
         for (field, Wanted(mut values)) in pattern.fields {
             let value = match values.len() {
+                0 => EVERY_ROBOT.into(),
                 1 => values.remove(0),
                 _ => Self::Array(values),
             };
@@ -261,7 +271,39 @@ impl Pattern {
         };
         self.fields
             .iter()
-            .all(|(field, wanted)| wanted.0.iter().any(|value| equal(value, &event[field])))
+            .all(|(field, wanted)| wanted.has(&event[field]))
+    }
+
+    /// Whether its events have a field with the name of a robot, of which it says nothing.
+    pub(crate) fn leaves_open(&self, field: &str) -> bool {
+        let is_robot = KINDS[&self.kind].get(field) == Some(&Domain::Robot);
+        is_robot && !self.fields.contains_key(field)
+    }
+
+    /// The words that robots choose and that it names.
+    pub(crate) fn words(&self) -> Vec<Word> {
+        let (kind, of, fields): (_, _, &[&str]) = match self.kind.as_str() {
+            "emotion" => (words::Kind::Emotion, "robot", &["from", "to"]),
+            "behavior" => (words::Kind::Behavior, "robot", &["from", "to"]),
+            "command_sent" => (words::Kind::Command, "from", &["command"]),
+            _ => return Vec::new(),
+        };
+
+        let texts = |field: &str| {
+            let wanted = self.fields.get(field).into_iter();
+            wanted.flat_map(|wanted| wanted.0.iter().filter_map(Value::as_str).map(str::to_owned))
+        };
+        let mut named = Vec::new();
+        for field in fields {
+            for word in texts(field) {
+                named.push(Word {
+                    kind,
+                    robots: texts(of).collect(),
+                    word,
+                });
+            }
+        }
+        named
     }
 
     /// The robots that the pattern names. An event of a run can match only if its roster has them.
@@ -272,6 +314,12 @@ impl Pattern {
             .iter()
             .filter(|(field, _)| domains[*field] == Domain::Robot);
         of_robots.flat_map(|(_, wanted)| wanted.0.iter().filter_map(Value::as_str))
+    }
+}
+
+impl Wanted {
+    fn has(&self, value: &Value) -> bool {
+        self.0.is_empty() || self.0.iter().any(|wanted| equal(wanted, value))
     }
 }
 
@@ -287,7 +335,10 @@ impl std::fmt::Display for Pattern {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(&self.kind)?;
         for (place, (field, wanted)) in self.fields.iter().enumerate() {
-            let values: Vec<String> = wanted.0.iter().map(plain).collect();
+            let mut values: Vec<String> = wanted.0.iter().map(plain).collect();
+            if values.is_empty() {
+                values.push("of every name".to_owned());
+            }
             let comma = if place > 0 { ", " } else { " with " };
             write!(f, "{comma}{field} {}", values.join(" or "))?;
         }
@@ -338,6 +389,15 @@ mod tests {
         assert!(!one.matches(&enters("A", "Z")));
         assert_eq!(one.robots().collect::<Vec<_>>(), ["A"]);
         assert_eq!(one.to_string(), "behavior with robot A, to X or Y");
+
+        let every = pattern("{ event = 'behavior', robot = '*', to = 'X' }").unwrap();
+        assert!(every.matches(&enters("A", "X")) && every.matches(&enters("B", "X")));
+        assert!(!every.matches(&enters("A", "Y")));
+        assert_eq!(every.robots().count(), 0);
+        assert!(any.leaves_open("robot") && !every.leaves_open("robot"));
+        assert!(!any.leaves_open("to"));
+        let written = Value::from(every.clone());
+        assert_eq!(Pattern::try_from(written), Ok(every));
     }
 
     #[test]

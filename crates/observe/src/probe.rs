@@ -1,7 +1,8 @@
 //! Takes a measure of a run, one observation after the other.
 
-use protocol::{Event, RobotName};
+use protocol::{RobotName, Tick};
 use serde_json::Value;
+use timeline::{Kind as StateKind, Stay};
 
 use crate::Observation;
 use crate::measure::{
@@ -9,10 +10,12 @@ use crate::measure::{
     States, TimeTo, When,
 };
 
+/// Tables of a robot's summary that have entries for what occurred.
+const OCCURRED: [&str; 4] = ["emotions_s", "behaviors_s", "entered", "sent"];
+
 /// A measure of one run.
 #[derive(Debug)]
 pub struct Probe<'a> {
-    measure: &'a Measure,
     /// Time of the last observation, simulated seconds. A run begins at 0.
     now_s: f64,
     tally: Tally<'a>,
@@ -52,8 +55,9 @@ impl<'a> Probe<'a> {
             }),
             Kind::Share(share) => Tally::Share(ShareTally {
                 definition: share,
-                entered_s: None,
-                total_s: 0.0,
+                robots: timeline::States::default(),
+                ticks: 0,
+                now: 0,
             }),
             Kind::Variable(variable) => Tally::Variable(VariableTally {
                 definition: variable,
@@ -66,11 +70,7 @@ impl<'a> Probe<'a> {
             }),
         };
 
-        Self {
-            measure,
-            now_s: 0.0,
-            tally,
-        }
+        Self { now_s: 0.0, tally }
     }
 
     /// Takes a tick, or the end of the run, into account.
@@ -96,7 +96,7 @@ impl<'a> Probe<'a> {
             Tally::Count(tally) => Measured::from(tally.count as f64),
             Tally::Time(tally) => tally.measured(now_s),
             Tally::Between(tally) => tally.measured(now_s),
-            Tally::Share(tally) => Measured::from(tally.share(now_s)),
+            Tally::Share(tally) => tally.measured(),
             Tally::Variable(tally) => tally.measured(now_s),
             Tally::Stalled(tally) => tally.measured(now_s),
         }
@@ -128,7 +128,13 @@ fn sum(value: &Value, path: &[&str]) -> Option<f64> {
     let table = value.as_object()?;
 
     if *first != "*" {
-        return sum(table.get(*first)?, rest);
+        return match (table.get(*first)?, rest) {
+            // What did not occur has no entry.
+            (Value::Object(occurred), [word]) if OCCURRED.contains(first) && *word != "*" => {
+                occurred.get(*word).map_or(Some(0.0), Value::as_f64)
+            }
+            (next, rest) => sum(next, rest),
+        };
     }
 
     let mut total = 0.0;
@@ -287,48 +293,43 @@ impl BetweenTally<'_> {
 #[derive(Debug)]
 struct ShareTally<'a> {
     definition: &'a Share,
-    /// Since when the robot has been in one of the states, simulated seconds.
-    entered_s: Option<f64>,
-    /// Time in the states before, seconds.
-    total_s: f64,
+    robots: timeline::States,
+    /// Ticks in the states before.
+    ticks: Tick,
+    /// The last tick.
+    now: Tick,
 }
 
 impl ShareTally<'_> {
     fn observe(&mut self, observation: &Observation<'_>) {
+        self.now = observation.tick;
         for event in observation.events {
-            let (of, to, states) = match (event, &self.definition.states) {
-                (Event::Emotion { robot, to, .. }, States::Emotions(states))
-                | (Event::Behavior { robot, to, .. }, States::Behaviors(states)) => {
-                    (robot, to, states)
-                }
-                _ => continue,
-            };
-
-            if *of == self.definition.robot {
-                let is_in = states.contains(to);
-                self.change(is_in, observation.time_s);
+            for stay in self.robots.apply(observation.tick, event) {
+                self.ticks += self.counted(&stay);
             }
         }
     }
 
-    fn change(&mut self, is_in: bool, now_s: f64) {
-        match self.entered_s {
-            None if is_in => self.entered_s = Some(now_s),
-            Some(entered_s) if !is_in => {
-                self.total_s += now_s - entered_s;
-                self.entered_s = None;
-            }
-            _ => {}
-        }
+    /// How many ticks of a stay count.
+    fn counted(&self, stay: &Stay) -> Tick {
+        let (kind, states) = match &self.definition.states {
+            States::Emotions(states) => (StateKind::Emotion, states),
+            States::Behaviors(states) => (StateKind::Behavior, states),
+        };
+        let is_of_robot = stay.robot == self.definition.robot && stay.kind == kind;
+        let is_counted = is_of_robot && states.contains(&stay.state);
+        if is_counted { stay.ticks() } else { 0 }
     }
 
-    fn share(&self, now_s: f64) -> f64 {
-        if now_s <= 0.0 {
-            return f64::from(u8::from(self.entered_s.is_some()));
+    fn measured(&self) -> Measured {
+        if self.now == 0 {
+            let reason = "a run that ends with tick 0 lasts for no time".to_owned();
+            return Measured::Missing { reason };
         }
 
-        let last_s = self.entered_s.map_or(0.0, |entered_s| now_s - entered_s);
-        (self.total_s + last_s) / now_s
+        let lasting = self.robots.lasting(self.now);
+        let lasting: Tick = lasting.iter().map(|stay| self.counted(stay)).sum();
+        Measured::from((self.ticks + lasting) as f64 / self.now as f64)
     }
 }
 
@@ -439,6 +440,7 @@ mod tests {
     use std::collections::BTreeMap;
 
     use proptest::prelude::*;
+    use protocol::Event;
     use protocol::messages::{Point, StateVariables, Variable};
     use serde_json::json;
 
@@ -560,7 +562,11 @@ mod tests {
         };
         assert_eq!(at("robots.A.sent.x"), Measured::from(2.0));
         assert_eq!(at("robots.*.sent.*"), Measured::from(5.0));
-        for missing in ["robots.A.sent", "robots.C.sent.x"] {
+        // What did not occur has no entry, and is 0.
+        assert_eq!(at("robots.B.sent.x"), Measured::from(0.0));
+        assert_eq!(at("robots.*.sent.y"), Measured::from(3.0));
+        assert_eq!(at("robots.*.sent.z"), Measured::from(0.0));
+        for missing in ["robots.A.sent", "robots.A.x", "robots.C.sent.x"] {
             let error = reason_of(at(missing));
             assert!(error.contains(missing), "{error}");
         }
@@ -689,8 +695,29 @@ mod tests {
         assert_eq!(certain_of(sad, &ticks), 0.5);
         assert_eq!(certain_of(behavior, &ticks), 1.0);
         assert_eq!(certain_of(sad, &[Tick::default(), Tick::default()]), 0.0);
-        // A run that ends with its first tick.
-        assert_eq!(certain_of(sad, &ticks[..1]), 1.0);
+        let at_once = take(sad, &ticks[..1]);
+        assert!(reason_of(at_once).contains("tick 0"));
+    }
+
+    /// From the tick in which it is lost on a robot is in no state; the share is of the whole run nevertheless.
+    #[test]
+    fn a_robot_that_is_lost_is_in_no_state() {
+        let lost = Event::Lost { robot: name("A") };
+        let back = Event::Joined {
+            robot: name("A"),
+            generation: None,
+            at: Default::default(),
+        };
+        let mut ticks = vec![Tick::default(); 11];
+        ticks[0] = happens(&[&feels("A", "SAD")]);
+        ticks[3] = happens(&[&lost]);
+        let sad = "share = { robot = 'A', emotion = 'SAD' }";
+        assert_eq!(certain_of(sad, &ticks), 0.3);
+
+        ticks[8] = happens(&[&back]);
+        assert_eq!(certain_of(sad, &ticks), 0.5);
+        ticks[8] = happens(&[&back, &feels("A", "HAPPY")]);
+        assert_eq!(certain_of(sad, &ticks), 0.3);
     }
 
     #[test]

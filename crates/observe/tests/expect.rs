@@ -251,17 +251,24 @@ fn what_is_waited_for_at_the_end_is_undecided() {
 }
 
 #[test]
-fn without_any_event_that_it_is_expected_after_it_passes() {
+fn without_any_event_that_it_is_expected_after_it_is_not_asked() {
     let mut run = Run::of(AFTER_HEALING);
     run.quiet_until(10);
     assert_eq!(run.watch.end(End::Stopped).verdict, Verdict::Undecided);
     let judgment = run.watch.end(End::Finished);
-    assert_eq!(judgment.verdict, Verdict::Pass);
+    assert_eq!(judgment.verdict, Verdict::NotAsked);
     assert!(
         judgment
             .because
             .contains("nothing that it is expected after")
     );
+
+    // It was asked, and `unless` ended the wait.
+    assert_eq!(run.tick(&[cut(false)]), None);
+    assert_eq!(run.tick(&[cut(true)]), None);
+    let judgment = run.watch.end(End::Finished);
+    assert_eq!(judgment.verdict, Verdict::Pass);
+    assert!(judgment.because.contains("(1) was ended by `unless`"));
 }
 
 #[test]

@@ -55,12 +55,14 @@ pub(crate) fn experiment(
         .unwrap_or_default()
         .to_string_lossy()
         .into_owned();
+    let is_own_folder = out.is_none();
     let folder = out.unwrap_or_else(|| Path::new(engine::OUT).join(&name));
     let request = Request {
         name,
         experiment,
         set,
         robots: Robots::InProcess,
+        origin: file.canonicalize().ok().filter(|_| is_own_folder),
     };
     let jobs = jobs.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
 
@@ -105,6 +107,7 @@ fn play(
     let plan = Plan::new(request)?;
     plan.check()?;
     plan.check_begins()?;
+    plan.check_origin(folder)?;
     plan.save(folder)?;
 
     let options = Options {
@@ -138,10 +141,10 @@ fn play(
 }
 
 /// The fields of `cars.Verdict`.
-type Judgment = (String, &'static str, Vec<usize>, Vec<usize>);
+type Judgment = (String, &'static str, Vec<usize>, Vec<usize>, Vec<usize>);
 
-/// What an experiment expects of every run: name, verdict, and the numbers of the units that fail it and of those in which it is
-/// undecided.
+/// What an experiment expects of every run: name, verdict, and the numbers of the units that fail it, of those in which it is
+/// undecided, and of those in which it was not asked.
 #[pyfunction]
 pub(crate) fn verdicts(folder: PathBuf) -> PyResult<Vec<Judgment>> {
     let results = Results::load(&folder).map_err(reported)?;
@@ -149,7 +152,13 @@ pub(crate) fn verdicts(folder: PathBuf) -> PyResult<Vec<Judgment>> {
     for judged in results.judged() {
         let name = judged.expectation.to_owned();
         let verdict = judged.verdict().name();
-        verdicts.push((name, verdict, judged.failed, judged.undecided));
+        verdicts.push((
+            name,
+            verdict,
+            judged.failed,
+            judged.undecided,
+            judged.not_asked,
+        ));
     }
     Ok(verdicts)
 }

@@ -9,6 +9,7 @@ use protocol::event::WaitedFor;
 use protocol::messages::{End, StateVariables, Verdict};
 use protocol::{Event, RobotName, RunName, Tick};
 use serde::{Deserialize, Serialize};
+use timeline::{Kind, States, Stay};
 
 pub use network::{CutSummary, LinkSummary, NetworkSummary};
 
@@ -50,7 +51,7 @@ pub struct Summary {
     #[serde(skip)]
     begun: Option<Instant>,
     #[serde(skip)]
-    since: BTreeMap<RobotName, Since>,
+    states: States,
 }
 
 /// A verdict on an expectation.
@@ -67,9 +68,9 @@ pub struct Judged {
 /// Metrics of one robot.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct RobotSummary {
-    /// Simulated seconds in each emotion.
+    /// Simulated seconds in each emotion, without those in which it took no part.
     pub emotions_s: BTreeMap<String, f64>,
-    /// Simulated seconds in each behavior.
+    /// Simulated seconds in each behavior, without those in which it took no part.
     pub behaviors_s: BTreeMap<String, f64>,
     /// How often it entered each behavior, the first one included.
     pub entered: BTreeMap<String, u64>,
@@ -114,13 +115,6 @@ pub struct HeldUp {
     pub longest_s: f64,
 }
 
-/// The current emotion and behavior of a robot, and the ticks in which they began.
-#[derive(Debug, Clone, PartialEq, Default)]
-struct Since {
-    emotion: Option<(String, Tick)>,
-    behavior: Option<(String, Tick)>,
-}
-
 impl Summary {
     /// The empty summary of an epoch.
     #[must_use]
@@ -143,7 +137,7 @@ impl Summary {
             expectations: BTreeMap::new(),
             wall: Wall::default(),
             begun: None,
-            since: BTreeMap::new(),
+            states: States::default(),
         }
     }
 
@@ -151,10 +145,14 @@ impl Summary {
     pub fn count(&mut self, simulation: &Simulation, tick: Tick, event: &Event) {
         let tick_s = simulation.scenario().tick_s;
         self.network.count(simulation, tick, event);
+        for stay in self.states.apply(tick, event) {
+            self.add(stay, tick_s);
+        }
 
         match event {
-            Event::Emotion { robot, to, .. } => self.enter_emotion(robot, to, tick, tick_s),
-            Event::Behavior { robot, to, .. } => self.enter_behavior(robot, to, tick, tick_s),
+            Event::Behavior { robot, to, .. } => {
+                *self.robot(robot).entered.entry(to.clone()).or_default() += 1;
+            }
             Event::Blocked { robot, .. } => self.robot(robot).blocked += 1,
             Event::CommandSent { from, command, .. } => {
                 *self.robot(from).sent.entry(command.clone()).or_default() += 1;
@@ -199,18 +197,15 @@ impl Summary {
         self.robots.entry(name.clone()).or_default()
     }
 
-    fn enter_emotion(&mut self, robot: &RobotName, to: &str, tick: Tick, tick_s: f64) {
-        let since = self.since.entry(robot.clone()).or_default();
-        let left = since.emotion.replace((to.to_owned(), tick));
-        add(&mut self.robot(robot).emotions_s, left, tick, tick_s);
-    }
-
-    fn enter_behavior(&mut self, robot: &RobotName, to: &str, tick: Tick, tick_s: f64) {
-        let since = self.since.entry(robot.clone()).or_default();
-        let left = since.behavior.replace((to.to_owned(), tick));
-        let robot = self.robot(robot);
-        add(&mut robot.behaviors_s, left, tick, tick_s);
-        *robot.entered.entry(to.to_owned()).or_default() += 1;
+    /// Adds the time in a state that is over.
+    fn add(&mut self, stay: Stay, tick_s: f64) {
+        let ticks = stay.ticks();
+        let robot = self.robot(&stay.robot);
+        let times_s = match stay.kind {
+            Kind::Emotion => &mut robot.emotions_s,
+            Kind::Behavior => &mut robot.behaviors_s,
+        };
+        *times_s.entry(stay.state).or_default() += ticks as f64 * tick_s;
     }
 
     /// The verdict on the run: the worst of its expectations. A run of which nothing is expected passes.
@@ -250,22 +245,15 @@ impl Summary {
         self.time_s = simulation.time_s(ticks);
         self.digest = simulation.digest();
 
-        for (name, since) in std::mem::take(&mut self.since) {
-            let state_variables = simulation.state_variables(&name).cloned();
-            let robot = self.robot(&name);
-            add(&mut robot.emotions_s, since.emotion, ticks, tick_s);
-            add(&mut robot.behaviors_s, since.behavior, ticks, tick_s);
+        for stay in std::mem::take(&mut self.states).lasting(ticks) {
+            self.add(stay, tick_s);
+        }
+        for (name, robot) in &mut self.robots {
+            let state_variables = simulation.state_variables(name).cloned();
             robot.state_variables = state_variables.unwrap_or_default();
         }
 
         let elapsed = self.begun.map(|begun| begun.elapsed());
         self.wall.elapsed_s = elapsed.unwrap_or_default().as_secs_f64();
-    }
-}
-
-/// Adds the time in a state that a robot has left.
-fn add(times_s: &mut BTreeMap<String, f64>, left: Option<(String, Tick)>, now: Tick, tick_s: f64) {
-    if let Some((state, since)) = left {
-        *times_s.entry(state).or_default() += (now - since) as f64 * tick_s;
     }
 }

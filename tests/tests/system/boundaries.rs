@@ -11,9 +11,10 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("protocol", &[]),
     ("lockstep", &["protocol"]),
     ("config", &["protocol"]),
-    ("diagram", &["protocol"]),
+    ("timeline", &["protocol"]),
+    ("diagram", &["protocol", "timeline"]),
     ("statistics", &["protocol"]),
-    ("observe", &["config", "protocol"]),
+    ("observe", &["config", "protocol", "timeline"]),
     ("report", &["diagram"]),
     ("bus", &["protocol"]),
     ("recording", &["protocol"]),
@@ -43,6 +44,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "protocol",
             "recording",
             "terminal",
+            "timeline",
         ],
     ),
     (
@@ -78,6 +80,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "recording",
             "report",
             "statistics",
+            "timeline",
         ],
     ),
     (

@@ -55,10 +55,12 @@ fn the_hall_does_what_is_expected_of_it() {
         named([
             (OVERLAP, "pass"),
             (CALL, "pass"),
-            (HEALED, "pass"),
+            (HEALED, "not_asked"),
             (PROGRESS, "pass")
         ])
     );
+    let line = format!("not asked  {HEALED}: nothing that it is expected after happened until");
+    assert!(table.contains(&line), "{table}");
     assert!(
         table.contains(&format!("pass       {OVERLAP}\n")),
         "{table}"

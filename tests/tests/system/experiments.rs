@@ -4,6 +4,7 @@
 mod folder;
 mod numbers;
 mod refused;
+mod states;
 mod teams;
 mod verdicts;
 

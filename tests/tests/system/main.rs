@@ -47,6 +47,7 @@ mod report;
 mod returns;
 mod secure;
 mod shell;
+mod states;
 mod statistics;
 mod stay;
 mod temporary;

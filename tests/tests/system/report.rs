@@ -107,8 +107,7 @@ fn the_numbers_on_the_page_are_those_of_the_record() {
         assert_close(&row[2], variable.as_f64().unwrap());
     }
     for row in table(&document, &["Robot", "parts visited", "time, s"]) {
-        // Tick 0 counts, too.
-        assert_close(&row[2], 600.5);
+        assert_close(&row[2], 600.0);
     }
 }
 

@@ -338,9 +338,10 @@ export type Tone = "good" | "neutral" | "warning" | "bad";
  */
 export type Face = "happy" | "sad" | "surprised" | "disgusted" | "angry" | "fearful" | "neutral";
 /**
- * Whether a run has done what is expected of it. The worse is the greater.
+ * Whether a run has done what is expected of it. The worse is the greater: a run passes if one expectation does and no other one
+ * fails or is undecided.
  */
-export type Verdict = "pass" | "undecided" | "fail";
+export type Verdict = "not_asked" | "pass" | "undecided" | "fail";
 /**
  * What became of a command.
  */

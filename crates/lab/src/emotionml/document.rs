@@ -403,9 +403,9 @@ fn milliseconds(tick: u64, tick_s: f64) -> u64 {
     (tick as f64 * tick_s * 1000.0).round() as u64
 }
 
-/// Duration from the beginning of the first to the end of the last tick: an episode ends where the next one begins.
+/// Duration of an episode, which ends where the next one begins.
 fn duration_ms(episode: &Episode, tick_s: f64) -> u64 {
-    milliseconds(episode.last + 1, tick_s) - milliseconds(episode.first, tick_s)
+    milliseconds(episode.end, tick_s) - milliseconds(episode.first, tick_s)
 }
 
 /// The `*-set` attributes: one for each kind that occurs.

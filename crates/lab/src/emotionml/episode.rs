@@ -26,12 +26,23 @@ const ONESELF: &str = "self";
 /// Emotion state of a robot without emotions.
 const NEUTRAL: &str = "NEUTRAL";
 
-/// What a robot published in a tick.
+/// What is known of a robot in a tick.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Presence {
+    /// It has reported.
+    Reported,
+    /// Its report is missing: it is in the state that it reported last.
+    Missed,
+    /// It takes no part, and is in no state.
+    Absent,
+}
+
+/// What a robot published in a tick, or last.
 #[derive(Debug, Clone)]
 pub(super) struct RobotState {
     pub(super) name: RobotName,
-    /// Whether its report is missing, so that the other fields are older than the tick.
-    pub(super) missed: bool,
+    /// If it has not reported in the tick, the other fields are older.
+    pub(super) presence: Presence,
     pub(super) emotion: String,
     pub(super) behavior: String,
     /// Its state variables; `None` where the record has none.
@@ -85,14 +96,12 @@ impl Trace {
         }
     }
 
-    /// Repeats the last number for ticks without a report.
-    fn hold(&mut self, ticks: u64) {
+    /// Repeats the last number for a tick without a report.
+    fn hold(&mut self) {
         if let Some(values) = &mut self.0
             && let Some(last) = values.last().copied()
         {
-            for _ in 0..ticks {
-                values.push(last);
-            }
+            values.push(last);
         }
     }
 
@@ -109,8 +118,10 @@ pub(super) struct Episode {
     pub(super) begun: RobotState,
     /// First tick.
     pub(super) first: Tick,
-    /// Last tick with a report of the robot.
+    /// Last tick.
     pub(super) last: Tick,
+    /// The tick in which it was over, or the last tick of the run.
+    pub(super) end: Tick,
     /// The agent other than itself that the robot held responsible last.
     pub(super) other: Option<String>,
     /// The published numbers, in the order of [`NUMBERS`].
@@ -128,25 +139,33 @@ impl Episode {
             begun,
             first: tick,
             last: tick,
+            end: tick + 1,
             numbers,
             own_doing,
         }
     }
 
     fn extend(&mut self, tick: Tick, robot: &RobotState) {
-        let missed = tick.saturating_sub(self.last + 1);
-
         for (trace, (name, range)) in self.numbers.iter_mut().zip(NUMBERS) {
-            trace.hold(missed);
             trace.push(robot.published(name, &range));
         }
-        self.own_doing.hold(missed);
         self.own_doing.push(robot.agency().map(own_doing));
 
         if let Some(other) = robot.other() {
             self.other = Some(other.to_owned());
         }
         self.last = tick;
+        self.end = tick + 1;
+    }
+
+    /// The robot has not reported in a tick.
+    fn hold(&mut self, tick: Tick) {
+        for trace in &mut self.numbers {
+            trace.hold();
+        }
+        self.own_doing.hold();
+        self.last = tick;
+        self.end = tick + 1;
     }
 
     /// Intensity, tick by tick, if it was published in every tick.
@@ -193,15 +212,24 @@ pub(super) struct Episodes {
 impl Episodes {
     /// Adds the state of a robot in a tick. Returns the episode that it ends.
     ///
-    /// Ticks without a report belong to the episode if the next report has the same emotion. Otherwise the end of the
-    /// emotion is not known, and the episode ends with the last report.
+    /// Ticks without a report belong to the episode: the robot is in the state that it reported last. From the tick in which it
+    /// is lost on it takes no part, and its episode is over.
     pub(super) fn add(&mut self, tick: Tick, robot: RobotState) -> Option<Episode> {
-        if robot.missed {
-            return None;
+        if robot.presence == Presence::Reported {
+            self.note(&robot);
         }
-        self.note(&robot);
 
         let episode = self.robots.entry(robot.name.clone()).or_default();
+        match robot.presence {
+            Presence::Absent => return episode.take(),
+            Presence::Missed => {
+                if let Some(episode) = episode {
+                    episode.hold(tick);
+                }
+                return None;
+            }
+            Presence::Reported => {}
+        }
         match episode {
             Some(episode) if episode.begun.emotion == robot.emotion => {
                 episode.extend(tick, &robot);
@@ -211,9 +239,12 @@ impl Episodes {
         }
     }
 
-    /// The episodes in progress at the end of the run, by robot.
+    /// The episodes in progress at the end of the run, by robot. The run ends with its last tick: of that there is no time.
     pub(super) fn end(self) -> impl Iterator<Item = Episode> {
-        self.robots.into_values().flatten()
+        self.robots.into_values().flatten().map(|mut episode| {
+            episode.end = episode.last;
+            episode
+        })
     }
 
     /// Notes what is missing of a robot, once.
@@ -251,17 +282,17 @@ mod tests {
         let variables = [(INTENSITY.to_owned(), intensity.into())].into();
         RobotState {
             name: RobotName::new("Butler").unwrap(),
-            missed: false,
+            presence: Presence::Reported,
             emotion: emotion.to_owned(),
             behavior: String::new(),
             variables: Some(variables),
         }
     }
 
-    fn missed(emotion: &str) -> RobotState {
+    fn without_report(presence: Presence) -> RobotState {
         RobotState {
-            missed: true,
-            ..seen(emotion, 0.0)
+            presence,
+            ..seen("A", 0.0)
         }
     }
 
@@ -305,26 +336,31 @@ mod tests {
     }
 
     #[test]
-    fn missed_ticks_repeat_the_last_report_if_the_next_one_has_the_same_emotion() {
+    fn missed_ticks_repeat_the_last_report_and_an_absence_ends_the_episode() {
+        let missed = || without_report(Presence::Missed);
+        let absent = || without_report(Presence::Absent);
         let found = episodes(vec![
             seen("A", 0.1),
-            missed("A"),
-            missed("A"),
+            missed(),
+            missed(),
             seen("A", 0.4),
-            missed("A"),
+            missed(),
+            seen("B", 0.5),
         ]);
-
         assert_eq!(
             found,
-            [("A".to_owned(), 0, 3, Some(vec![0.1, 0.1, 0.1, 0.4]))]
+            [
+                ("A".to_owned(), 0, 4, Some(vec![0.1, 0.1, 0.1, 0.4, 0.4])),
+                ("B".to_owned(), 5, 5, Some(vec![0.5]))
+            ]
         );
 
-        let found = episodes(vec![seen("A", 0.1), missed("A"), seen("B", 0.4)]);
+        let found = episodes(vec![seen("A", 0.1), absent(), absent(), seen("A", 0.4)]);
         assert_eq!(
             found,
             [
                 ("A".to_owned(), 0, 0, Some(vec![0.1])),
-                ("B".to_owned(), 2, 2, Some(vec![0.4]))
+                ("A".to_owned(), 3, 3, Some(vec![0.4]))
             ]
         );
     }

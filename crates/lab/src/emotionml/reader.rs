@@ -1,6 +1,6 @@
 //! Reads the states of a run's robots tick by tick, from its recording, or from its events if it has no recording.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -13,8 +13,9 @@ use recording::{Recording, Ticks};
 use scenario::Scenario;
 use simulator::RunFolder;
 use simulator::recorder::{EVENTS, RECORDING, SCENARIO};
+use timeline::States;
 
-use super::episode::RobotState;
+use super::episode::{Presence, RobotState};
 use crate::folder::run_name;
 
 /// Longest line of a record, bytes; a tick of a thousand robots that publish much takes a hundredth of it.
@@ -67,6 +68,8 @@ struct Playback {
     ticks: Ticks,
     /// The last report of each robot.
     reports: BTreeMap<RobotName, Report>,
+    /// Who takes part.
+    states: States,
 }
 
 impl Reader {
@@ -115,6 +118,7 @@ impl Reader {
         let playback = Playback {
             ticks: Ticks::of(recording),
             reports: BTreeMap::new(),
+            states: States::default(),
         };
 
         let source = Source::Recording(Box::new(playback));
@@ -229,6 +233,9 @@ impl Playback {
             return Ok(None);
         };
 
+        for event in &tick.events {
+            self.states.apply(tick.frame.tick, event);
+        }
         self.reports.append(&mut tick.reports);
         let mut robots = Vec::new();
         for robot in &tick.frame.robots {
@@ -236,7 +243,7 @@ impl Playback {
             if let Some(report) = self.reports.get(&robot.name) {
                 robots.push(RobotState {
                     name: robot.name.clone(),
-                    missed: robot.missed.is_some(),
+                    presence: presence(&self.states, &robot.name, robot.missed.is_some()),
                     emotion: report.emotion_state.clone(),
                     behavior: report.behavior_state.clone(),
                     variables: Some(report.state_variables.clone()),
@@ -254,7 +261,7 @@ impl Playback {
 fn next_of(lines: &mut Lines, replay: &mut Replay) -> miette::Result<Option<Snapshot>> {
     while let Some(line) = lines.next()? {
         let tick = line.tick;
-        if let Some(robots) = replay.apply(line.event) {
+        if let Some(robots) = replay.apply(tick, line.event) {
             return Ok(Some(Snapshot { tick, robots }));
         }
     }
@@ -262,25 +269,31 @@ fn next_of(lines: &mut Lines, replay: &mut Replay) -> miette::Result<Option<Snap
     Ok(None)
 }
 
+/// Whether a robot has reported in a tick, and else why not.
+fn presence(states: &States, robot: &RobotName, has_missed: bool) -> Presence {
+    if states.lost_since(robot).is_some() {
+        return Presence::Absent;
+    }
+    if has_missed {
+        return Presence::Missed;
+    }
+    Presence::Reported
+}
+
 /// The states of the robots, restored from events, which contain only changes.
 #[derive(Debug, Default)]
 struct Replay {
     robots: BTreeMap<RobotName, RobotState>,
-    lost: BTreeSet<RobotName>,
+    states: States,
 }
 
 impl Replay {
     /// Applies an event. Returns the robots if the event completes a tick.
-    fn apply(&mut self, event: Event) -> Option<Vec<RobotState>> {
+    fn apply(&mut self, tick: Tick, event: Event) -> Option<Vec<RobotState>> {
+        self.states.apply(tick, &event);
         match event {
-            Event::Joined { robot, .. } => {
-                self.lost.remove(&robot);
-                self.state_of(robot);
-            }
-            Event::Lost { robot } => {
-                self.lost.insert(robot);
-            }
-            Event::Missed { robot } => self.state_of(robot).missed = true,
+            Event::Joined { robot, .. } => _ = self.state_of(robot),
+            Event::Missed { robot } => self.state_of(robot).presence = Presence::Missed,
             Event::Emotion { robot, to, .. } => self.state_of(robot).emotion = to,
             Event::Behavior { robot, to, .. } => self.state_of(robot).behavior = to,
             Event::Tick { .. } => return Some(self.end_tick()),
@@ -295,9 +308,10 @@ impl Replay {
         let mut robots = Vec::new();
         for robot in self.robots.values_mut() {
             let mut shown = robot.clone();
-            shown.missed |= self.lost.contains(&robot.name);
+            let has_missed = robot.presence == Presence::Missed;
+            shown.presence = presence(&self.states, &robot.name, has_missed);
             robots.push(shown);
-            robot.missed = false;
+            robot.presence = Presence::Reported;
         }
         robots
     }
@@ -306,7 +320,7 @@ impl Replay {
     fn state_of(&mut self, name: RobotName) -> &mut RobotState {
         let empty = RobotState {
             name: name.clone(),
-            missed: false,
+            presence: Presence::Reported,
             emotion: String::new(),
             behavior: String::new(),
             variables: None,
@@ -396,9 +410,14 @@ mod tests {
     /// Emotion of the only robot after each tick; `None` without a report.
     fn emotions(events: Vec<Event>) -> Vec<Option<String>> {
         let mut replay = Replay::default();
-        let ticks = events.into_iter().filter_map(|event| replay.apply(event));
+        let ticks = events
+            .into_iter()
+            .filter_map(|event| replay.apply(0, event));
         ticks
-            .map(|robots| (!robots[0].missed).then(|| robots[0].emotion.clone()))
+            .map(|robots| {
+                let has_reported = robots[0].presence == Presence::Reported;
+                has_reported.then(|| robots[0].emotion.clone())
+            })
             .collect()
     }
 

@@ -13,10 +13,10 @@ use miette::miette;
 use simulator::folder::check_no_links;
 use xxhash_rust::xxh3::xxh3_64;
 
-use super::plan::{Plan, Unit};
+use super::plan::{Plan, Robots, Unit};
 use super::processes::Launcher;
 use super::store::Store;
-use super::unit;
+use super::unit::{self, Played};
 use crate::export::draft::unwritable;
 
 /// Name of the threads that play units.
@@ -120,6 +120,7 @@ pub fn play(
     done: &(impl Fn() + Sync),
 ) -> miette::Result<()> {
     let _first = first(folder, queue)?;
+    try_arms(plan, store, queue, launcher, done)?;
     let shared = Shared {
         plan,
         queue,
@@ -154,6 +155,60 @@ pub fn play(
         return Err(error.into());
     }
     current.store.refresh()?;
+    Ok(())
+}
+
+/// Plays one unit of each arm before all others, if the robots are processes and no unit has been played: what they publish is known
+/// only then. A measure that all of them miss is refused before the others are played.
+fn try_arms(
+    plan: &Plan,
+    store: &mut Store,
+    queue: &mut Queue,
+    launcher: Launcher<'_>,
+    done: &impl Fn(),
+) -> miette::Result<()> {
+    if *plan.robots() == Robots::InProcess || queue.units.len() < plan.units() {
+        return Ok(());
+    }
+
+    let mut tried = Vec::new();
+    let mut names = BTreeSet::new();
+    for number in &queue.units {
+        if names.insert(plan.unit(*number).arm.name.clone()) {
+            tried.push(*number);
+        }
+    }
+    let mut played = Vec::new();
+    for number in &tried {
+        if queue.is_stopped.load(Ordering::Relaxed) {
+            return Ok(());
+        }
+        let unit = plan.unit(*number);
+        let result = plan.play(&unit, launcher);
+        store.add(unit.key, result.clone())?;
+        done();
+        match result {
+            Ok(one) => played.push(one),
+            // Why it failed is said at the end.
+            Err(_) => {
+                queue
+                    .units
+                    .retain(|other| other > number || !tried.contains(other));
+                return Ok(());
+            }
+        }
+    }
+
+    queue.units.retain(|number| !tried.contains(number));
+    let played: Vec<&Played> = played.iter().collect();
+    if let Some(first) = plan.missing_in_all(&played).first() {
+        return Err(miette!(
+            help = "a robot of a run that is recorded with `cars run` shows what it publishes: `cars export`",
+            "{first}, in no arm; {} of {} units have been played",
+            tried.len(),
+            plan.units()
+        ));
+    }
     Ok(())
 }
 

@@ -1,6 +1,6 @@
 //! The experiment file: read as written, then checked. Errors show the place in the file.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -9,6 +9,7 @@ use config::{FileError, Source, shipped};
 use observe::expect::check_all;
 use observe::measure::check_name;
 use observe::{Expectation, Measure};
+use protocol::RobotName;
 use scenario::Scenario;
 use serde::Deserialize;
 use toml::Spanned;
@@ -32,17 +33,21 @@ const MAX_VALUES: usize = 1_000;
 const MAX_TEXT_BYTES: usize = 2_000;
 /// Most measures.
 const MAX_MEASURES: usize = 200;
-/// Keys of results that are no measure and no factor.
-const RESERVED: [&str; 8] = [
+/// Columns of tables and keys of results that no factor, measure or expectation has.
+const RESERVED: [&str; 10] = [
     NAMED,
     "arm",
     "baseline",
     "digest",
+    "failed",
     "seed",
     "times",
     "times_s",
+    "unit",
     "yoked_to_seed",
 ];
+/// How the columns end that a measure has beside its number.
+const OF_MEASURE: [&str; 2] = ["_censored", "_state"];
 
 /// An experiment, checked.
 #[derive(Debug, Clone)]
@@ -190,6 +195,7 @@ impl Experiment {
     pub fn load(path: &Path) -> Result<Self, FileError> {
         let folder = path.parent().unwrap_or(Path::new(""));
         let source = Source::read(path)?;
+        check_content(&source)?;
         let raw: RawExperiment = source.parse()?;
         let scenario = folder.join(raw.scenario.get_ref());
         source.check_named(raw.scenario.span(), &scenario)?;
@@ -209,6 +215,7 @@ impl Experiment {
     /// # Errors
     /// [`FileError`] with line and caret.
     pub fn parse(source: &Source, folder: &Path) -> Result<Self, FileError> {
+        check_content(source)?;
         let raw: RawExperiment = source.parse()?;
         raw.check(source.clone(), folder)
     }
@@ -272,7 +279,7 @@ impl Experiment {
         let roster: Vec<String> = scenario.roster().iter().map(ToString::to_string).collect();
         for measure in &self.measures {
             for robot in measure.robots() {
-                let is_operator = robot == protocol::RobotName::operator().as_str();
+                let is_operator = robot == RobotName::operator().as_str();
                 if !is_operator && !roster.iter().any(|name| name == robot) {
                     let reason = format!(
                         "the scenario has no robot \"{robot}\"; it has {}",
@@ -283,6 +290,35 @@ impl Experiment {
             }
         }
 
+        Ok(())
+    }
+
+    /// Checks that its robots have the variables that are measured, in one arm under one condition at least.
+    ///
+    /// # Errors
+    /// [`FileError`] at a measure of a variable that is not there.
+    pub fn check_variables(
+        &self,
+        published: &BTreeMap<RobotName, BTreeSet<String>>,
+    ) -> Result<(), FileError> {
+        for measure in &self.measures {
+            for (robot, name) in measure.variables() {
+                let known = published.get(robot);
+                if known.is_some_and(|known| known.contains(name)) {
+                    continue;
+                }
+
+                let known: Vec<&str> = known.into_iter().flatten().map(String::as_str).collect();
+                let reason = match known[..] {
+                    [] => format!("{robot} has no state variables"),
+                    _ => format!(
+                        "{robot} has no state variable `{name}`; it has {}",
+                        known.join(", ")
+                    ),
+                };
+                return Err(FileError::at(&self.source, Some(measure.span()), &reason));
+            }
+        }
         Ok(())
     }
 
@@ -301,6 +337,18 @@ impl Experiment {
             None => self.procedure.clone(),
         }
     }
+}
+
+/// Checks that a file has more than blanks and comments: no line of an empty file is wrong.
+fn check_content(source: &Source) -> Result<(), FileError> {
+    let table: toml::Table = source.parse()?;
+    if table.is_empty() {
+        let reason = format!("{} is empty: it is not an experiment", source.name);
+        return Err(FileError::new(reason).with_help(
+            "an experiment has a question, a scenario, seeds, a duration, arms and measures",
+        ));
+    }
+    Ok(())
 }
 
 /// The error of a part of the file.
@@ -339,7 +387,7 @@ impl RawExperiment {
             .list(duration_s)
             .map_err(|error| FileError::at(&source, None, &error.to_string()))?;
 
-        let measures = check_measures(&source, self.measures, &conditions)?;
+        let measures = check_measures(&source, self.measures, &conditions, &self.expectations)?;
         let report = self.report.check(&source, &measures, &conditions)?;
 
         let mut expectations = Vec::new();
@@ -641,6 +689,7 @@ fn check_measures(
     source: &Source,
     measures: Spanned<Vec<Measure>>,
     conditions: &Conditions,
+    expectations: &[Spanned<Expectation>],
 ) -> Result<Vec<Measure>, FileError> {
     let span = measures.span();
     let measures = measures.into_inner();
@@ -649,22 +698,73 @@ fn check_measures(
         return Err(refuse(source, span, reason));
     }
 
-    let mut names: BTreeSet<&str> = BTreeSet::from(RESERVED);
-    for factor in &conditions.factors {
-        names.insert(&factor.name);
-    }
+    let mut columns = Columns::of(conditions);
     for (index, measure) in measures.iter().enumerate() {
         let name = &measure.name;
         if measures[..index].iter().any(|other| other.name == *name) {
             let reason = format!("there are two measures \"{name}\"");
             return Err(refuse(source, measure.span(), reason));
         }
-        if names.contains(name.as_str()) {
-            let reason = format!("results have a column \"{name}\" already");
-            return Err(refuse(source, measure.span(), reason));
+
+        columns
+            .add(name)
+            .map_err(|reason| refuse(source, measure.span(), reason))?;
+        for ending in OF_MEASURE {
+            columns
+                .add(&format!("{name}{ending}"))
+                .map_err(|reason| refuse(source, measure.span(), reason))?;
         }
+        check_head(measure, &measures[..index], conditions)
+            .map_err(|reason| refuse(source, measure.span(), reason))?;
+    }
+    for expectation in expectations {
+        columns
+            .add(&expectation.get_ref().name)
+            .map_err(|reason| refuse(source, expectation.span(), reason))?;
     }
     Ok(measures)
+}
+
+/// The names of the columns of the table of units.
+struct Columns(BTreeSet<String>);
+
+impl Columns {
+    /// Those without measures and expectations.
+    fn of(conditions: &Conditions) -> Self {
+        let mut columns: BTreeSet<String> = RESERVED.iter().map(ToString::to_string).collect();
+        for factor in &conditions.factors {
+            columns.insert(factor.name.clone());
+        }
+        Self(columns)
+    }
+
+    fn add(&mut self, name: &str) -> Result<(), String> {
+        if self.0.insert(name.to_owned()) {
+            return Ok(());
+        }
+        Err(format!("results have a column \"{name}\" already"))
+    }
+}
+
+/// Checks that the head of the column of a measure is not that of another column of the same table.
+fn check_head(
+    measure: &Measure,
+    others: &[Measure],
+    conditions: &Conditions,
+) -> Result<(), String> {
+    let Some(column) = &measure.column else {
+        return Ok(());
+    };
+
+    let title = measure.title();
+    let mut others = others.iter().filter(|other| other.column.is_some());
+    let is_taken = others.any(|other| other.title() == title)
+        || column == "arm"
+        || *column == conditions.head();
+    if is_taken {
+        return Err(format!("a table has a column \"{title}\" already"));
+    }
+    Ok(())
 }
 
 #[cfg(test)]

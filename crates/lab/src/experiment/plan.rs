@@ -20,11 +20,16 @@ use super::file::{Arm, Experiment};
 use super::script;
 use super::setting::Setting;
 use crate::export::draft::{Draft, unwritable};
+use crate::shell;
 
 /// The plan in the folder of an experiment.
 pub const PLAN: &str = "plan.json";
 /// The experiment file as it was planned, for people.
 const FILE: &str = "experiment.toml";
+/// Folder of the files with the units that have been played.
+pub(super) const UNITS: &str = "units";
+/// How the name of a file with units ends.
+pub(super) const UNITS_ENDING: &str = ".jsonl";
 /// How units are measured. It is a part of the identity of a unit, so units that were measured otherwise are played again.
 const MEASURING: u32 = 2;
 
@@ -39,6 +44,8 @@ pub struct Request {
     pub set: Vec<Override>,
     /// How its units are played.
     pub robots: Robots,
+    /// The experiment file, if it is a file: another one of the same name is another experiment.
+    pub origin: Option<PathBuf>,
 }
 
 /// How the robots of a unit run. The run is the same.
@@ -63,10 +70,21 @@ pub struct Plan {
     cells: Vec<Cell>,
 }
 
-/// `plan.json`.
+/// `plan.json`: the plan, and a digest of it. A plan that is not as it was written would play one thing under the name of another.
+#[derive(Debug, Serialize, Deserialize)]
+struct Sealed {
+    #[serde(flatten)]
+    plan: Written,
+    seal: String,
+}
+
+/// A plan, as it is written.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Written {
     name: String,
+    /// The experiment file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    origin: Option<PathBuf>,
     program: Program,
     units: usize,
     duration_s: f64,
@@ -259,6 +277,7 @@ impl Plan {
         experiment.report.check_units(experiment.source(), units)?;
         let written = Written {
             name: request.name.clone(),
+            origin: request.origin.clone(),
             program: Program::this(),
             units,
             duration_s: experiment.duration_s,
@@ -279,8 +298,12 @@ impl Plan {
     /// If there is none, it cannot be read, or it was made by a program that measures otherwise.
     pub fn load(folder: &Path) -> miette::Result<Self> {
         let Some(written) = read(folder)? else {
+            let help = match has_units(folder) {
+                true => again(folder),
+                false => "make one with `cars experiment run`".to_owned(),
+            };
             return Err(miette!(
-                help = "make one with `cars experiment run`",
+                help = help,
                 "{} is not the folder of an experiment: it has no {PLAN}",
                 folder.display()
             ));
@@ -364,7 +387,7 @@ impl Plan {
     /// # Errors
     /// If the folder has other content, or a file cannot be written.
     pub fn save(&self, folder: &Path) -> miette::Result<()> {
-        if !folder.join(PLAN).exists() && has_files(folder) {
+        if !folder.join(PLAN).exists() && has_files(folder) && !has_units(folder) {
             return Err(miette!(
                 help = "choose another folder with -o, or move it away",
                 "{} is there and is not the folder of an experiment",
@@ -378,7 +401,11 @@ impl Plan {
         }
 
         std::fs::create_dir_all(folder).map_err(|error| unwritable(folder, &error))?;
-        let mut text = serde_json::to_string_pretty(&self.written).into_diagnostic()?;
+        let sealed = Sealed {
+            plan: self.written.clone(),
+            seal: self.written.seal()?,
+        };
+        let mut text = serde_json::to_string_pretty(&sealed).into_diagnostic()?;
         text.push('\n');
         write(&folder.join(PLAN), &text)?;
         write(&folder.join(FILE), &self.written.file)?;
@@ -393,13 +420,62 @@ impl Plan {
         Ok(read(folder)?.is_some_and(|there| there.is_same(&self.written)))
     }
 
-    /// What of the plan that was in the folder before has changed, so that its units are played again: a sentence each.
+    /// Checks that the folder has no plan of another experiment file of the same name: the results of the one would replace those
+    /// of the other.
     ///
     /// # Errors
-    /// If the plan that is there cannot be read.
-    pub fn changes_since(&self, folder: &Path) -> miette::Result<Vec<String>> {
-        let Some(before) = read(folder)? else {
-            return Ok(Vec::new());
+    /// If it has one.
+    pub fn check_origin(&self, folder: &Path) -> miette::Result<()> {
+        // A plan that cannot be read is made again, and is of the same file as far as anyone knows.
+        let Ok(Some(before)) = read(folder) else {
+            return Ok(());
+        };
+        match (&before.origin, &self.written.origin) {
+            (Some(before), Some(now)) if before != now => Err(miette!(
+                help = format!(
+                    "choose another folder with --out; if the file has moved, go on with `--out {}`",
+                    shell::path(folder)
+                ),
+                "{} has the experiment {}, and this is {}",
+                folder.display(),
+                before.display(),
+                now.display()
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    /// The arms that play the same runs under every condition, by two: a comparison of them shows nothing.
+    #[must_use]
+    pub fn equal_arms(&self) -> Vec<(&str, &str)> {
+        let arms = &self.experiment.arms;
+        let mut equal = Vec::new();
+        for (place, arm) in arms.iter().enumerate() {
+            let same = (0..place).find(|other| {
+                let mut cells = (0..self.conditions.len()).map(|number| number * arms.len());
+                cells.all(|first| {
+                    self.cells[first + place].content == self.cells[first + other].content
+                })
+            });
+            equal.extend(same.map(|other| (arms[other].name.as_str(), arm.name.as_str())));
+        }
+        equal
+    }
+
+    /// What of the plan that was in the folder before has changed, so that its units are played again, or cannot be read: a
+    /// sentence each.
+    #[must_use]
+    pub fn changes_since(&self, folder: &Path) -> Vec<String> {
+        let before = match read(folder) {
+            Ok(Some(before)) => before,
+            Ok(None) if has_units(folder) => {
+                return vec![format!(
+                    "{} has units and no {PLAN}: it is made again",
+                    folder.display()
+                )];
+            }
+            Ok(None) => return Vec::new(),
+            Err(reason) => return vec![format!("{reason}: it is made again")],
         };
 
         let now = &self.written;
@@ -430,7 +506,7 @@ impl Plan {
                 others.len()
             ));
         }
-        Ok(changes)
+        changes
     }
 
     /// Name of the experiment.
@@ -617,6 +693,25 @@ fn has_files(folder: &Path) -> bool {
     names.any(|name| !name.to_string_lossy().starts_with('.'))
 }
 
+/// Whether a folder has units that have been played. They are whole by themselves.
+fn has_units(folder: &Path) -> bool {
+    let entries = std::fs::read_dir(folder.join(UNITS));
+    let mut names = entries
+        .into_iter()
+        .flatten()
+        .flatten()
+        .map(|entry| entry.file_name());
+    names.any(|name| name.to_string_lossy().ends_with(UNITS_ENDING))
+}
+
+/// What to do where a plan is lost or damaged.
+fn again(folder: &Path) -> String {
+    format!(
+        "`cars experiment run FILE --out {}` with the same experiment file makes it again, and uses the units that have been played",
+        shell::path(folder)
+    )
+}
+
 /// Reads the plan of a folder; `None` if it has none.
 fn read(folder: &Path) -> miette::Result<Option<Written>> {
     let path = folder.join(PLAN);
@@ -624,11 +719,34 @@ fn read(folder: &Path) -> miette::Result<Option<Written>> {
         return Ok(None);
     }
 
-    let text = Source::read(&path)?.text;
-    let written = serde_json::from_str(&text)
-        .into_diagnostic()
-        .wrap_err_with(|| format!("{} is not a plan of this version of cars", path.display()))?;
-    Ok(Some(written))
+    let refused = |reason: &str| miette!(help = again(folder), "{} {reason}", path.display());
+    let text = std::fs::read(&path).map_err(|error| FileError::unreadable(&path, &error))?;
+    let value: serde_json::Value = match serde_json::from_slice(&text) {
+        Ok(value) => value,
+        Err(_) if text.is_empty() => return Err(refused("is empty")),
+        Err(error) => return Err(refused(&format!("is damaged: {error}"))),
+    };
+    if value.get("seal").is_none() {
+        return Err(refused(
+            "has no seal: it is damaged, or of another version of cars",
+        ));
+    }
+    let sealed: Sealed =
+        serde_json::from_value(value).map_err(|error| refused(&format!("is damaged: {error}")))?;
+    if sealed.plan.seal()? != sealed.seal {
+        return Err(refused("is damaged: it is not as it was written"));
+    }
+    Ok(Some(sealed.plan))
+}
+
+impl Written {
+    /// Digest of all that the plan has.
+    fn seal(&self) -> miette::Result<String> {
+        let text = serde_json::to_vec(self).into_diagnostic()?;
+        let mut hash = Xxh3::new();
+        hash.update(&text);
+        Ok(format!("{:032x}", hash.digest128()))
+    }
 }
 
 /// Writes a file that is seen whole or not at all.

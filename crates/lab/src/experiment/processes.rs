@@ -7,7 +7,6 @@ use config::FileError;
 use miette::{IntoDiagnostic, miette};
 use observe::Observation;
 use protocol::Event;
-use protocol::messages::Verdict;
 use recording::{Recording, Ticks};
 use scenario::Scenario;
 use simulator::RunFolder;
@@ -58,7 +57,7 @@ pub(super) fn follow(
     // Verdicts are exit statuses, too, and say nothing against the launch.
     let summary = read_summary(&run)?;
     let summary = summary.filter(|summary| {
-        let is_judged = summary.end.is_some() && summary.verdict() != Verdict::Pass;
+        let is_judged = summary.end.is_some() && summary.verdict().exit_status() != 0;
         output.status.success() || is_judged
     });
     let Some(summary) = summary else {

@@ -14,6 +14,7 @@ use super::estimate::Cell;
 use super::outcome::Outcome;
 use super::plan::Plan;
 use super::store::Store;
+use super::unheard::Unheard;
 use crate::export::draft::{Draft, unwritable};
 use crate::export::sheet::{Column, Format, Sheet, Type, Value};
 
@@ -52,6 +53,8 @@ pub struct Results {
     pub damages: Vec<String>,
     /// Numbers of units that were played several times and gave different runs.
     pub conflicts: Vec<usize>,
+    /// Words of the measures and expectations that occurred in none of the units, for people.
+    pub never_occurred: Vec<String>,
 }
 
 /// An expectation of an experiment, and the runs that do not meet it.
@@ -63,17 +66,26 @@ pub struct Judged<'a> {
     pub failed: Vec<usize>,
     /// Numbers of the units that ended before it was certain.
     pub undecided: Vec<usize>,
+    /// Numbers of the units in which what it is expected after did not happen.
+    pub not_asked: Vec<usize>,
+    /// How many units were judged.
+    pub judged: usize,
 }
 
 impl Judged<'_> {
     /// The worst verdict of a run.
     #[must_use]
     pub fn verdict(&self) -> Verdict {
-        match (self.failed.is_empty(), self.undecided.is_empty()) {
-            (false, _) => Verdict::Fail,
-            (true, false) => Verdict::Undecided,
-            (true, true) => Verdict::Pass,
+        if !self.failed.is_empty() {
+            return Verdict::Fail;
         }
+        if !self.undecided.is_empty() {
+            return Verdict::Undecided;
+        }
+        if !self.not_asked.is_empty() && self.not_asked.len() == self.judged {
+            return Verdict::NotAsked;
+        }
+        Verdict::Pass
     }
 }
 
@@ -85,6 +97,7 @@ struct Written<'a> {
     units: usize,
     missing: usize,
     failures: &'a [Failure],
+    never_occurred: &'a [String],
     estimates: Vec<Cell>,
     contrasts: Vec<Contrast>,
 }
@@ -107,11 +120,15 @@ impl Results {
         let mut failures = Vec::new();
         let mut missing = Vec::new();
         let mut conflicts = Vec::new();
+        let mut unheard = Unheard::default();
         for number in 0..plan.units() {
             let unit = plan.unit(number);
             match store.get(unit.key) {
                 None => missing.push(number),
-                Some(Ok(played)) => outcomes.push(Outcome::of(&unit, played)),
+                Some(Ok(played)) => {
+                    unheard.add(played);
+                    outcomes.push(Outcome::of(&unit, played));
+                }
                 Some(Err(reason)) => failures.push(Failure {
                     unit: number,
                     condition: unit.condition.name.clone(),
@@ -133,6 +150,7 @@ impl Results {
             missing,
             damages,
             conflicts,
+            never_occurred: unheard.in_all(),
         }
     }
 
@@ -146,17 +164,22 @@ impl Results {
                 expectation: &expectation.name,
                 failed: Vec::new(),
                 undecided: Vec::new(),
+                not_asked: Vec::new(),
+                judged: 0,
             };
             for outcome in &self.outcomes {
-                match outcome.verdicts.get(&expectation.name) {
-                    Some(verdict) if verdict == Verdict::Fail.name() => {
-                        judged.failed.push(outcome.unit);
-                    }
-                    Some(verdict) if verdict == Verdict::Undecided.name() => {
-                        judged.undecided.push(outcome.unit);
-                    }
-                    _ => {}
-                }
+                let Some(verdict) = outcome.verdicts.get(&expectation.name) else {
+                    continue;
+                };
+
+                judged.judged += 1;
+                let units = match verdict {
+                    verdict if verdict == Verdict::Fail.name() => &mut judged.failed,
+                    verdict if verdict == Verdict::Undecided.name() => &mut judged.undecided,
+                    verdict if verdict == Verdict::NotAsked.name() => &mut judged.not_asked,
+                    _ => continue,
+                };
+                units.push(outcome.unit);
             }
 
             all.push(judged);
@@ -179,6 +202,7 @@ impl Results {
             units: self.plan.units(),
             missing: self.missing.len(),
             failures: &self.failures,
+            never_occurred: &self.never_occurred,
             estimates: self.plan.experiment.estimate(&self.outcomes),
             contrasts: self.plan.experiment.contrast(&self.outcomes),
         };

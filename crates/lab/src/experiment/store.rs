@@ -14,14 +14,10 @@ use config::FileError;
 use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh3::xxh3_64;
 
-use super::plan::{Key, Plan};
+use super::plan::{Key, Plan, UNITS, UNITS_ENDING};
 use super::unit::{self, Played};
 use crate::export::draft::unwritable;
 
-/// Folder of the files.
-const UNITS: &str = "units";
-/// How the name of a file ends.
-const ENDING: &str = ".jsonl";
 /// What a seal begins with, in the last field of a line.
 const SEAL: &[u8] = b",\"seal\":\"";
 /// Hexadecimal digits of a seal.
@@ -111,7 +107,7 @@ impl Store {
                 .own
                 .as_ref()
                 .is_some_and(|(own, _)| *own == entry.path());
-            if entry.file_name().to_string_lossy().ends_with(ENDING) && !is_own {
+            if entry.file_name().to_string_lossy().ends_with(UNITS_ENDING) && !is_own {
                 files.push(entry.path());
             }
         }
@@ -216,7 +212,7 @@ impl Store {
         let made = tempfile::Builder::new()
             .prefix("")
             .rand_bytes(12)
-            .suffix(ENDING)
+            .suffix(UNITS_ENDING)
             .permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666))
             .tempfile_in(&self.folder);
         let (file, path) = made
@@ -310,6 +306,7 @@ mod tests {
             digest: "d".to_owned(),
             measures: BTreeMap::from([("m".to_owned(), measured)]),
             verdicts: BTreeMap::new(),
+            unheard: Vec::new(),
         })
     }
 

@@ -1,12 +1,13 @@
 //! Plays one unit of an experiment and takes its measures.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::panic::AssertUnwindSafe;
 
 use config::Override;
 use miette::{IntoDiagnostic, miette};
+use observe::words::{Unheard, Words};
 use observe::{Measured, Observation, Probe};
-use protocol::RunName;
+use protocol::{RobotName, RunName};
 use scenario::Scenario;
 use serde::{Deserialize, Serialize};
 use simulator::Summary;
@@ -33,10 +34,17 @@ pub struct Played {
     /// The verdicts about expectations, by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub verdicts: BTreeMap<String, String>,
+    /// Words of the measures and of the experiment's expectations that did not occur.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub unheard: Vec<Unheard>,
 }
 
-/// The measures of a run, by name.
-struct Gauge<'a>(Vec<(&'a str, Probe<'a>)>);
+/// What is measured of a run.
+struct Gauge<'a> {
+    /// The measures, by name.
+    probes: Vec<(&'a str, Probe<'a>)>,
+    words: Words,
+}
 
 impl Plan {
     /// Checks that every arm can be played under every condition.
@@ -71,11 +79,12 @@ impl Plan {
         Ok(None)
     }
 
-    /// Checks that robots in this process begin with their parameters, in every arm under every condition: plays tick 0. A plan
-    /// that has been saved has passed this.
+    /// Checks that robots in this process begin with their parameters, in every arm under every condition, and that those of some
+    /// arm have the variables that are measured: plays tick 0. A plan that has been saved has passed this.
     ///
     /// # Errors
-    /// If a robot does not, at the place of the change that it refuses, with the arm and the condition.
+    /// If a robot does not begin, at the place of the change that it refuses, with the arm and the condition; or at a measure
+    /// of a variable that it has in no arm.
     pub fn check_begins(&self) -> miette::Result<()> {
         if *self.robots() != Robots::InProcess {
             return Ok(());
@@ -86,21 +95,48 @@ impl Plan {
             caught(|| {
                 let mut local = Local::new(scenario, &run)?;
                 local.simulation.init(&mut local.robots).into_diagnostic()?;
-                Ok(())
+                Ok(local)
             })
         };
+        let mut published: BTreeMap<RobotName, BTreeSet<String>> = BTreeMap::new();
 
         let seed = self.unit(0).seed;
         for cell in 0..self.cells() {
             let scenario = self.scenario(cell, seed, Vec::new())?;
-            if let Err(reason) = begin(scenario) {
-                let case = self.case(cell)?;
-                return Err(case
-                    .refused(&reason, |scenario| begin(scenario).err())
-                    .into());
+            match begin(scenario) {
+                Ok(local) => add_variables(&mut published, &local),
+                Err(reason) => {
+                    let case = self.case(cell)?;
+                    return Err(case
+                        .refused(&reason, |scenario| begin(scenario).err())
+                        .into());
+                }
             }
         }
+        self.experiment.check_variables(&published)?;
         Ok(())
+    }
+
+    /// The measures that all of these units miss, for people; empty if one of the units failed, or there are none.
+    #[must_use]
+    pub fn missing_in_all(&self, played: &[&Played]) -> Vec<String> {
+        let mut missing = Vec::new();
+        let Some((first, others)) = played.split_first() else {
+            return missing;
+        };
+        for (name, measured) in &first.measures {
+            let Measured::Missing { reason } = measured else {
+                continue;
+            };
+            let is_missing = |one: &&Played| {
+                let measured = one.measures.get(name);
+                matches!(measured, Some(Measured::Missing { .. }))
+            };
+            if others.iter().all(is_missing) {
+                missing.push(format!("the measure \"{name}\": {reason}"));
+            }
+        }
+        missing
     }
 
     /// Number of arms under all conditions.
@@ -137,22 +173,27 @@ impl Plan {
         let condition_s = unit.condition.time_s;
         // Where it lasts for the whole run there is no time after it, not even the last tick.
         let condition_s = condition_s.unwrap_or((0.0, f64::INFINITY));
-        let mut gauge = Gauge(Vec::new());
-        for measure in &self.experiment.measures {
+        let experiment = &self.experiment;
+        let mut gauge = Gauge {
+            probes: Vec::new(),
+            words: Words::of(&experiment.measures, &experiment.expectations),
+        };
+        for measure in &experiment.measures {
             let probe = Probe::new(measure, condition_s);
-            gauge.0.push((&measure.name, probe));
+            gauge.probes.push((&measure.name, probe));
         }
 
         let scenario = self.scenario_of(unit, launcher)?;
         let ended = self.follow(scenario, launcher, &mut gauge)?;
         let mut measures = BTreeMap::new();
-        for (name, probe) in gauge.0 {
+        for (name, probe) in gauge.probes {
             measures.insert(name.to_owned(), probe.measured(&ended.summary));
         }
         Ok(Played {
             digest: ended.digest,
             measures,
             verdicts: ended.verdicts,
+            unheard: gauge.words.unheard(),
         })
     }
 
@@ -169,6 +210,21 @@ impl Plan {
             Robots::Launched(launch) => {
                 processes::follow(scenario, Some(launch), launcher, follower)
             }
+        }
+    }
+}
+
+/// Adds the variables that the robots of a run in tick 0 have.
+fn add_variables(published: &mut BTreeMap<RobotName, BTreeSet<String>>, local: &Local) {
+    for robot in local.simulation.names() {
+        let names = published.entry(robot.clone()).or_default();
+        if let Some(state) = local.simulation.robot_state(robot) {
+            names.extend(
+                state
+                    .state_variables
+                    .iter()
+                    .map(|(name, _)| name.to_string()),
+            );
         }
     }
 }
@@ -197,9 +253,10 @@ fn follow_in_process(scenario: Scenario, follower: &mut impl Follow) -> miette::
 
 impl Follow for Gauge<'_> {
     fn observe(&mut self, observation: &Observation<'_>) {
-        for (_, probe) in &mut self.0 {
+        for (_, probe) in &mut self.probes {
             probe.observe(observation);
         }
+        self.words.observe(observation);
     }
 }
 

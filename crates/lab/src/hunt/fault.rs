@@ -257,6 +257,18 @@ impl PlannedFault {
         Some(fault)
     }
 
+    /// The fault at another time. Walls and guests have none.
+    pub(super) fn at(&self, time: Span) -> Self {
+        let mut fault = self.clone();
+        match &mut fault {
+            Self::Channel { span, .. }
+            | Self::Partition { span, .. }
+            | Self::Absence { span, .. } => *span = time,
+            Self::Lose { .. } | Self::Wall { .. } | Self::Crowd { .. } => {}
+        }
+        fault
+    }
+
     /// The fault in words, for people; times in simulated seconds.
     #[must_use]
     pub fn in_words(&self, tick_s: f64) -> String {

@@ -1,7 +1,7 @@
 //! Shrinking: from a case in which an expectation fails to a smaller one in which the same expectation fails.
 //!
 //! Faults are replaced by the single messages that they lost, left out by delta debugging (Zeller and Hildebrandt 2002), and
-//! weakened; robots, guests and the end of the run are left out. Only a case that was played, and in which the expectation
+//! weakened and moved to earlier times; robots, guests and the end of the run are left out. Only a case that was played, and in which the expectation
 //! failed, is taken. A smaller scenario is taken only if the expectation does not fail in it without faults: otherwise what
 //! is missing in it would be the cause.
 
@@ -235,12 +235,16 @@ impl Shrinker<'_> {
         }
     }
 
-    /// Weakens one fault after the other, as long as the expectation fails.
+    /// Weakens one fault after the other, or moves it to an earlier time, as long as the expectation fails.
     fn weaken_faults(&mut self) {
         let mut index = 0;
         while index < self.best.faults.len() && !self.is_over() {
             let mut cases = Vec::new();
-            for weaker in weaker(&self.best.faults[index], self.world.guests) {
+            let fault = &self.best.faults[index];
+            let mut instead = weaker(fault, self.world.guests);
+            instead.extend(earlier(fault));
+            instead.retain(|other| !self.best.faults.contains(other));
+            for weaker in instead {
                 let mut faults = self.best.faults.clone();
                 faults[index] = weaker;
                 cases.push(self.best.with_faults(faults));
@@ -347,6 +351,50 @@ fn weaker(fault: &PlannedFault, guests: usize) -> Vec<PlannedFault> {
         }
     }
 
+    all
+}
+
+/// The same fault at earlier times, the earliest first. A run in which it does the same is shorter.
+fn earlier(fault: &PlannedFault) -> Vec<PlannedFault> {
+    let mut all = Vec::new();
+    match fault {
+        PlannedFault::Lose { link, number } => {
+            for number in before(*number, 1) {
+                all.push(PlannedFault::Lose {
+                    link: link.clone(),
+                    number,
+                });
+            }
+        }
+        PlannedFault::Channel { span, .. }
+        | PlannedFault::Partition { span, .. }
+        | PlannedFault::Absence { span, .. } => {
+            for from in before(span.from, 0) {
+                let span = Span {
+                    from,
+                    until: from + (span.until - span.from),
+                };
+                all.push(fault.at(span));
+            }
+        }
+        PlannedFault::Wall { .. } | PlannedFault::Crowd { .. } => {}
+    }
+    all
+}
+
+/// Numbers from `least` on that are smaller than a number: the least one, one in the middle, and those a little smaller.
+fn before(number: u64, least: u64) -> Vec<u64> {
+    let mut all = Vec::new();
+    for other in [
+        least,
+        number / 2,
+        number.saturating_sub(8),
+        number.saturating_sub(1),
+    ] {
+        if (least..number).contains(&other) && !all.contains(&other) {
+            all.push(other);
+        }
+    }
     all
 }
 
@@ -615,6 +663,54 @@ mod tests {
         let result = shrink(&Absent, NAME, case, played, &World::default(), bounds);
         assert_eq!(result.case.faults, [crash(55, 60)]);
         assert_eq!(result.case.ticks, Some(60));
+    }
+
+    /// A fault for which many times do becomes one at the earliest of them that steps lead to.
+    #[test]
+    fn a_fault_moves_to_an_earlier_time() {
+        struct Later;
+        impl Trial for Later {
+            fn play(&self, case: &Case, _: &BTreeSet<String>) -> miette::Result<Played> {
+                let mut played = Played::default();
+                let does_fail = |fault: &PlannedFault| match fault {
+                    PlannedFault::Absence { span, .. } => {
+                        span.from >= 12 && span.until - span.from >= 5
+                    }
+                    PlannedFault::Lose { number, .. } => *number >= 3,
+                    _ => false,
+                };
+                if case.faults.iter().any(does_fail) {
+                    let failure = Failure {
+                        tick: 60,
+                        because: String::new(),
+                    };
+                    played.failed.insert(NAME.to_owned(), failure);
+                }
+                Ok(played)
+            }
+        }
+
+        let crash = |from, until| PlannedFault::Absence {
+            robot: RobotName::new("A").unwrap(),
+            why: Absence::Crash,
+            span: Span { from, until },
+        };
+        for (fault, expected) in [
+            (crash(180, 300), crash(12, 17)),
+            (lose(29), lose(3)),
+            (lose(3), lose(3)),
+        ] {
+            let case = Case::of(vec![fault]);
+            let played = Later.play(&case, &BTreeSet::new()).unwrap();
+            let bounds = Bounds {
+                runs: 10_000,
+                jobs: 2,
+                stop: &AtomicBool::new(false),
+            };
+            let result = shrink(&Later, NAME, case, played, &World::default(), bounds);
+            assert_eq!(result.case.faults, [expected]);
+            assert!(result.is_minimal);
+        }
     }
 
     /// A scenario that fails without faults is no smaller case of one in which a fault is the cause.

@@ -27,6 +27,8 @@ pub struct Played {
     pub failed: BTreeMap<String, Failure>,
     /// The expectations that the run has.
     pub expectations: BTreeSet<String>,
+    /// Those that were not asked: what they are expected after did not happen.
+    pub not_asked: BTreeSet<String>,
     /// The last tick.
     pub ticks: Tick,
     /// Commands between robots, in the order in which they were sent.
@@ -292,6 +294,13 @@ impl Notes {
                     from: from.clone(),
                     to: to.clone(),
                 });
+            }
+            Event::Judged {
+                expectation,
+                verdict: Verdict::NotAsked,
+                ..
+            } => {
+                self.played.not_asked.insert(expectation.clone());
             }
             Event::Judged {
                 expectation,

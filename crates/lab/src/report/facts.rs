@@ -10,6 +10,7 @@ use recording::{Recording, RecordingError};
 use report::{Band, Floor};
 use simulator::EpochFiles;
 use simulator::record::{Entry, Record};
+use timeline::{Kind, Stay};
 
 /// Parts of the floor along its longer side.
 const PARTS: f64 = 50.0;
@@ -45,6 +46,8 @@ pub(super) struct RunFacts {
     pub(super) floors: BTreeMap<RobotName, Floor>,
     /// What is missing, a sentence each.
     pub(super) notes: Vec<String>,
+    /// The states of the robots after the last event.
+    states: timeline::States,
 }
 
 /// The facts about a robot.
@@ -58,8 +61,6 @@ pub(super) struct RobotFacts {
     pub(super) missed: u64,
     /// How often it took part again.
     pub(super) returns: u64,
-    /// Since when it takes no part.
-    lost: Option<Tick>,
 }
 
 /// The states of one kind that a robot was in.
@@ -71,8 +72,6 @@ pub(super) struct States {
     pub(super) entered: BTreeMap<String, u64>,
     /// How often one state followed another.
     pub(super) transitions: BTreeMap<(String, String), u64>,
-    /// The current state and its first tick.
-    current: Option<(String, Tick)>,
 }
 
 /// The facts about commands from one robot to another.
@@ -162,7 +161,17 @@ impl RunFacts {
     }
 
     fn add_event(&mut self, tick: Tick, event: &Event) {
+        let was_lost =
+            matches!(event, Event::Joined { robot, .. } if self.states.lost_since(robot).is_some());
+        for stay in self.states.apply(tick, event) {
+            self.add_stay(stay);
+        }
+
         match event {
+            Event::Joined { robot, .. } if was_lost => {
+                self.disturb(tick, "takes no part", robot.as_str(), false);
+                self.add_of_robot(tick, event);
+            }
             Event::Init {
                 seed,
                 version,
@@ -226,27 +235,30 @@ impl RunFacts {
         }
     }
 
-    fn add_of_robot(&mut self, tick: Tick, event: &Event) {
+    /// Adds a stay of a robot in a state.
+    fn add_stay(&mut self, stay: Stay) {
         let tick_s = self.tick_s;
+        let robot = self.robots.entry(stay.robot).or_default();
+        let states = match stay.kind {
+            Kind::Emotion => &mut robot.emotions,
+            Kind::Behavior => &mut robot.behaviors,
+        };
+        states.bands.push(Band {
+            name: stay.state,
+            begin_s: stay.begin as f64 * tick_s,
+            end_s: stay.end as f64 * tick_s,
+        });
+    }
+
+    fn add_of_robot(&mut self, tick: Tick, event: &Event) {
         match event {
             Event::Joined {
                 robot, generation, ..
             } => {
                 let facts = self.robots.entry(robot.clone()).or_default();
-                if facts.lost.take().is_some() {
-                    facts.emotions.resume(tick);
-                    facts.behaviors.resume(tick);
-                    self.disturb(tick, "takes no part", robot.as_str(), false);
-                }
-
-                let facts = self.robots.entry(robot.clone()).or_default();
                 facts.returns += u64::from(generation.is_some());
             }
             Event::Lost { robot } => {
-                let facts = self.robots.entry(robot.clone()).or_default();
-                facts.lost = Some(tick);
-                facts.emotions.pause(tick, tick_s);
-                facts.behaviors.pause(tick, tick_s);
                 self.disturb(tick, "takes no part", robot.as_str(), true);
             }
             Event::Missed { robot } => {
@@ -257,11 +269,11 @@ impl RunFacts {
             }
             Event::Emotion { robot, from, to } => {
                 let facts = self.robots.entry(robot.clone()).or_default();
-                facts.emotions.change(from.as_deref(), to, tick, tick_s);
+                facts.emotions.enter(from.as_deref(), to);
             }
             Event::Behavior { robot, from, to } => {
                 let facts = self.robots.entry(robot.clone()).or_default();
-                facts.behaviors.change(from.as_deref(), to, tick, tick_s);
+                facts.behaviors.enter(from.as_deref(), to);
             }
             _ => {}
         }
@@ -312,11 +324,8 @@ impl RunFacts {
 
     /// States last until the last tick.
     fn finish(&mut self) {
-        for robot in self.robots.values_mut() {
-            if robot.lost.is_none() {
-                robot.emotions.pause(self.last_tick, self.tick_s);
-                robot.behaviors.pause(self.last_tick, self.tick_s);
-            }
+        for stay in std::mem::take(&mut self.states).lasting(self.last_tick) {
+            self.add_stay(stay);
         }
     }
 
@@ -351,8 +360,10 @@ impl RunFacts {
         };
 
         let mut next = 0;
-        while next < recording.len() {
-            let ticks = recording.read_raw(next, next + AT_ONCE)?;
+        // Where a robot is after a tick it is until the next one: of the last tick there is no time.
+        let last = recording.len().saturating_sub(1);
+        while next < last {
+            let ticks = recording.read_raw(next, last.min(next + AT_ONCE))?;
             for tick in &ticks {
                 for robot in &tick.frame.robots {
                     let column = (robot.location.x / part_m).clamp(0.0, PARTS - 1.0);
@@ -379,39 +390,11 @@ impl States {
         times
     }
 
-    fn change(&mut self, from: Option<&str>, to: &str, tick: Tick, tick_s: f64) {
-        self.end_band(tick, tick_s);
-        self.current = Some((to.to_owned(), tick));
+    fn enter(&mut self, from: Option<&str>, to: &str) {
         *self.entered.entry(to.to_owned()).or_insert(0) += 1;
         if let Some(from) = from {
             let transition = (from.to_owned(), to.to_owned());
             *self.transitions.entry(transition).or_insert(0) += 1;
-        }
-    }
-
-    /// The robot takes no part from this tick on; its state is kept.
-    fn pause(&mut self, tick: Tick, tick_s: f64) {
-        self.end_band(tick, tick_s);
-    }
-
-    /// The robot takes part again.
-    fn resume(&mut self, tick: Tick) {
-        if let Some((_, begin)) = &mut self.current {
-            *begin = tick;
-        }
-    }
-
-    fn end_band(&mut self, tick: Tick, tick_s: f64) {
-        if let Some((name, begin)) = &mut self.current
-            && *begin < tick
-        {
-            self.bands.push(Band {
-                name: name.clone(),
-                begin_s: *begin as f64 * tick_s,
-                end_s: tick as f64 * tick_s,
-            });
-            // What follows a pause begins when it is over.
-            *begin = tick;
         }
     }
 }

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::RangeInclusive;
 
 use observe::Measure;
+use protocol::messages::Verdict;
 use report::{
     Cell, Column, Curve, Estimate, Figure, IntervalRow, Intervals, Matrix, MatrixCell, MatrixLabel,
     Panel, Part, Step, Steps, Table, Trend, TrendLine, TrendPoint, decimals_for, fixed,
@@ -928,6 +929,7 @@ pub(super) fn verdicts(study: &Study<'_>) -> Option<Figure> {
         Column::number("pass"),
         Column::number("fail"),
         Column::number("undecided"),
+        Column::number("not asked"),
     ]);
     let columns_title = match study.factors[..] {
         [only] => only,
@@ -944,13 +946,17 @@ pub(super) fn verdicts(study: &Study<'_>) -> Option<Figure> {
                 }
             }
             let count = |verdict: &str| counts.get(verdict).copied().unwrap_or(0);
-            let all: u64 = counts.values().sum();
-            if all == 0 {
+            let not_asked = count(Verdict::NotAsked.name());
+            let asked = counts.values().sum::<u64>() - not_asked;
+            if asked + not_asked == 0 {
                 continue;
             }
             cells[arm][condition] = Some(MatrixCell {
-                share: count("fail") as f64 / all as f64,
-                text: format!("{}/{all}", count("pass")),
+                share: count("fail") as f64 / asked.max(1) as f64,
+                text: match asked {
+                    0 => "not asked".to_owned(),
+                    _ => format!("{}/{asked}", count("pass")),
+                },
                 remark: match (count("fail"), count("undecided")) {
                     (0, 0) => String::new(),
                     (0, undecided) => format!("{undecided} open"),
@@ -965,6 +971,7 @@ pub(super) fn verdicts(study: &Study<'_>) -> Option<Figure> {
                     Cell::Count(count("pass")),
                     Cell::Count(count("fail")),
                     Cell::Count(count("undecided")),
+                    Cell::Count(not_asked),
                 ]);
             }
         }
@@ -996,8 +1003,9 @@ pub(super) fn verdicts(study: &Study<'_>) -> Option<Figure> {
         }
     }
     let caption = String::from(
-        "Verdicts about the expectations: runs that pass of all runs, and how many fail or are undecided (open), because the run \
-         ended first. Darker is a larger share of runs that fail.",
+        "Verdicts about the expectations: runs that pass of those in which it was asked, and how many fail or are undecided \
+         (open), because the run ended first. It is not asked where what it is expected after did not happen. Darker is a larger \
+         share of runs that fail.",
     );
     Some(Figure {
         panels,

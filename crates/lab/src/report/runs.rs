@@ -541,7 +541,7 @@ fn write_expectations(page: &mut Page, runs: &[Run]) {
                 table.rows.push(vec![
                     Cell::text(&run.name),
                     Cell::text(&one.expectation),
-                    Cell::text(one.verdict.name()),
+                    Cell::text(one.verdict.to_string()),
                     Cell::Number(one.tick as f64 * run.facts.tick_s, 1),
                     Cell::text(&one.because),
                 ]);
@@ -554,7 +554,8 @@ fn write_expectations(page: &mut Page, runs: &[Run]) {
 
     page.section("Expectations");
     let mut caption =
-        "Verdicts about what the scenario expects. Undecided: the run ended before it was certain."
+        "Verdicts about what the scenario expects. Undecided: the run ended before it was certain. \
+         Not asked: what it is expected after did not happen."
             .to_owned();
     if count > table.rows.len() {
         caption += &format!(" The first {} of {count} are shown.", table.rows.len());

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::pattern::{Pattern, PatternError};
+use crate::words::{self, Word};
 use crate::{Observation, RobotState};
 
 /// Most alternatives of a condition.
@@ -388,6 +389,19 @@ impl Condition {
         })
     }
 
+    /// The words that robots choose and that it names.
+    pub(super) fn words(&self) -> Vec<Word> {
+        let mut named = Vec::new();
+        for alternative in &self.0 {
+            match alternative {
+                Alternative::Event(pattern) => named.extend(pattern.words()),
+                Alternative::State(state) => named.extend(state.words()),
+                Alternative::Overlap(_) | Alternative::Stalled(_) => {}
+            }
+        }
+        named
+    }
+
     /// Whether it depends on anything but events.
     pub(super) fn needs_states(&self) -> bool {
         let mut alternatives = self.0.iter();
@@ -416,6 +430,25 @@ impl Condition {
         }
 
         robots
+    }
+}
+
+impl State {
+    fn words(&self) -> Vec<Word> {
+        let (kind, states) = match &self.is {
+            Is::Emotion(states) => (words::Kind::Emotion, states),
+            Is::Behavior(states) => (words::Kind::Behavior, states),
+            Is::Variable(..) => return Vec::new(),
+        };
+        let mut named = Vec::new();
+        for state in states {
+            named.push(Word {
+                kind,
+                robots: vec![self.robot.to_string()],
+                word: state.clone(),
+            });
+        }
+        named
     }
 }
 

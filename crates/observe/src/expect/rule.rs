@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::condition::{self, Condition};
 use crate::pattern::Pattern;
+use crate::words::Word;
 
 /// Most expectations of a file.
 pub const MAX_EXPECTATIONS: usize = 64;
@@ -315,6 +316,26 @@ impl Expectation {
             return Err(ExpectError::Twice(self.name.clone()));
         }
         self.check(roster)
+    }
+
+    /// The words that robots choose and that it names.
+    pub(crate) fn words(&self) -> Vec<Word> {
+        let (condition, patterns): (_, Vec<&Pattern>) = match &self.rule {
+            Rule::Never(condition) | Rule::Always(condition) => (condition, Vec::new()),
+            Rule::Eventually { condition, .. } => (condition, Vec::new()),
+            Rule::After {
+                trigger,
+                condition,
+                unless,
+                ..
+            } => (condition, trigger.iter().chain(unless).collect()),
+        };
+
+        let mut named = condition.words();
+        for pattern in patterns {
+            named.extend(pattern.words());
+        }
+        named
     }
 
     /// The robots that it names.

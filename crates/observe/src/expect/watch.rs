@@ -39,6 +39,8 @@ pub struct Watch {
     now: Tick,
     /// The earliest event after which the condition has not held yet, if it is waited for.
     pending: Option<Pending>,
+    /// How many waits events have begun.
+    asked: u64,
     /// How many times the condition held after an event.
     met: u64,
     /// The longest wait, ticks.
@@ -68,6 +70,7 @@ impl Watch {
             tick_s,
             now: 0,
             pending: None,
+            asked: 0,
             met: 0,
             longest: 0,
         }
@@ -141,6 +144,7 @@ impl Watch {
         if self.pending.is_none() {
             let since = self.now;
             self.pending = triggered.map(|event| Pending { since, event });
+            self.asked += u64::from(self.pending.is_some());
         }
         let pending = self.pending.as_ref()?;
 
@@ -193,11 +197,21 @@ impl Watch {
             return Judgment::new(Verdict::Undecided, unknown.to_owned());
         }
 
+        if let Rule::After { .. } = self.rule
+            && self.asked == 0
+        {
+            let because = format!("nothing that it is expected after happened until {here}");
+            return Judgment::new(Verdict::NotAsked, because);
+        }
+
         let because = match &self.rule {
             Rule::Never(_) => format!("it did not happen until {here}"),
             Rule::Always(_) => format!("it held until {here}"),
             Rule::After { .. } if self.met == 0 => {
-                format!("nothing that it is expected after happened until {here}")
+                format!(
+                    "each wait for it ({}) was ended by `unless` until {here}",
+                    self.asked
+                )
             }
             Rule::After { .. } | Rule::Eventually { .. } => format!(
                 "it happened each time ({}) until {here}, at the latest after {:.1} s",

@@ -116,12 +116,15 @@ pub struct HeldProcess {
     pub kind: FaultKind,
 }
 
-/// Whether a run has done what is expected of it. The worse is the greater.
+/// Whether a run has done what is expected of it. The worse is the greater: a run passes if one expectation does and no other one
+/// fails or is undecided.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
 )]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
+    /// What it is expected after did not happen.
+    NotAsked,
     /// It has.
     Pass,
     /// The run ended before that was certain.
@@ -135,6 +138,7 @@ impl Verdict {
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
+            Self::NotAsked => "not_asked",
             Self::Pass => "pass",
             Self::Undecided => "undecided",
             Self::Fail => "fail",
@@ -145,7 +149,7 @@ impl Verdict {
     #[must_use]
     pub fn exit_status(self) -> u8 {
         match self {
-            Self::Pass => 0,
+            Self::Pass | Self::NotAsked => 0,
             Self::Fail => 1,
             Self::Undecided => 2,
         }
@@ -154,7 +158,10 @@ impl Verdict {
 
 impl std::fmt::Display for Verdict {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(self.name())
+        match self {
+            Self::NotAsked => f.pad("not asked"),
+            other => f.pad(other.name()),
+        }
     }
 }
 

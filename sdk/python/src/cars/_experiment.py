@@ -19,11 +19,13 @@ class Verdict(NamedTuple):
 
     expectation: str
     verdict: str
-    """``pass``, ``fail`` or ``undecided``: that of the worst run."""
+    """``pass``, ``fail`` or ``undecided``: that of the worst run; ``not_asked`` if no run was asked."""
     failed: list[int]
     """Numbers of the units that fail it."""
     undecided: list[int]
     """Numbers of the units that ended before it was certain."""
+    not_asked: list[int]
+    """Numbers of the units in which what it is expected after did not happen."""
 
 
 class Experiment:

@@ -40,9 +40,9 @@ class Run:
 
     @property
     def verdict(self) -> str:
-        """``pass``, ``fail`` or ``undecided``: the worst about what the scenario expects."""
+        """``pass``, ``fail`` or ``undecided``: the worst about what the scenario expects; ``not_asked`` if nothing was asked."""
         verdicts = {judged["verdict"] for judged in self.summary.get("expectations", {}).values()}
-        return next((verdict for verdict in ("fail", "undecided") if verdict in verdicts), "pass")
+        return next((verdict for verdict in ("fail", "undecided", "pass", "not_asked") if verdict in verdicts), "pass")
 
     def frames(self, kind: Optional[str] = None) -> Frames:
         """Its tables as frames, which are those of ``cars export``.

@@ -314,6 +314,108 @@ fn a_damaged_unit_is_named_and_played_again() {
     assert!(!printed.contains("is damaged"), "{printed}");
 }
 
+/// Nothing is played under a wrong name, and what has been played is not lost.
+#[test]
+fn a_plan_that_is_damaged_or_lost_is_made_again_and_its_units_are_used() {
+    let short = Short::new();
+    let whole = short.out("whole");
+    short.run(&whole, &[]);
+    let folder = short.out("damaged");
+    short.run(&folder, &[]);
+    let plan = folder.join("plan.json");
+    let good = fs::read_to_string(&plan).unwrap();
+    let flipped = good.replacen("loss = 0.25", "loss = 0.75", 1);
+    let flipped = if flipped == good {
+        good.replacen("0.25", "0.35", 1)
+    } else {
+        flipped
+    };
+    assert_ne!(flipped, good);
+
+    let unsealed = good.replace("\"seal\"", "\"soul\"");
+    for (text, reason) in [
+        (Some(flipped.as_str()), "is not as it was written"),
+        (Some(&good[..good.len() / 2]), "is damaged"),
+        (Some(&unsealed), "has no seal"),
+        (Some(""), "is empty"),
+        (None, "it has no plan.json"),
+    ] {
+        match text {
+            Some(text) => fs::write(&plan, text).unwrap(),
+            None => fs::remove_file(&plan).unwrap(),
+        }
+        for command in ["status", "merge", "unit", "replay"] {
+            let mut args = vec![command, folder.to_str().unwrap()];
+            if matches!(command, "unit" | "replay") {
+                args.push("0");
+            }
+            let (code, printed) = cars(&args);
+            assert_eq!(code, 1, "{command}: {printed}");
+            assert!(printed.contains(reason), "{command}: {printed}");
+            assert!(
+                printed.contains("cars experiment run FILE --out"),
+                "{printed}"
+            );
+        }
+
+        let printed = short.run(&folder, &[]);
+        assert!(printed.contains("it is made again"), "{printed}");
+        assert!(printed.contains("80 are there, 0 to play"), "{printed}");
+        assert_same_results(&whole, &folder);
+    }
+}
+
+/// Every bit of a plan counts, or changes nothing.
+#[test]
+fn no_flipped_bit_of_a_plan_plays_anything_else() {
+    let short = Short::new();
+    let folder = short.out("bits");
+    short.run(&folder, &["--plan-only", "--seeds", "2"]);
+    let plan = folder.join("plan.json");
+    let good = fs::read(&plan).unwrap();
+    let before = lab::experiment::Plan::load(&folder).unwrap();
+    let mut chance = random::stream(14, "bits");
+    for _ in 0..300 {
+        let place = (random::unit(&mut chance) * good.len() as f64) as usize;
+        let bit = (random::unit(&mut chance) * 8.0) as u32;
+        let mut damaged = good.clone();
+        damaged[place] ^= 1 << bit;
+        fs::write(&plan, &damaged).unwrap();
+        if let Ok(plan) = lab::experiment::Plan::load(&folder) {
+            for number in 0..before.units() {
+                assert_eq!(plan.unit(number).key, before.unit(number).key, "{place}");
+            }
+        }
+    }
+}
+
+#[test]
+fn two_experiment_files_of_one_name_do_not_share_a_folder_by_chance() {
+    let lab = Lab::new();
+    let play = |folder: &str, question: &str, more: &[&str]| {
+        let at = lab.out().join(folder);
+        fs::create_dir_all(&at).unwrap();
+        let file = at.join("twice.toml");
+        let text = Short::text().replace("Are results independent", question);
+        fs::write(&file, text).unwrap();
+        let args = ["run", file.to_str().unwrap(), "--plan-only"];
+        let mut command = command(&[&args[..], more].concat());
+        let output = command.current_dir(lab.out()).output().unwrap();
+        (output.status.code(), super::notes(&output))
+    };
+
+    assert_eq!(play("one", "Is it one", &[]).0, Some(0));
+    assert_eq!(play("one", "Is it still one", &[]).0, Some(0));
+    let (code, printed) = play("other", "Is it another", &[]);
+    assert_eq!(code, Some(1), "{printed}");
+    assert!(
+        printed.contains("choose another folder with --out"),
+        "{printed}"
+    );
+    let out = ["--out", "runs/experiments/twice"];
+    assert_eq!(play("other", "Is it another", &out).0, Some(0));
+}
+
 #[test]
 fn a_unit_that_fails_ends_nothing_and_is_played_again_on_request() {
     let short = Short::new();
@@ -391,14 +493,14 @@ fn a_unit_is_recorded_as_a_run_by_one_command() {
         short.lab.ok(&["verify", &run]);
     }
 
-    // Another run than the unit that was played is an error.
+    // A plan that is not as it was written is refused.
     let plan = folder.join("plan.json");
     let text = fs::read_to_string(&plan).unwrap();
     let changed = text.replace("\"version\": \"", "\"version\": \"0.");
     fs::write(&plan, changed).unwrap();
     let (code, printed) = cars(&["unit", folder.to_str().unwrap(), "0"]);
     assert_eq!(code, 1);
-    assert!(printed.contains("was planned by cars 0."), "{printed}");
+    assert!(printed.contains("is not as it was written"), "{printed}");
 }
 
 #[test]

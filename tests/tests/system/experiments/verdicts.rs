@@ -34,6 +34,15 @@ fn the_exit_status_is_that_of_the_worst_verdict_of_the_experiment() {
         "{notes}"
     );
 
+    let not_asked = "[[expect]]\nname = 'heals'\nafter = { event = 'link_healed' }\n\
+                     eventually = { robot = 'Butler', behavior = 'SERVE' }\nwithin = '10 s'\n";
+    let (status, notes) = judged(&format!("{passes}{not_asked}"));
+    assert_eq!(status, 0, "{notes}");
+    assert!(
+        notes.contains("not asked: heals: in 3 of 3 runs, the first is unit 0"),
+        "{notes}"
+    );
+
     let fails = "[[expect]]\nname = 'nobody speaks'\nnever = { event = 'command_sent' }\n";
     let (status, notes) = judged(&format!("{undecided}{fails}{passes}"));
     assert_eq!(status, 1, "{notes}");

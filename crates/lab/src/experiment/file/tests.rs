@@ -664,3 +664,61 @@ fn texts_for_people_have_a_limit() {
     let error = error.in_words();
     assert!(error.contains("`question` has 2001 bytes"), "{error}");
 }
+
+/// Two columns of a table never have one name: whatever gives the second one is refused at its line.
+#[test]
+fn no_name_is_that_of_another_column() {
+    let factor = "name = \"guests\"";
+    let measure = "name = \"exchanges\"\ncount";
+    let timed = "name = \"exchanges\"\ntime = { to = { event = \"end\" } }\n[[measure]]\nname = \"m\"\ncount";
+    let expectation = "name = \"exchange\"";
+    for (name, texts) in [
+        ("failed", &[factor, measure, expectation][..]),
+        ("unit", &[factor, measure, expectation]),
+        ("digest", &[factor, measure, expectation]),
+        ("arm", &[factor, measure, expectation]),
+        ("guests", &[measure, expectation]),
+        ("served", &[factor, measure, expectation]),
+        ("served_censored", &[factor, measure, expectation]),
+        ("served_state", &[factor, measure, expectation]),
+        ("exchanges", &[factor, expectation]),
+    ] {
+        for text in texts {
+            let old = text.split('"').nth(1).unwrap();
+            let new = text.replacen(old, name, 1);
+            let file = GOOD.replacen(text, &new, 1);
+            // The report names measures and a factor by their old names.
+            let (file, _) = file.split_once("[report]").unwrap();
+            let error = parse(file).unwrap_err().in_words();
+            assert!(error.contains("have a column"), "{name}, {text}: {error}");
+        }
+    }
+    let (without_report, _) = GOOD.split_once("[report]").unwrap();
+    parse(&without_report.replacen(measure, timed, 1)).unwrap();
+
+    // Heads of columns in the table for people.
+    for (one, other) in [("served", "served"), ("arm", "x")] {
+        let with = |name: &str, column: &str| format!("name = \"{name}\"\ncolumn = \"{column}\"");
+        let file = without_report
+            .replacen("name = \"served\"", &with("served", one), 1)
+            .replacen("name = \"exchanges\"", &with("exchanges", other), 1);
+        let error = parse(&file).unwrap_err().in_words();
+        assert!(error.contains("a table has a column"), "{error}");
+    }
+}
+
+#[test]
+fn an_empty_file_is_no_experiment() {
+    for text in ["", " \n", "# a comment\n"] {
+        let error = parse(text).unwrap_err().in_words();
+        assert!(
+            error.contains("is empty: it is not an experiment"),
+            "{error}"
+        );
+    }
+    for name in [" ", "\u{3000}", " one"] {
+        let text = GOOD.replace("name = \"one\"", &format!("name = \"{name}\""));
+        let error = parse(&text).unwrap_err().in_words();
+        assert!(error.contains("no blanks before or after"), "{error}");
+    }
+}
