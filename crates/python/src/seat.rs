@@ -101,10 +101,19 @@ impl PythonRobot {
 impl Robot for PythonRobot {
     fn init(&mut self, cars: &mut robot::Cars<'_>) -> Result<(), BadParameters> {
         self.cars = None;
-        self.call(cars, |object, cars| {
-            object.call_method1("init", (cars,)).map(drop)
+        let refuses = cars.has_earlier_parameters();
+        let mut refused = None;
+        self.call(cars, |object, own| {
+            let begun = object.call_method1("init", (own,)).map(drop);
+            match begun {
+                Err(error) if refuses && !error.is_instance_of::<Interrupted>(object.py()) => {
+                    refused = Some(error.to_string());
+                    Ok(())
+                }
+                begun => begun,
+            }
         });
-        Ok(())
+        refused.map_or(Ok(()), |reason| Err(cars.bad_parameters(reason)))
     }
 
     fn tick(&mut self, cars: &mut robot::Cars<'_>) -> Action {

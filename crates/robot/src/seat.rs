@@ -4,13 +4,15 @@
 use std::sync::Arc;
 
 use lockstep::{Begin, Sent, Turn};
-use protocol::messages::{Command, CommandText, News, Panel, Point, PublicState, Report, Welcome};
+use protocol::messages::{
+    Command, CommandText, MAX_TEXT_BYTES, News, Panel, Point, PublicState, Report, Welcome,
+};
 use protocol::random::{Stream, stream};
 use protocol::{FieldError, Message, Tick};
 
 use crate::cars::{Cars, ReceivedCommand};
 use crate::cri::{Action, Robot};
-use crate::error::RobotError;
+use crate::error::{BadParameters, RobotError};
 use crate::network::Network;
 
 /// What came of a tick.
@@ -78,6 +80,61 @@ impl Seat {
         turn: &Turn<News>,
         network: &mut dyn Network,
     ) -> Result<Done, RobotError> {
+        if turn.begin == Begin::Init {
+            self.check_later_parameters()?;
+        }
+
+        let mut refused = Vec::new();
+        loop {
+            let mut log = refused.clone();
+            let acted = self.act(turn, network, &mut log);
+            match acted {
+                Err(RobotError::Parameters(error)) if self.has_earlier_parameters(turn) => {
+                    refused.push(shortened(format!("error: {error}; it keeps those before")));
+                    self.take_earlier_parameters();
+                }
+                Err(error) => return Err(error),
+                Ok((location, action)) => return self.publish(turn.tick, location, action, log),
+            }
+        }
+    }
+
+    /// Refuses what the scenario will change the parameters to.
+    fn check_later_parameters(&self) -> Result<(), BadParameters> {
+        let Some(check) = self.robot.parameters_check() else {
+            return Ok(());
+        };
+        for later in &self.welcome.later_parameters {
+            check(later).map_err(|reason| BadParameters {
+                robot: self.welcome.name.clone(),
+                reason: format!("as a change of the scenario sets them: {reason}"),
+            })?;
+        }
+
+        Ok(())
+    }
+
+    /// Whether the robot begins in the middle of an epoch, after its parameters have changed.
+    fn has_earlier_parameters(&self, turn: &Turn<News>) -> bool {
+        turn.begin == Begin::TakeOver && !self.welcome.earlier_parameters.is_empty()
+    }
+
+    /// Back to the parameters before, as if nothing had been drawn or sent with those that were refused.
+    fn take_earlier_parameters(&mut self) {
+        let welcome = Arc::make_mut(&mut self.welcome);
+        welcome.parameters = welcome.earlier_parameters.remove(0);
+        self.random = stream(welcome.seed, &welcome.stream);
+        self.outbox.clear();
+        self.gave_up = None;
+    }
+
+    /// Lets the robot perceive and act. Returns where it stands, and what it does.
+    fn act(
+        &mut self,
+        turn: &Turn<News>,
+        network: &mut dyn Network,
+        log: &mut Vec<String>,
+    ) -> Result<(Point, Action), RobotError> {
         let welcome = self.welcome.clone();
         let quiet = News::default();
         let news = turn.news.as_ref().unwrap_or(&quiet);
@@ -89,7 +146,6 @@ impl Seat {
             .map_or(self.proposal, |correction| correction.location);
         let commands = received(news);
 
-        let mut log = Vec::new();
         let mut cars = Cars {
             welcome: &welcome,
             tick: turn.tick,
@@ -99,7 +155,7 @@ impl Seat {
             senses_bodies: self.robot.senses_bodies(),
             random: &mut self.random,
             outbox: &mut self.outbox,
-            log: &mut log,
+            log,
             gave_up: &mut self.gave_up,
             network,
         };
@@ -122,7 +178,7 @@ impl Seat {
                 reason,
             });
         }
-        self.publish(turn.tick, location, action, log)
+        Ok((location, action))
     }
 
     /// Makes the report and the public state of an action, once they are fit to be sent.
@@ -217,6 +273,16 @@ fn received(news: &News) -> Vec<ReceivedCommand> {
     }
 
     received
+}
+
+/// A line that is short enough for the log: a robot may quote anything in its errors.
+fn shortened(mut line: String) -> String {
+    if line.len() > MAX_TEXT_BYTES {
+        let end = line.floor_char_boundary(MAX_TEXT_BYTES - "…".len());
+        line.truncate(end);
+        line.push('…');
+    }
+    line
 }
 
 fn finite_or(value: f64, fallback: f64) -> f64 {
