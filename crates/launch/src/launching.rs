@@ -15,13 +15,14 @@ use simulator::RunFolder;
 use simulator::recorder::{LOGS, SCENARIO};
 
 use super::compose;
+use super::ending::Failure;
 use super::endpoint;
 use super::file::{self, LaunchFile};
 use super::launched::Launched;
 use super::link::ProcessLink;
 use super::observe::{Observer, Watch};
 use super::options::RunOptions;
-use super::plan::{self, Execution, Planned};
+use super::plan::{self, Execution, FAILED, Planned};
 use super::screen::{Screen, ScreenOptions};
 use super::secure::Secured;
 use super::signals;
@@ -187,10 +188,23 @@ impl Launch {
         Self::of(what, file, scenario, run, options)
     }
 
+    /// The launch that resumes this one, which has failed.
+    ///
+    /// # Errors
+    /// As for [`Self::resume`].
+    pub fn resumed(&self, folder: &RunFolder) -> miette::Result<Self> {
+        let mut options = self.options.clone();
+        // The page that asked for it is still open.
+        options.opens_browser = false;
+        Self::resume(folder.path(), options)
+    }
+
     /// Makes the folder of a new run and notes how it is launched, or takes that of the run to resume.
     fn folder(&self) -> Result<RunFolder, FileError> {
         if self.is_resumed {
-            return Ok(RunFolder::new(&self.options.run.out, &self.run));
+            let folder = RunFolder::new(&self.options.run.out, &self.run);
+            let _is_gone = std::fs::remove_file(folder.file(LOGS).join(FAILED));
+            return Ok(folder);
         }
 
         let (folder, lock) = self.options.run.folder(&self.run, &self.scenario)?;
@@ -405,9 +419,7 @@ impl Launch {
 /// Whether the run failed because the simulator could not listen where another process does.
 fn is_port_taken(outcome: &Outcome) -> bool {
     let failure = outcome.failure.as_ref();
-    failure.is_some_and(|failure| {
-        failure.process == file::SIMULATOR && failure.code == simulator::program::ADDRESS_TAKEN
-    })
+    failure.is_some_and(Failure::is_port_taken)
 }
 
 /// A path that holds in any folder: the run may be resumed from another one.
