@@ -178,3 +178,33 @@ def test_ctl_says_what_a_robot_refuses(launch):
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, cwd=run.folder)
     assert done.returncode != 0
     assert "Butler refuses these parameters: policy: unknown variant" in done.stderr
+
+
+def test_init_that_waits_for_a_dead_robot_says_so(launch, open_page):
+    run = launch()
+    page = open_page(run.address)
+    ready(page)
+    step(page, 1)
+    run.kill("Leguin")
+    page.get_by_test_id("btn-init").click()
+    expect(page.get_by_test_id("awaiting")).to_contain_text("Leguin")
+    expect(page.get_by_test_id("phase")).to_have_text("gathering", ignore_case=True)
+    page.get_by_test_id("btn-init").click()
+    expect(page.get_by_test_id("message")).to_contain_text("the run is gathering")
+
+    run.restart("Leguin")
+    ready(page)
+    assert run.status()["epoch"] == 2
+
+
+def test_watch_again_and_init_after_a_fault_without_an_end(launched, open_page):
+    fault = 'fault=[{robot="Leguin",do="crash",at="2 s"}]'
+    run = launched("--paused", "--duration", "5 s", "--speed", "max", "--set", "on_late=continue", "--set", fault)
+    page = open_page(run.address)
+    ready(page)
+    page.get_by_test_id("btn-start").click()
+    expect(page.get_by_test_id("phase")).to_have_text("ended", ignore_case=True)
+    page.get_by_test_id("watch-again").click()
+    eventually("an earlier tick", lambda: int(page.get_by_test_id("tick").text_content()) < 10)
+    expect(page.get_by_test_id("tick")).to_have_text("10", timeout=30_000)
+    expect(page.get_by_test_id("message")).to_be_empty()

@@ -1,7 +1,9 @@
 //! A robot of Python as a robot of the SDK.
 
+use std::ffi::CString;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use pyo3::exceptions::PyRuntimeWarning;
 use pyo3::prelude::*;
 use robot::{Action, BadParameters, Panel, Robot, StateVariables};
 
@@ -98,6 +100,14 @@ impl PythonRobot {
     }
 }
 
+/// Warns as Python does. Where warnings are errors, this one is none: the robot goes on.
+fn warn(text: &str) {
+    Python::attach(|py| {
+        let text = CString::new(text.replace('\0', " ")).unwrap_or_default();
+        let _is_an_error = PyErr::warn(py, &py.get_type::<PyRuntimeWarning>(), &text, 0);
+    });
+}
+
 impl Robot for PythonRobot {
     fn init(&mut self, cars: &mut robot::Cars<'_>) -> Result<(), BadParameters> {
         self.cars = None;
@@ -113,7 +123,12 @@ impl Robot for PythonRobot {
                 begun => begun,
             }
         });
-        refused.map_or(Ok(()), |reason| Err(cars.bad_parameters(reason)))
+        let Some(reason) = refused else {
+            return Ok(());
+        };
+        let refusal = cars.bad_parameters(reason);
+        warn(&format!("{refusal}; it keeps those before"));
+        Err(refusal)
     }
 
     fn tick(&mut self, cars: &mut robot::Cars<'_>) -> Action {

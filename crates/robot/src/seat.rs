@@ -4,9 +4,7 @@
 use std::sync::Arc;
 
 use lockstep::{Begin, Sent, Turn};
-use protocol::messages::{
-    Command, CommandText, MAX_TEXT_BYTES, News, Panel, Point, PublicState, Report, Welcome,
-};
+use protocol::messages::{Command, CommandText, News, Panel, Point, PublicState, Report, Welcome};
 use protocol::random::{Stream, stream};
 use protocol::{FieldError, Message, Tick};
 
@@ -14,6 +12,11 @@ use crate::cars::{Cars, ReceivedCommand};
 use crate::cri::{Action, Robot};
 use crate::error::{BadParameters, RobotError};
 use crate::network::Network;
+
+/// The line of the log for a change of parameters that a robot refuses. The log is part of the record, and a robot in another
+/// language has other words for the reason: that is a diagnostic.
+const KEPT: &str =
+    "error: refuses its new parameters, and keeps those before; its output has the reason";
 
 /// What came of a tick.
 #[derive(Debug)]
@@ -84,13 +87,17 @@ impl Seat {
             self.check_later_parameters()?;
         }
 
-        let mut refused = Vec::new();
+        let mut has_refused = false;
         loop {
-            let mut log = refused.clone();
+            let mut log = Vec::new();
+            if has_refused {
+                log.push(KEPT.to_owned());
+            }
             let acted = self.act(turn, network, &mut log);
             match acted {
                 Err(RobotError::Parameters(error)) if self.has_earlier_parameters(turn) => {
-                    refused.push(shortened(format!("error: {error}; it keeps those before")));
+                    tracing::warn!("{error}; it keeps those before");
+                    has_refused = true;
                     self.take_earlier_parameters();
                 }
                 Err(error) => return Err(error),
@@ -273,16 +280,6 @@ fn received(news: &News) -> Vec<ReceivedCommand> {
     }
 
     received
-}
-
-/// A line that is short enough for the log: a robot may quote anything in its errors.
-fn shortened(mut line: String) -> String {
-    if line.len() > MAX_TEXT_BYTES {
-        let end = line.floor_char_boundary(MAX_TEXT_BYTES - "…".len());
-        line.truncate(end);
-        line.push('…');
-    }
-    line
 }
 
 fn finite_or(value: f64, fallback: f64) -> f64 {

@@ -288,13 +288,18 @@ def test_a_change_of_parameters_that_a_robot_refuses_is_a_line_of_its_log(tmp_pa
         file.write_text(hall("A", "B", more=tables))
         return cars.run(file, robots={"A": Walker, "B": Still}, out=tmp_path / str(len(list(tmp_path.iterdir()))))
 
-    run = changed("fast", "0.5", "7", "8", "0.5")
+    with pytest.warns(RuntimeWarning) as warned:
+        run = changed("fast", "0.5", "7", "8", "0.5")
+    reasons = [str(warning.message) for warning in warned if warning.category is RuntimeWarning]
+    assert "parameters of A: speed_mps must be a number, not 'fast'" in reasons[0]
+    # 8 is refused, and so is 7, which was before it.
+    assert [reason.endswith("ValueError: too fast; it keeps those before") for reason in reasons] == [False, True, True, True]
     log = (run.folder / "cars.log").read_text()
-    assert "error: parameters of A: BadParameters: parameters of A: speed_mps must be a number" in log
-    assert log.count("ValueError: too fast; it keeps those before") == 3  # 8 is refused, and so is 7, which was before it
+    assert log.count("error: refuses its new parameters, and keeps those before; its output has the reason") == 3
     speeds = run.states[run.states.robot == "A"].groupby("tick").speed_mps.first()
     assert [speeds[tick] for tick in (3, 5, 6, 8, 10, 19)] == [0.25, 0.25, 0.5, 0.5, 0.5, 0.5]
-    again = changed("fast", "0.5", "7", "8", "0.5")
+    with pytest.warns(RuntimeWarning):
+        again = changed("fast", "0.5", "7", "8", "0.5")
     assert (run.folder / "events.jsonl").read_text() == (again.folder / "events.jsonl").read_text()
 
 

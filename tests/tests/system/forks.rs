@@ -226,6 +226,10 @@ fn a_fork_that_cannot_be_made_is_refused_and_the_run_is_kept() {
         "none of the 2 elements is called",
     );
     refused(&["parent@30", "--set", "change=[]"], "further [[change]]");
+    refused(
+        &["parent@30", "--set", "robot.Butler.params.policy=nonsense"],
+        "parameters of Butler: policy: unknown variant `nonsense`",
+    );
     let hang = r#"fault=[{ robot = "Leguin", do = "hang", at = "20 s", for = "1 s" }]"#;
     refused(&["parent@30", "--set", hang], "needs a process of its own");
 

@@ -162,19 +162,21 @@ def run(
     def maker(of: str, make: Callable[[], Robot]) -> Callable[[], Robot]:
         return lambda: checked(make(), f"robots[{of!r}] must make")
 
+    file = _arguments.path("scenario", scenario)
+    seed = None if seed is None else _arguments.whole("seed", seed, 0, _arguments.MAX_SEED)
+    settings = _settings.changes(set)
+    lasts = _arguments.time("duration", duration)
+    pace = _arguments.speed("speed", speed)
+    named = _arguments.text("name", name)
+    makers = {of: maker(of, make) for of, make in _arguments.makers("robots", robots).items()}
+    into = None if out is None else _arguments.path("out", out)
+
     keeper = None
-    if out is None:
+    if into is None:
         keeper = tempfile.TemporaryDirectory(prefix="cars-")
-        out = keeper.name
+        into = Path(keeper.name)
     folder, summary = _cars.run(
-        _arguments.path("scenario", scenario),
-        seed=None if seed is None else _arguments.whole("seed", seed, 0, _arguments.MAX_SEED),
-        set=_settings.changes(set),
-        duration=_arguments.time("duration", duration),
-        speed=_arguments.speed("speed", speed),
-        name=_arguments.text("name", name),
-        out=_arguments.path("out", out),
-        robots={of: maker(of, make) for of, make in _arguments.makers("robots", robots).items()},
+        file, seed=seed, set=settings, duration=lasts, speed=pace, name=named, out=into, robots=makers
     )
     return Run(folder, json.loads(summary), keeper)
 
