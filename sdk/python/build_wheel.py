@@ -28,7 +28,7 @@ def build(profile: str, out: Path) -> Path:
     """Makes the wheel in a folder, and returns its path."""
     # The whole workspace, so that what the module and the programs share has the same features in both and is compiled once.
     cargo = ["cargo", "build", "--workspace", "--bins", "--lib", "--profile", profile]
-    subprocess.run([*cargo, "--quiet"], cwd=ROOT, check=True)
+    subprocess.run(cargo, cwd=ROOT, check=True)
     target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"), profile)
     made = out.resolve()
     # A copy, so that programs never lie among the sources; within the project, whose toolchain and settings cargo finds from there,
@@ -45,7 +45,7 @@ def build(profile: str, out: Path) -> Path:
         scripts.mkdir(parents=True)
         for program in PROGRAMS:
             subprocess.run(["strip", "-o", scripts / program, target / program], check=True)
-        maturin = ["maturin", "build", "--profile", profile, "--strip", "--quiet", "--out", str(made)]
+        maturin = ["maturin", "build", "--profile", profile, "--strip", "--out", str(made)]
         subprocess.run(maturin, cwd=copy, check=True)
     return max(made.glob("*.whl"), key=lambda wheel: wheel.stat().st_mtime)
 

@@ -129,7 +129,18 @@ pub(crate) fn launch(args: LaunchArgs) -> miette::Result<ExitCode> {
             Ok(ExitCode::SUCCESS)
         }
         None => {
-            let (outcome, folder) = launch.play(|text| terminal::note(text))?;
+            let (mut outcome, mut folder) = launch.play(|text| terminal::note(text))?;
+            while outcome.is_to_resume {
+                terminal::note(
+                    outcome
+                        .failure
+                        .iter()
+                        .map(ToString::to_string)
+                        .collect::<String>(),
+                );
+                let resumed = launch.resumed(&folder)?;
+                (outcome, folder) = resumed.play(|text| terminal::note(text))?;
+            }
             conclude(&outcome, &folder, is_quiet)
         }
     }

@@ -190,6 +190,8 @@ impl Kit {
             location: role.location,
             roster: cast.into_keys().collect(),
             parameters: role.parameters,
+            earlier_parameters: Vec::new(),
+            later_parameters: Vec::new(),
             news_flag: 0,
             last_state: None,
             state_before: None,

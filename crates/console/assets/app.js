@@ -7,6 +7,7 @@ import { Connection } from "./connection.js";
 import { Controls, renderAwaiting } from "./controls.js";
 import { DiagramView } from "./diagram.js";
 import { Editor } from "./editor.js";
+import { renderFailed } from "./failed.js";
 import { Hover } from "./hover.js";
 import { Interventions } from "./interventions.js";
 import { classesIn } from "./known.js";
@@ -85,6 +86,14 @@ async function sendCommand(to, command) {
   const answer = await connection.command(to, command);
   if (answer.answer === "done") store.applyStatus(answer);
   notices.show(answer, `${command} goes to ${to} with the next tick.`);
+}
+
+/** Has a run that has failed go on, and resolves with whether it will. The console ends with its answer, or before it. */
+async function resume() {
+  const answer = await connection.resume();
+  const isAccepted = answer.answer !== "refused" || !store.isConnected;
+  if (!isAccepted) notices.show(answer);
+  return isAccepted;
 }
 
 const isRecording = () => store.mode === "recording";
@@ -228,6 +237,7 @@ function drawBar() {
   interventions.render();
   box("experiment").hidden = !interventions.isPossible;
   renderStranger(box("stranger"), store);
+  renderFailed(box("failed"), store, resume);
   renderVerdicts(box("verdicts"), store);
 
   renderScrub(box("scrub-bar"), player, shownTime);
@@ -238,13 +248,13 @@ function drawBar() {
   if (isPast && openTab === "setup") tabList.select("log");
   box("voice-label").hidden = isRecording();
 
-  const isEmpty = store.frame === null && !isRecording() && !(store.isLive && store.status);
+  const isEmpty = store.frame === null && !store.failed && !isRecording() && !(store.isLive && store.status);
   box("empty").hidden = !isEmpty;
   box("empty-console").hidden = store.isConnected;
   box("empty-simulator").hidden = !store.isConnected;
   box("advice").textContent = `cars launch launch/hors_doeuvres.toml --run ${store.run} --listen ${store.endpoint} --no-console`;
 
-  box("gone").hidden = isEmpty || isRecording() || store.isLive || store.stranger !== null;
+  box("gone").hidden = isEmpty || isRecording() || store.isLive || store.stranger !== null || store.failed !== null;
   box("gone").textContent = store.isConnected
     ? "The simulator is disconnected. This is its last frame."
     : "The console is not reachable. This is the last frame.";

@@ -14,9 +14,11 @@
  *   | {type: "frame", frame: WorldFrame}
  *   | {type: "panel", robot: string, panel: Panel}
  *   | {type: "log", lines: LogRecord[], dropped: number}
+ *   | {type: "failed", failed: Failed}
  *   | {type: "answer", id: number, answer?: ControlAnswer, error?: string}} ServerMessage
  */
 
+/** Why a run has failed, and the command by which it goes on. @typedef {{text: string, lines: string[], log: string, command: string}} Failed */
 /** Messages that do not answer a request. @typedef {Exclude<ServerMessage, {type: "answer"}>} Broadcast */
 /** The first message of a server. @typedef {Extract<ServerMessage, {type: "hello"}>} Hello */
 /** @typedef {{resolve: (answer: ControlAnswer) => void, timer: number}} Pending */
@@ -89,10 +91,15 @@ export class Connection {
     return this.send({ type: "command", to, command });
   }
 
+  /** Has a run that has failed go on: its launcher starts the processes again, this console included. */
+  resume() {
+    return this.send({ type: "resume" });
+  }
+
   /**
    * Resolves with the answer. Failures of the connection look like refusals of the simulator, so that there is one way to
    * show both.
-   * @param {{type: "control", control: Control} | {type: "command", to: string, command: string}} message
+   * @param {{type: "control", control: Control} | {type: "command", to: string, command: string} | {type: "resume"}} message
    * @returns {Promise<ControlAnswer>}
    */
   send(message) {

@@ -30,6 +30,8 @@ export class Store {
     this.endpoint = "";
     /** What has taken the address of this page, see `connection.js`. @type {import("./connection.js").Stranger | null} */
     this.stranger = null;
+    /** Why the run has failed. @type {import("./connection.js").Failed | null} */
+    this.failed = null;
     this.isConnected = false;
     this.isSimulatorPresent = false;
     /** What is shown. @type {WorldFrame | null} */
@@ -107,6 +109,10 @@ export class Store {
         this.endpoint = message.endpoint ?? "";
         this.hello(message.mode, message.run, message.version);
         break;
+      case "failed":
+        this.failed = message.failed;
+        this.emit("connection");
+        break;
       case "simulator":
         this.setSimulator(message.present);
         this.emit("connection");
@@ -137,6 +143,7 @@ export class Store {
     this.mode = mode;
     this.run = run;
     this.version = version;
+    this.failed = null;
     this.log = [];
     this.logCount = 0;
     this.logMissed = 0;

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use tokio::sync::{Notify, OwnedSemaphorePermit, Semaphore, SemaphorePermit, watch};
 
+use crate::failed::Failed;
 use crate::guard::Guard;
 use crate::live::Live;
 use crate::past::Past;
@@ -36,6 +37,8 @@ pub(crate) struct App {
     reads: Semaphore,
     ending: watch::Sender<bool>,
     entry: Notify,
+    failed: watch::Sender<Option<Arc<Failed>>>,
+    resumption: Notify,
 }
 
 impl App {
@@ -50,6 +53,8 @@ impl App {
             reads: Semaphore::new(MAX_READS),
             ending: watch::Sender::new(false),
             entry: Notify::new(),
+            failed: watch::Sender::new(None),
+            resumption: Notify::new(),
         }
     }
 
@@ -73,6 +78,30 @@ impl App {
         self.entry.notified().await;
     }
 
+    /// Tells all browsers why the run has failed.
+    pub(crate) fn fail(&self, failed: Failed) {
+        self.failed.send_replace(Some(Arc::new(failed)));
+    }
+
+    /// Why the run has failed, once it has.
+    pub(crate) fn failed(&self) -> watch::Receiver<Option<Arc<Failed>>> {
+        self.failed.subscribe()
+    }
+
+    /// Notes that a person wants a run that has failed to go on. Returns whether it has failed.
+    pub(crate) fn on_resume(&self) -> bool {
+        let has_failed = self.failed.borrow().is_some();
+        if has_failed {
+            self.resumption.notify_one();
+        }
+        has_failed
+    }
+
+    /// Waits until a person wants the run to go on. For one task.
+    pub(crate) async fn resumed(&self) {
+        self.resumption.notified().await;
+    }
+
     /// Closes the session with the run.
     pub(crate) fn close(&self) {
         if let Mode::Live(live) = &self.mode {
@@ -93,6 +122,11 @@ impl App {
     /// Waits for a permit to read from the recording. `None` never happens: the semaphore is not closed.
     pub(crate) async fn admit_read(&self) -> Option<SemaphorePermit<'_>> {
         self.reads.acquire().await.ok()
+    }
+
+    /// Whether a browser is connected.
+    pub(crate) fn is_viewed(&self) -> bool {
+        self.browsers.available_permits() < MAX_BROWSERS
     }
 
     /// Waits until no browser is connected.

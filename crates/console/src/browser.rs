@@ -15,6 +15,7 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc, watch};
 use tokio::time::{Instant, sleep_until, timeout};
 
 use crate::app::{App, Ending, MAX_BROWSERS, Mode};
+use crate::failed::Failed;
 use crate::feed::Cursor;
 use crate::live::{Live, Viewer};
 use crate::page::{PageMessage, RequestId, ServerMessage};
@@ -85,6 +86,7 @@ struct Browser {
     socket: WebSocket,
     app: Arc<App>,
     ending: Ending,
+    failed: watch::Receiver<Option<Arc<Failed>>>,
     /// `None` while a recording is shown.
     view: Option<LiveView>,
     answer_sender: mpsc::Sender<Utf8Bytes>,
@@ -146,6 +148,7 @@ impl Browser {
         Self {
             socket,
             ending: app.ending(),
+            failed: new_failure(&app),
             app,
             view,
             answer_sender,
@@ -177,6 +180,10 @@ impl Browser {
                 Some(answer) = self.answers.recv() => self.send_text(answer).await?,
                 () = LiveView::changed(&mut self.view, self.next_batch),
                     if unacknowledged < MAX_UNACKNOWLEDGED => self.send_batch().await?,
+                failed = next_failure(&mut self.failed) => {
+                    let text = ServerMessage::Failed { failed: &failed }.text();
+                    self.send_text(text).await?;
+                }
                 () = sleep_until(self.next_ping) => self.check_liveness().await?,
                 () = self.ending.reached() => {
                     return Err(Disconnect::closed(close_code::AWAY, "the console ends"));
@@ -302,6 +309,10 @@ impl Browser {
 
     /// Starts a request to the simulator; `answers` receives its outcome.
     fn start_request(&self, message: PageMessage) -> Result<(), &'static str> {
+        if matches!(message, PageMessage::Resume { .. }) {
+            let has_failed = self.app.on_resume();
+            return has_failed.then_some(()).ok_or("the run has not failed");
+        }
         let view = self
             .view
             .as_ref()
@@ -327,6 +338,24 @@ impl Browser {
         let text = ServerMessage::answer(id, Err(reason)).text();
         self.send_text(text).await
     }
+}
+
+/// What a browser is told of a failure: also of one that was before it came.
+fn new_failure(app: &App) -> watch::Receiver<Option<Arc<Failed>>> {
+    let mut failed = app.failed();
+    failed.mark_changed();
+    failed
+}
+
+/// Waits for a failure that the browser has not been told of. Never returns where none can come any more.
+async fn next_failure(failed: &mut watch::Receiver<Option<Arc<Failed>>>) -> Arc<Failed> {
+    while failed.changed().await.is_ok() {
+        let newest = failed.borrow_and_update().clone();
+        if let Some(newest) = newest {
+            return newest;
+        }
+    }
+    std::future::pending().await
 }
 
 fn id_of_malformed(text: &str) -> Option<u64> {
@@ -371,6 +400,7 @@ fn execute(live: &Live, message: &PageMessage) -> Result<ControlAnswer, String> 
     match message {
         PageMessage::Control { control, .. } => live.control(control),
         PageMessage::Command { to, command, .. } => live.send_command(to, command),
+        PageMessage::Resume { .. } => unreachable!("it is not for the simulator"),
     }
 }
 

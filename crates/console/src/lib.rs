@@ -7,6 +7,7 @@
 mod app;
 mod browser;
 mod diagrams;
+mod failed;
 mod feed;
 mod guard;
 mod kept;
@@ -32,6 +33,7 @@ use tokio::runtime::Runtime;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 
 use app::{App, Mode};
+use failed::Next;
 use guard::{AllowedHost, Guard};
 use kept::Kept;
 use live::Live;
@@ -43,6 +45,8 @@ const DEFAULT_BIND: &str = "127.0.0.1:7007";
 const FALLBACK_BIND: &str = "127.0.0.1:0";
 /// How long browsers have to close their connections when the console ends.
 const CLOSE_TIMEOUT: Duration = Duration::from_secs(2);
+/// Exit status of a console in which a person wants a run that has failed to go on.
+pub const RESUME: u8 = 75;
 /// How long to wait for threads that are blocked on a reply of the simulator.
 const SHUTDOWN_TIMEOUT: Duration = Duration::from_millis(200);
 
@@ -77,6 +81,10 @@ struct Args {
     /// was killed is started again.
     #[arg(long, env = "CARS_CONSOLE_KEEP", value_name = "FILE")]
     keep: Option<PathBuf>,
+    /// The file in which the launcher says that the run has failed: the page shows why, and the console stays while a browser
+    /// shows it.
+    #[arg(long, env = "CARS_CONSOLE_FAILED", value_name = "FILE", hide = true)]
+    failed: Option<PathBuf>,
     /// Admit requests that name this host, too, with its port unless it is the usual one: that of a proxy, which also brings TLS.
     /// Can be given several times.
     #[arg(
@@ -94,6 +102,7 @@ struct Serving {
     /// Whether a browser is started.
     opens: bool,
     keep: Option<PathBuf>,
+    failed: Option<PathBuf>,
     allowed: Vec<AllowedHost>,
 }
 
@@ -114,7 +123,8 @@ pub fn main() -> ExitCode {
     terminal::print_diagnostics("warn,zenoh=error");
 
     match run(args) {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(Next::End) => ExitCode::SUCCESS,
+        Ok(Next::Resume) => ExitCode::from(RESUME),
         Err(error) => {
             terminal::note(format_args!("error: {error}"));
             ExitCode::FAILURE
@@ -122,7 +132,7 @@ pub fn main() -> ExitCode {
     }
 }
 
-fn run(args: Args) -> Result<(), String> {
+fn run(args: Args) -> Result<Next, String> {
     let (mode, past) = match args.recording {
         Some(path) => open_recording(&path)?,
         None => {
@@ -136,6 +146,7 @@ fn run(args: Args) -> Result<(), String> {
         bind: args.bind,
         opens: args.open,
         keep: args.keep,
+        failed: args.failed,
         allowed: args.allow_host,
     };
     let runtime = build_runtime()?;
@@ -164,8 +175,8 @@ fn build_runtime() -> Result<Runtime, String> {
         .map_err(|error| format!("cannot start: {error}"))
 }
 
-/// Serves until the process receives SIGTERM or SIGINT.
-async fn serve(mode: Mode, past: Option<Past>, how: Serving) -> Result<(), String> {
+/// Serves until the process receives SIGTERM or SIGINT, or until a run that has failed is not looked at any more.
+async fn serve(mode: Mode, past: Option<Past>, how: Serving) -> Result<Next, String> {
     let kept = how.keep.as_deref().and_then(Kept::read);
     let listener = match &kept {
         Some(kept) => listen_again(kept.address, how.bind).await?,
@@ -191,22 +202,27 @@ async fn serve(mode: Mode, past: Option<Past>, how: Serving) -> Result<(), Strin
     let mut interrupt = handle(SignalKind::interrupt())?;
 
     announce(address, &url);
-    if how.opens && !was_open {
-        opening::open(&url, app.clone());
-    }
+    let is_opening = how.opens && !was_open && opening::open(&url, app.clone());
+    let failure = async {
+        match &how.failed {
+            Some(file) => failed::watch(file, &app, is_opening || was_open).await,
+            None => std::future::pending().await,
+        }
+    };
 
     let serving = tokio::spawn(server::serve(listener, app.clone()));
-    tokio::select! {
-        _ = terminate.recv() => {}
-        _ = interrupt.recv() => {}
-    }
+    let next = tokio::select! {
+        _ = terminate.recv() => Next::End,
+        _ = interrupt.recv() => Next::End,
+        next = failure => next,
+    };
 
     app.end();
     if tokio::time::timeout(CLOSE_TIMEOUT, serving).await.is_err() {
         tracing::debug!("a browser did not close its connection in time");
     }
     app.close();
-    Ok(())
+    Ok(next)
 }
 
 fn announce(address: SocketAddr, url: &str) {

@@ -5,6 +5,8 @@ use protocol::RobotName;
 use protocol::messages::{Control, ControlAnswer, LogRecord, Panel, WorldFrame};
 use serde::{Deserialize, Serialize};
 
+use crate::failed::Failed;
+
 /// Server to page.
 #[derive(Debug, Serialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
@@ -44,6 +46,11 @@ pub(crate) enum ServerMessage<'a> {
         lines: &'a [LogRecord],
         /// How many lines before them this browser missed.
         dropped: u64,
+    },
+    /// The run has failed, and its processes end.
+    Failed {
+        /// Why, as its launcher says.
+        failed: &'a Failed,
     },
     /// The outcome of a request: either `answer` or `error` is present.
     Answer {
@@ -104,13 +111,18 @@ pub(crate) enum PageMessage {
         /// The text of the command.
         command: String,
     },
+    /// Has a run that has failed go on.
+    Resume {
+        /// Number of the request; the answer carries it, too.
+        id: u64,
+    },
 }
 
 impl PageMessage {
     /// The number that the page gave the request.
     pub(crate) fn id(&self) -> u64 {
         match self {
-            Self::Control { id, .. } | Self::Command { id, .. } => *id,
+            Self::Control { id, .. } | Self::Command { id, .. } | Self::Resume { id } => *id,
         }
     }
 

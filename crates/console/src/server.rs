@@ -1,8 +1,9 @@
 //! The HTTP side: routes, connections and their limits.
 
+use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::pin::pin;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use axum::Router;
@@ -14,13 +15,14 @@ use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use hyper::server::conn::http1;
+use hyper::service::{Service as _, service_fn};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
 use protocol::{Epoch, Tick};
 use rust_embed::Embed;
 use serde::{Deserialize, Serialize};
 use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::sync::{Notify, Semaphore};
 
 use crate::app::{App, Ending};
 use crate::browser;
@@ -66,14 +68,63 @@ fn routes(app: Arc<App>) -> Router {
         .with_state(app)
 }
 
+/// Connections that have not sent a complete request yet, the oldest first.
+#[derive(Default)]
+struct Unheard(Mutex<BTreeMap<u64, Arc<Notify>>>);
+
+/// A connection that has not sent a complete request yet; it is counted until it has, or is dropped.
+struct Newcomer {
+    unheard: Arc<Unheard>,
+    number: u64,
+    /// Notified when the connection has to make room.
+    evicted: Arc<Notify>,
+}
+
+impl Unheard {
+    fn lock(&self) -> MutexGuard<'_, BTreeMap<u64, Arc<Notify>>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Counts a connection in. Numbers rise.
+    fn admit(self: &Arc<Self>, number: u64) -> Newcomer {
+        let evicted = Arc::new(Notify::new());
+        self.lock().insert(number, evicted.clone());
+        Newcomer {
+            unheard: self.clone(),
+            number,
+            evicted,
+        }
+    }
+
+    /// Closes the oldest connection, if there is one: it has had the most time to send something.
+    fn evict(&self) {
+        if let Some((_, oldest)) = self.lock().pop_first() {
+            oldest.notify_one();
+        }
+    }
+}
+
+impl Newcomer {
+    /// A complete request has arrived.
+    fn is_heard(&self) {
+        self.unheard.lock().remove(&self.number);
+    }
+}
+
+impl Drop for Newcomer {
+    fn drop(&mut self) {
+        self.is_heard();
+    }
+}
+
 /// Serves until the console ends and all clients are disconnected.
 pub(crate) async fn serve(listener: TcpListener, app: Arc<App>) {
     let routes = routes(app.clone());
     let connections = Arc::new(Semaphore::new(MAX_CONNECTIONS));
+    let unheard = Arc::new(Unheard::default());
     let mut ending = app.ending();
 
-    // The semaphore is never closed. At the limit, new clients wait in the listener's backlog.
-    while let Ok(permit) = connections.clone().acquire_owned().await {
+    for number in 0.. {
         let accepted = tokio::select! {
             accepted = listener.accept() => accepted,
             () = ending.reached() => break,
@@ -81,12 +132,23 @@ pub(crate) async fn serve(listener: TcpListener, app: Arc<App>) {
 
         match accepted {
             Ok((stream, _)) => {
-                tokio::spawn(serve_connection(
-                    stream,
-                    routes.clone(),
-                    app.ending(),
-                    permit,
-                ));
+                // At the limit a silent connection makes room. Where there is none, clients wait in the listener's backlog.
+                if connections.available_permits() == 0 {
+                    unheard.evict();
+                }
+                let permit = tokio::select! {
+                    permit = connections.clone().acquire_owned() => permit,
+                    () = ending.reached() => break,
+                };
+                let Ok(permit) = permit else {
+                    unreachable!("the semaphore is never closed")
+                };
+                let connection =
+                    serve_connection(stream, routes.clone(), app.ending(), unheard.admit(number));
+                tokio::spawn(async {
+                    connection.await;
+                    drop(permit);
+                });
             }
             Err(error) => {
                 // Too many open files, for example: a connection that closes makes room.
@@ -107,21 +169,28 @@ async fn serve_connection(
     stream: TcpStream,
     routes: Router,
     mut ending: Ending,
-    _permit: OwnedSemaphorePermit,
+    newcomer: Newcomer,
 ) {
     if let Err(error) = stream.set_nodelay(true) {
         tracing::debug!("a connection is closed already: {error}");
     }
 
+    let evicted = newcomer.evicted.clone();
+    let routes = TowerToHyperService::new(routes);
+    let service = service_fn(move |request| {
+        newcomer.is_heard();
+        routes.call(request)
+    });
     let connection = http1::Builder::new()
         .timer(TokioTimer::new())
         .header_read_timeout(REQUEST_TIMEOUT)
-        .serve_connection(TokioIo::new(stream), TowerToHyperService::new(routes))
+        .serve_connection(TokioIo::new(stream), service)
         .with_upgrades();
     let mut connection = pin!(connection);
 
     let outcome = tokio::select! {
         outcome = connection.as_mut() => outcome,
+        () = evicted.notified() => return,
         () = ending.reached() => {
             connection.as_mut().graceful_shutdown();
             connection.await

@@ -12,7 +12,7 @@ use simulator::record::{Entry, Record};
 use simulator::{EpochFiles, Recorder, RunFolder, Summary};
 
 use crate::reexecution::{Reexecution, cannot_go_on};
-use crate::run::{check_faults, go_on, observed};
+use crate::run::{check_faults, check_parameters, go_on, observed};
 
 /// Tables of a scenario that hold for the whole run and can be other ones in a fork.
 const OF_THE_RUN: [&str; 2] = ["duration", "record"];
@@ -80,6 +80,7 @@ impl Fork<'_> {
             ));
         }
         check_faults(&scenario, self.tick)?;
+        check_parameters(&scenario, self.tick)?;
         Ok(scenario)
     }
 

@@ -79,7 +79,7 @@ impl Reexecution {
         }
 
         Ok(Self {
-            local: Local::with_robots(scenario, epoch, &run, robots)?,
+            local: Local::recorded(scenario, epoch, &run, robots)?,
             run,
             script,
             scripted,

@@ -8,7 +8,7 @@ use miette::{IntoDiagnostic, miette};
 use protocol::messages::{End, FaultKind, OnLate};
 use protocol::{Epoch, Event, RobotName, RunName, Tick};
 use recording::panel_ticks;
-use robot::{LocalHost, Robot};
+use robot::{LocalHost, Robot, Welcome};
 use scenario::FaultEnd;
 use scenario::Scenario;
 use simulator::recorder::Observed;
@@ -207,14 +207,28 @@ impl Local {
         robots: BTreeMap<RobotName, Box<dyn Robot>>,
     ) -> miette::Result<Self> {
         let mut simulation = Simulation::new(scenario, epoch).into_diagnostic()?;
-        let mut seats = Vec::new();
-        for (name, robot) in robots {
-            simulation.list_bodies(&name, robot.senses_bodies());
-            if let Some(welcome) = simulation.welcome(run, &name, 1, None) {
-                seats.push((robot, welcome));
-            }
-        }
+        let seats = seats(&mut simulation, run, robots);
+        Ok(Self {
+            simulation,
+            robots: LocalHost::new(seats),
+        })
+    }
 
+    /// The same for an epoch that was recorded: the robots of then had no objection to what the scenario planned.
+    ///
+    /// # Errors
+    /// If the scenario cannot be set up.
+    pub fn recorded(
+        scenario: Scenario,
+        epoch: Epoch,
+        run: &RunName,
+        robots: BTreeMap<RobotName, Box<dyn Robot>>,
+    ) -> miette::Result<Self> {
+        let mut simulation = Simulation::new(scenario, epoch).into_diagnostic()?;
+        let mut seats = seats(&mut simulation, run, robots);
+        for (_, welcome) in &mut seats {
+            welcome.later_parameters.clear();
+        }
         Ok(Self {
             simulation,
             robots: LocalHost::new(seats),
@@ -274,6 +288,36 @@ impl Local {
         }
         Ok(())
     }
+}
+
+/// The robots with their welcomes.
+fn seats(
+    simulation: &mut Simulation,
+    run: &RunName,
+    robots: BTreeMap<RobotName, Box<dyn Robot>>,
+) -> Vec<(Box<dyn Robot>, Welcome)> {
+    let mut seats = Vec::new();
+    for (name, robot) in robots {
+        simulation.list_bodies(&name, robot.senses_bodies());
+        if let Some(welcome) = simulation.welcome(run, &name, 1, None) {
+            seats.push((robot, welcome));
+        }
+    }
+    seats
+}
+
+/// Checks the parameters that robots get after a tick, as far as their classes are of this process and can check them.
+///
+/// # Errors
+/// If a robot refuses them.
+pub fn check_parameters(scenario: &Scenario, after: Tick) -> miette::Result<()> {
+    for (name, parameters) in scenario.parameters_from(after + 1) {
+        let robot = robots::make(&scenario.robots[&name].class);
+        if let Some(check) = robot.and_then(|robot| robot.parameters_check()) {
+            check(&parameters).map_err(|reason| miette!("parameters of {name}: {reason}"))?;
+        }
+    }
+    Ok(())
 }
 
 /// Checks that the faults of a scenario that begin after a tick can be played without processes: crashes and hangs that end by

@@ -15,6 +15,7 @@ use simulator::recorder::{LOGS, SCENARIO};
 use simulator::{IfTaken, RunFolder, RunLock};
 
 use super::compose;
+use super::ending::Failure;
 use super::endpoint;
 use super::file::{self, LaunchFile};
 use super::launched::Launched;
@@ -22,7 +23,7 @@ use super::leftovers::Leftovers;
 use super::link::ProcessLink;
 use super::observe::{Observer, Watch};
 use super::options::RunOptions;
-use super::plan::{self, Execution, Part, Planned};
+use super::plan::{self, Execution, FAILED, Part, Planned};
 use super::screen::{Screen, ScreenOptions};
 use super::secure::Secured;
 use super::signals;
@@ -201,6 +202,17 @@ impl Launch {
         Self::of(what, file, scenario, run, options)
     }
 
+    /// The launch that resumes this one, which has failed.
+    ///
+    /// # Errors
+    /// As for [`Self::resume`].
+    pub fn resumed(&self, folder: &RunFolder) -> miette::Result<Self> {
+        let mut options = self.options.clone();
+        // The page that asked for it is still open.
+        options.opens_browser = false;
+        Self::resume(folder.path(), options)
+    }
+
     /// Makes the folder of a new run and notes how it is launched, or takes that of the run to resume. From then on the run has
     /// the name of the folder. While the lock is held, no other launch takes the folder.
     fn take_folder(
@@ -210,6 +222,7 @@ impl Launch {
         if self.is_resumed {
             let folder = RunFolder::new(&self.options.run.out, &self.run);
             let lock = folder.lock_of_launcher()?;
+            let _is_gone = std::fs::remove_file(folder.file(LOGS).join(FAILED));
             return Ok((folder, lock));
         }
 
@@ -465,9 +478,7 @@ impl Launch {
 /// Whether the run failed because the simulator could not listen where another process does.
 fn is_port_taken(outcome: &Outcome) -> bool {
     let failure = outcome.failure.as_ref();
-    failure.is_some_and(|failure| {
-        failure.process == file::SIMULATOR && failure.code == simulator::program::ADDRESS_TAKEN
-    })
+    failure.is_some_and(Failure::is_port_taken)
 }
 
 /// A path that holds in any folder: the run may be resumed from another one.

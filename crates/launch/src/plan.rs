@@ -24,6 +24,12 @@ pub(super) const ZENOH_CONFIG: &str = "CARS_ZENOH_CONFIG";
 /// Environment variable with the file in which the console keeps its address and its token, so that browsers find it again when
 /// it was killed and is started again.
 const KEEP_VARIABLE: &str = "CARS_CONSOLE_KEEP";
+/// Name of that file, among the logs.
+const CONSOLE_KEPT: &str = "console.kept";
+/// Environment variable with the file in which the launcher says why the run has failed.
+const FAILED_VARIABLE: &str = "CARS_CONSOLE_FAILED";
+/// Name of that file, among the logs.
+pub(super) const FAILED: &str = "failed.json";
 
 /// Environment variable with the time for which a robot tries to reach the simulator and to join, seconds.
 const PATIENCE_VARIABLE: &str = "CARS_PATIENCE_S";
@@ -139,9 +145,11 @@ pub(super) fn plan(file: &LaunchFile, execution: &Execution) -> Result<Vec<Plann
             args.push("--open".to_owned());
         }
         let mut command = client(file, process, args, execution, &places)?;
-        let kept = execution.folder().file(LOGS).join(CONSOLE_KEPT);
-        let kept = kept.display().to_string();
+        let logs = execution.folder().file(LOGS);
+        let kept = logs.join(CONSOLE_KEPT).display().to_string();
         command.env.entry(KEEP_VARIABLE.to_owned()).or_insert(kept);
+        let failed = logs.join(FAILED).display().to_string();
+        command.env.insert(FAILED_VARIABLE.to_owned(), failed);
         planned.push(Planned {
             part: Part::Observer,
             ..prepare(process, command)
@@ -345,7 +353,7 @@ impl std::fmt::Display for CommandLine {
 }
 
 /// Quotes a word for a shell if necessary.
-fn quote(word: &str) -> String {
+pub(super) fn quote(word: &str) -> String {
     let mut characters = word.chars();
     let is_plain = characters.all(|c| c.is_ascii_alphanumeric() || "-_./=:,@%+".contains(c));
     if is_plain && !word.is_empty() {

@@ -14,7 +14,7 @@ use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender};
 use super::ending::{Ended, Failure};
 use super::leftovers::Leftovers;
 use super::log::{LIMIT_BYTES, ProcessLog};
-use super::plan::{Part, Planned};
+use super::plan::{Part, Planned, quote};
 use super::process::{self, Group, Output};
 use super::restart::{BUDGET, Budget};
 use super::screen::ScreenHandle;
@@ -22,6 +22,11 @@ use super::tail::Tail;
 
 /// Longest description of an end for the simulator, characters.
 const MAX_REASON: usize = 1000;
+/// Exit status of a console in which a person wants a run that has failed to go on.
+const RESUME: u8 = 75;
+
+/// A console at which nobody looks has ended after this long.
+const UNSEEN: Duration = Duration::from_secs(1);
 
 /// An event of the supervisor's loop. Processes are named by their indices.
 #[derive(Debug)]
@@ -83,6 +88,8 @@ pub struct Outcome {
     pub failure: Option<Failure>,
     /// The first signal to end.
     pub asked: Option<Signal>,
+    /// Whether a person who saw the failure in the console wants the run to go on.
+    pub is_to_resume: bool,
 }
 
 /// A process under supervision.
@@ -114,6 +121,10 @@ impl Supervised {
             is_down: false,
             is_slow: false,
         }
+    }
+
+    fn is_observer(&self) -> bool {
+        self.planned.part == Part::Observer
     }
 
     fn signal(&self, signal: Signal) {
@@ -167,6 +178,7 @@ impl Supervisor {
             outcome: Outcome {
                 failure: None,
                 asked: None,
+                is_to_resume: false,
             },
         }
     }
@@ -197,7 +209,52 @@ impl Supervisor {
 
         let killed = self.leftovers.kill_all();
         self.notice_killed("the robots' processes", killed);
+        self.explain().await;
         self.outcome
+    }
+
+    /// Waits while the console shows people why the run has failed. It ends by itself when no browser shows it any more.
+    async fn explain(&mut self) {
+        let mut is_told = false;
+        while self.is_console_running() {
+            let event = tokio::time::timeout(UNSEEN, self.events.recv()).await;
+            let Ok(event) = event else {
+                if !is_told && self.is_explaining() {
+                    is_told = true;
+                    self.notice(
+                        "a browser shows why, and can resume the run; Ctrl-C ends the console",
+                    );
+                }
+                continue;
+            };
+            match event {
+                Some(SupervisorEvent::Ended(index, ended)) => self.on_ended(index, &ended),
+                Some(SupervisorEvent::Asked(signal)) if self.is_explaining() => {
+                    self.outcome.asked = Some(signal);
+                    self.end_observers();
+                    self.after(self.grace, SupervisorEvent::GraceOver(Shutdown::GivenUp));
+                }
+                Some(SupervisorEvent::Asked(_) | SupervisorEvent::GraceOver(Shutdown::GivenUp)) => {
+                    self.signal_all(Signal::SIGKILL);
+                }
+                Some(_) => {}
+                None => unreachable!("the supervisor holds a sender of its own queue"),
+            }
+        }
+    }
+
+    /// Whether the console stays to show why the run has failed: no process takes it along, unless a person ends the run.
+    fn is_explaining(&self) -> bool {
+        let Outcome { failure, asked, .. } = &self.outcome;
+        let is_final = failure
+            .as_ref()
+            .is_some_and(|failure| !failure.is_port_taken());
+        is_final && asked.is_none()
+    }
+
+    fn is_console_running(&self) -> bool {
+        let mut processes = self.processes.iter();
+        processes.any(|process| process.is_observer() && process.group.is_some())
     }
 
     fn handle(&mut self, event: SupervisorEvent) {
@@ -213,7 +270,10 @@ impl Supervisor {
     }
 
     fn is_any_running(&self) -> bool {
-        self.processes.iter().any(|process| process.group.is_some())
+        let is_explaining = self.is_explaining();
+        let mut processes = self.processes.iter();
+        processes
+            .any(|process| process.group.is_some() && !(is_explaining && process.is_observer()))
     }
 
     fn notice(&self, text: impl Into<String>) {
@@ -273,6 +333,8 @@ impl Supervisor {
         let process = &self.processes[index];
         if process.planned.part == Part::Simulator {
             self.on_simulator_ended(index, ended);
+        } else if process.is_observer() && self.outcome.failure.is_some() {
+            self.outcome.is_to_resume = self.outcome.asked.is_none() && ended.code() == RESUME;
         } else if process.is_down {
             tracing::debug!("{} was killed by the scenario", self.name(index));
         } else if self.stage == Shutdown::Running {
@@ -325,7 +387,9 @@ impl Supervisor {
             self.terminate();
         } else {
             self.enter(Shutdown::Leaving);
-            self.end_observers();
+            if !self.is_explaining() {
+                self.end_observers();
+            }
         }
     }
 
@@ -450,10 +514,11 @@ impl Supervisor {
     }
 
     fn name_running(&self, what: &str) {
+        let is_explaining = self.is_explaining();
         let running = self
             .processes
             .iter()
-            .filter(|process| process.group.is_some());
+            .filter(|process| process.group.is_some() && !(is_explaining && process.is_observer()));
         let names: Vec<&str> = running.map(|process| &*process.planned.name).collect();
         self.notice(format!("{}: {what}", names.join(", ")));
     }
@@ -470,7 +535,27 @@ impl Supervisor {
             tail: self.processes[index].tail.lines(),
             log: log_of(&self.logs, name),
         };
-        self.outcome.failure.get_or_insert(failure);
+        if self.outcome.failure.is_none() {
+            self.outcome.failure = Some(failure);
+            self.show_failure();
+        }
+    }
+
+    /// Tells the console why the run has failed.
+    fn show_failure(&self) {
+        let Some(failure) = self
+            .outcome
+            .failure
+            .as_ref()
+            .filter(|_| self.is_explaining())
+        else {
+            return;
+        };
+        let run = self.logs.parent().unwrap_or(&self.logs);
+        let command = format!("cars launch --resume {}", quote(&run.display().to_string()));
+        if let Err(error) = failure.show(&self.logs, command) {
+            self.notice(format!("the console cannot be told why: {error}"));
+        }
     }
 
     /// Ends the run by its simulator, which writes its record and dismisses the robots.
@@ -498,9 +583,13 @@ impl Supervisor {
         self.enter(Shutdown::Killing);
     }
 
+    /// Signals all processes but a console that shows why the run has failed.
     fn signal_all(&self, signal: Signal) {
+        let is_explaining = self.is_explaining();
         for process in &self.processes {
-            process.signal(signal);
+            if !(is_explaining && process.is_observer()) {
+                process.signal(signal);
+            }
         }
     }
 

@@ -3,7 +3,7 @@
 //! What no rule allows is refused. The simulator needs no rule: it holds the door, and what it says itself passes no
 //! door. Everything here is about what others may say to it; it passes on only what it let in.
 
-use crate::keys::{Keys, QUERIES, STATE};
+use crate::keys::{Keys, PARAMETERS, QUERIES, STATE};
 use crate::name::{OPERATOR, RobotName};
 
 /// The simulator, as its certificate names it.
@@ -50,6 +50,8 @@ pub fn of_robot(keys: &Keys, robot: &RobotName) -> Vec<Grant> {
     let says = ["report", "waiting", "panel", STATE].map(|what| keys.robot(name, what));
     let commands = keys.robot("*", &format!("command/{name}"));
 
+    let mut answers = state_keys(keys, name);
+    answers.push(keys.robot(name, PARAMETERS));
     let mut asks = state_keys(keys, "*");
     asks.push(keys.join_as(robot));
 
@@ -59,11 +61,7 @@ pub fn of_robot(keys: &Keys, robot: &RobotName) -> Vec<Grant> {
             &["put"],
             says.into_iter().chain([commands]).collect(),
         ),
-        grant(
-            "answers",
-            &["declare_queryable", "reply"],
-            state_keys(keys, name),
-        ),
+        grant("answers", &["declare_queryable", "reply"], answers),
         grant("asks", &["query"], asks),
         grant(
             "hears",

@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 use crate::keys::{Keys, QUERIES, STATE};
 use crate::messages::{
     Answer, Clock, Command, Control, ControlAnswer, FaultOrder, JoinAnswer, JoinRequest, LogRecord,
-    News, Panel, PublicState, Report, Waiting, WorldFrame,
+    News, Panel, ParametersAnswer, ParametersOffer, PublicState, Report, Waiting, WorldFrame,
 };
 use crate::name::{RobotName, RunName};
 
@@ -38,7 +38,10 @@ enum Operation {
         answer: &'static str,
     },
     /// It is asked, and answers.
-    Answer(&'static str),
+    Answer {
+        to: &'static str,
+        with: &'static str,
+    },
 }
 use Operation::{Answer as Replies, Ask, Receive, Send};
 
@@ -111,7 +114,10 @@ fn channels() -> Vec<Channel> {
                     with: "query",
                     answer: "public_state",
                 },
-                Replies("public_state"),
+                Replies {
+                    to: "query",
+                    with: "public_state",
+                },
                 Send("public_state"),
                 Receive("public_state"),
             ],
@@ -122,6 +128,16 @@ fn channels() -> Vec<Channel> {
             "What is new for one robot in a tick, before the clock of the tick.",
             &["news"],
             &[Receive("news")],
+        ),
+        channel(
+            "parameters",
+            keys.parameters(&robot),
+            "The simulator asks a robot whether it can work with other parameters. Robots need not answer.",
+            &["parameters_offer", "parameters_answer"],
+            &[Replies {
+                to: "parameters_offer",
+                with: "parameters_answer",
+            }],
         ),
         channel(
             "panel",
@@ -188,7 +204,10 @@ fn channels() -> Vec<Channel> {
             keys.query(&robot, name),
             what,
             &["query", "answer"],
-            &[Replies("answer")],
+            &[Replies {
+                to: "query",
+                with: "answer",
+            }],
         )
     };
     channels.extend(QUERIES.map(query));
@@ -260,7 +279,7 @@ impl Channel {
             Send(name) => plain("put", "send", name),
             Receive(name) => plain("receive", "receive", name),
             Ask { with, answer } => query("ask", "send", with, answer),
-            Replies(answer) => query("answer", "receive", "query", answer),
+            Replies { to, with } => query("answer", "receive", to, with),
         }
     }
 }
@@ -272,7 +291,7 @@ fn messages(schemas: &mut SchemaGenerator) -> Map<String, Value> {
     }
 
     type Of = fn(&mut SchemaGenerator) -> Schema;
-    let all: [(&str, Of); 15] = [
+    let all: [(&str, Of); 17] = [
         ("answer", one::<Answer>),
         ("clock", one::<Clock>),
         ("command", one::<Command>),
@@ -283,6 +302,8 @@ fn messages(schemas: &mut SchemaGenerator) -> Map<String, Value> {
         ("join_request", one::<JoinRequest>),
         ("log_record", one::<LogRecord>),
         ("panel", one::<Panel>),
+        ("parameters_answer", one::<ParametersAnswer>),
+        ("parameters_offer", one::<ParametersOffer>),
         ("news", one::<News>),
         ("public_state", one::<PublicState>),
         ("report", one::<Report>),

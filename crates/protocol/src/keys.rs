@@ -31,6 +31,9 @@ pub const QUERIES: [&str; 6] = [
 /// half of what six do.
 pub const STATE: &str = "state";
 
+/// Last chunk of the key at which a robot checks parameters.
+pub(crate) const PARAMETERS: &str = "parameters";
+
 impl Keys {
     /// The keys of run `run`.
     #[must_use]
@@ -131,6 +134,12 @@ impl Keys {
     /// A key about one robot, or about all of them where its name is `*`.
     pub(crate) fn robot(&self, robot: &str, what: &str) -> String {
         format!("{}/robot/{robot}/{what}", self.root)
+    }
+
+    /// Queryable at the robot, of robots that can check parameters before they change.
+    #[must_use]
+    pub fn parameters(&self, robot: &RobotName) -> String {
+        self.robot(robot.as_str(), PARAMETERS)
     }
 
     /// Queryable at the robot: `what` is one of [`QUERIES`] or [`STATE`].

@@ -7,7 +7,7 @@ use schemars::{JsonSchema, Schema, schema_for};
 
 use crate::messages::{
     Answer, Clock, Command, Control, ControlAnswer, JoinAnswer, JoinRequest, LogRecord, News,
-    Panel, PublicState, Report, Waiting, WorldFrame,
+    Panel, ParametersAnswer, ParametersOffer, PublicState, Report, Waiting, WorldFrame,
 };
 
 /// The schema of every message, by the name of its file.
@@ -30,6 +30,8 @@ pub fn all() -> BTreeMap<&'static str, Schema> {
         ("news", one::<News>()),
         ("log_record", one::<LogRecord>()),
         ("panel", one::<Panel>()),
+        ("parameters_answer", one::<ParametersAnswer>()),
+        ("parameters_offer", one::<ParametersOffer>()),
         ("public_state", one::<PublicState>()),
         ("report", one::<Report>()),
         ("waiting", one::<Waiting>()),

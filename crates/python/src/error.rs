@@ -1,11 +1,13 @@
 //! Errors as exceptions, with the text that the command line prints.
 
 use std::fmt::Display;
+use std::str::FromStr;
 
 use miette::{MietteHandlerOpts, Report};
-use pyo3::{PyErr, import_exception};
+use pyo3::{PyErr, PyResult, import_exception};
 
 import_exception!(cars._errors, Error);
+import_exception!(cars._errors, BadArgument);
 import_exception!(cars._errors, HostError);
 import_exception!(cars._errors, UnknownRobot);
 import_exception!(cars._errors, Unreachable);
@@ -31,4 +33,18 @@ pub(crate) fn reported(error: impl Into<Report>) -> PyErr {
 /// The exception of an error in words.
 pub(crate) fn plain(error: impl Display) -> PyErr {
     Error::new_err(error.to_string())
+}
+
+/// The exception of an argument whose text is not understood.
+pub(crate) fn argument(name: &str, error: impl Display) -> PyErr {
+    BadArgument::new_err(format!("{name}: {error}"))
+}
+
+/// Reads an argument that is a text.
+pub(crate) fn read<T: FromStr<Err: Display>>(
+    name: &str,
+    text: Option<&str>,
+) -> PyResult<Option<T>> {
+    let read = text.map(str::parse).transpose();
+    read.map_err(|error: T::Err| argument(name, error))
 }

@@ -12,7 +12,7 @@ use miette::miette;
 use protocol::random::MAX_SEED;
 use pyo3::prelude::*;
 
-use crate::error::{plain, reported};
+use crate::error::{argument, read, reported};
 use crate::interrupt::interruptible;
 use crate::run::{overrides, scenario_of};
 
@@ -32,10 +32,7 @@ pub(crate) fn experiment(
     jobs: Option<usize>,
     retry_failed: bool,
 ) -> PyResult<PathBuf> {
-    let duration = duration
-        .map(str::parse::<Time>)
-        .transpose()
-        .map_err(plain)?;
+    let duration = read::<Time>("duration", duration)?;
     let set = overrides(&set)?;
     let mut experiment = Experiment::find(&file).map_err(reported)?;
     if let Some(Time(duration_s)) = duration {
@@ -90,9 +87,10 @@ fn checked(seeds: Vec<u64>) -> PyResult<Vec<u64>> {
     sorted.dedup();
     let is_usable = sorted.len() == seeds.len() && (2..=100_000).contains(&seeds.len());
     if !is_usable || sorted.last().is_some_and(|last| *last > MAX_SEED) {
-        return Err(plain(format!(
-            "seeds are 2 to 100000 whole numbers from 0 to {MAX_SEED}, each once"
-        )));
+        return Err(argument(
+            "seeds",
+            format!("seeds are 2 to 100000 whole numbers from 0 to {MAX_SEED}, each once"),
+        ));
     }
     Ok(seeds)
 }

@@ -17,7 +17,7 @@ use pyo3::prelude::*;
 use scenario::Scenario;
 use simulator::{IfTaken, RunFolder};
 
-use crate::error::{plain, reported};
+use crate::error::{argument, plain, read, reported};
 use crate::interrupt::Watch;
 use crate::make::Makers;
 use crate::seat::Failure;
@@ -26,7 +26,7 @@ use crate::seat::Failure;
 pub(crate) fn overrides(set: &[String]) -> PyResult<Vec<Override>> {
     let mut changes = Vec::new();
     for change in set {
-        changes.push(change.parse().map_err(plain)?);
+        changes.push(change.parse().map_err(|error| argument("set", error))?);
     }
     Ok(changes)
 }
@@ -48,18 +48,18 @@ pub(crate) fn run(
     robots: BTreeMap<String, Py<PyAny>>,
 ) -> PyResult<(PathBuf, String)> {
     let options = RunOptions {
-        run: name.map(str::parse).transpose().map_err(plain)?,
+        run: read("name", name)?,
         if_taken: if replace {
             IfTaken::Replace
         } else {
             IfTaken::Number
         },
-        seed: seed.map(seed::check).transpose().map_err(plain)?,
-        duration: duration
-            .map(str::parse::<Time>)
+        seed: seed
+            .map(seed::check)
             .transpose()
-            .map_err(plain)?,
-        speed: speed.map(str::parse::<Speed>).transpose().map_err(plain)?,
+            .map_err(|error| argument("seed", error))?,
+        duration: read::<Time>("duration", duration)?,
+        speed: read::<Speed>("speed", speed)?,
         out,
         set: overrides(&set)?,
     };

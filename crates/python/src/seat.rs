@@ -1,7 +1,9 @@
 //! A robot of Python as a robot of the SDK.
 
+use std::ffi::CString;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use pyo3::exceptions::PyRuntimeWarning;
 use pyo3::prelude::*;
 use robot::{Action, BadParameters, Panel, Robot, StateVariables};
 
@@ -98,13 +100,35 @@ impl PythonRobot {
     }
 }
 
+/// Warns as Python does. Where warnings are errors, this one is none: the robot goes on.
+fn warn(text: &str) {
+    Python::attach(|py| {
+        let text = CString::new(text.replace('\0', " ")).unwrap_or_default();
+        let _is_an_error = PyErr::warn(py, &py.get_type::<PyRuntimeWarning>(), &text, 0);
+    });
+}
+
 impl Robot for PythonRobot {
     fn init(&mut self, cars: &mut robot::Cars<'_>) -> Result<(), BadParameters> {
         self.cars = None;
-        self.call(cars, |object, cars| {
-            object.call_method1("init", (cars,)).map(drop)
+        let refuses = cars.has_earlier_parameters();
+        let mut refused = None;
+        self.call(cars, |object, own| {
+            let begun = object.call_method1("init", (own,)).map(drop);
+            match begun {
+                Err(error) if refuses && !error.is_instance_of::<Interrupted>(object.py()) => {
+                    refused = Some(error.to_string());
+                    Ok(())
+                }
+                begun => begun,
+            }
         });
-        Ok(())
+        let Some(reason) = refused else {
+            return Ok(());
+        };
+        let refusal = cars.bad_parameters(reason);
+        warn(&format!("{refusal}; it keeps those before"));
+        Err(refusal)
     }
 
     fn tick(&mut self, cars: &mut robot::Cars<'_>) -> Action {

@@ -3,7 +3,7 @@
 use pyo3::exceptions::{PyOverflowError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
-use pyo3::types::{PyBool, PyDict, PyString, PyTuple, PyType};
+use pyo3::types::{PyBool, PyDict, PyMapping, PyString, PyTuple, PyType};
 use robot::{Action, Point, PublicState, SensedBody, SensedKind, StateVariables, Variable};
 
 /// Module of the classes.
@@ -133,14 +133,41 @@ pub(crate) fn read_action(value: &Bound<'_, PyAny>) -> PyResult<Action> {
         let class = value.get_type();
         PyTypeError::new_err(format!("a tick returns a cars.Action, not a {class}"))
     })?;
+    let place =
+        read_point(&proposal).map_err(|_| wrong_field("proposal", "a cars.Point", &proposal))?;
+    let variables = value.getattr("state_variables")?;
+    let is_mapping = variables.cast::<PyMapping>().is_ok();
+    if !is_mapping {
+        return Err(wrong_field("state_variables", "a mapping", &variables));
+    }
     Ok(Action {
-        proposal: read_point(&proposal)?,
-        speed_mps: value.getattr("speed_mps")?.extract()?,
-        direction_rad: value.getattr("direction_rad")?.extract()?,
-        emotion_state: value.getattr("emotion_state")?.extract()?,
-        behavior_state: value.getattr("behavior_state")?.extract()?,
-        state_variables: read_variables(&value.getattr("state_variables")?)?,
+        proposal: place,
+        speed_mps: field(value, "speed_mps", "a number")?,
+        direction_rad: field(value, "direction_rad", "a number")?,
+        emotion_state: field(value, "emotion_state", "a text")?,
+        behavior_state: field(value, "behavior_state", "a text")?,
+        state_variables: read_variables(&variables)?,
     })
+}
+
+/// A field of an action.
+fn field<'py, T: FromPyObjectOwned<'py>>(
+    action: &Bound<'py, PyAny>,
+    name: &str,
+    accepted: &str,
+) -> PyResult<T> {
+    let value = action.getattr(name)?;
+    value
+        .extract()
+        .map_err(|_| wrong_field(name, accepted, &value))
+}
+
+/// The exception of a field of an action that has something else than it may.
+fn wrong_field(name: &str, accepted: &str, value: &Bound<'_, PyAny>) -> PyErr {
+    PyTypeError::new_err(format!(
+        "the {name} of a cars.Action must be {accepted}, not {}",
+        value.get_type()
+    ))
 }
 
 /// A tuple of values.

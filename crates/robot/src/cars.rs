@@ -11,7 +11,7 @@ use protocol::messages::{
 use protocol::random::Stream;
 use protocol::{RobotName, Tick};
 
-use crate::error::BadParameters;
+use crate::error::{BadParameters, read_parameters};
 use crate::network::{Network, Undelivered};
 
 /// Most bytes that a robot may write to the log in a tick, all lines together.
@@ -108,9 +108,13 @@ impl<'a> Cars<'a> {
     /// # Errors
     /// [`BadParameters`] names the parameter that is wrong or unknown.
     pub fn parameters<P: serde::de::DeserializeOwned>(&self) -> Result<P, BadParameters> {
-        let map = self.welcome.parameters.clone().into_iter().collect();
-        serde_json::from_value(serde_json::Value::Object(map))
-            .map_err(|error| self.bad_parameters(error))
+        read_parameters(&self.welcome.parameters).map_err(|reason| self.bad_parameters(reason))
+    }
+
+    /// Whether the robot goes on with earlier parameters if [`Robot::init`](crate::Robot::init) refuses those of now.
+    #[must_use]
+    pub fn has_earlier_parameters(&self) -> bool {
+        !self.welcome.earlier_parameters.is_empty()
     }
 
     /// The error of a robot that cannot work with its parameters.

@@ -3,7 +3,7 @@
 use protocol::messages::{Panel, Point, StateVariables, Variable};
 
 use crate::cars::Cars;
-use crate::error::BadParameters;
+use crate::error::{BadParameters, ParametersCheck};
 
 /// A robot.
 ///
@@ -17,7 +17,9 @@ pub trait Robot: Send {
     /// when the robot takes part again after it was lost, in the same process or in another one.
     ///
     /// # Errors
-    /// [`BadParameters`] if the robot cannot work with the parameters of the scenario.
+    /// [`BadParameters`] if the robot cannot work with the parameters of the scenario. At the beginning of an epoch that ends
+    /// the run. In the middle of one, where parameters have changed, the error becomes a line of the log, and `init` is called
+    /// again with those before.
     fn init(&mut self, cars: &mut Cars<'_>) -> Result<(), BadParameters>;
 
     /// Runs one tick. At tick 0 the robot stands at its start, no command has arrived, and other robots cannot be
@@ -40,6 +42,12 @@ pub trait Robot: Send {
     /// A robot that waits for another robot's answer holds nothing up in either case.
     fn is_quick(&self) -> bool {
         false
+    }
+
+    /// How parameters are checked before they change: a change by hand, or one that the scenario plans, is then refused before
+    /// anything happens. Called on any thread. By default not at all: `init` finds out.
+    fn parameters_check(&self) -> Option<ParametersCheck> {
+        None
     }
 
     /// What the console shows of the robot (the paper's `paintComponent`). By default nothing.

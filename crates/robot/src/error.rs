@@ -1,6 +1,8 @@
 //! Why a robot cannot take part, or cannot go on.
 
+use protocol::messages::Parameters;
 use protocol::{RobotName, Tick};
+use serde::de::DeserializeOwned;
 
 /// Parameters that a robot cannot work with.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -10,6 +12,23 @@ pub struct BadParameters {
     pub robot: RobotName,
     /// What is wrong with them.
     pub reason: String,
+}
+
+/// Checks parameters, without a robot that has them.
+pub type ParametersCheck = fn(&Parameters) -> Result<(), String>;
+
+/// Reads parameters as a robot's own type: numbers in SI units.
+///
+/// # Errors
+/// In words, which parameter is wrong or unknown.
+pub fn read_parameters<P: DeserializeOwned>(parameters: &Parameters) -> Result<P, String> {
+    let map = parameters.clone().into_iter().collect();
+    serde_path_to_error::deserialize(serde_json::Value::Object(map)).map_err(|error| {
+        match error.path().to_string() {
+            path if path == "." => error.inner().to_string(),
+            path => format!("{path}: {}", error.inner()),
+        }
+    })
 }
 
 /// Why a robot leaves the run.

@@ -18,7 +18,8 @@ use lockstep::{Action, Admission, Begin, Leave, Naming, Patience, StateQuery, Tu
 use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{
-    Clock, End, JoinAnswer, JoinRequest, News, PublicState, Refusal, Waiting, Welcome,
+    Clock, End, JoinAnswer, JoinRequest, News, ParametersAnswer, ParametersOffer, PublicState,
+    Refusal, Waiting, Welcome,
 };
 use protocol::{Malformed, PROTOCOL_VERSION, RobotName, RunName, decode, encode};
 
@@ -256,6 +257,33 @@ impl Host {
                 )?;
             self.declared.push(queryable);
         }
+        self.declare_parameters_check(name)
+    }
+
+    /// Declares the queryable at which a robot says whether it could work with other parameters, if it can tell.
+    fn declare_parameters_check(&mut self, name: &RobotName) -> Result<(), BusError> {
+        let robot = self
+            .members
+            .get(name)
+            .and_then(|member| member.robot.as_ref());
+        let Some(check) = robot.and_then(|robot| robot.parameters_check()) else {
+            return Ok(());
+        };
+
+        let key = self.keys.parameters(name);
+        let queryable = self.bus.queryable(&key, move |query| {
+            match decode::<ParametersOffer>(query.key(), "simulator", &query.body()) {
+                Ok(offer) => {
+                    let answer = match check(&offer.parameters) {
+                        Ok(()) => ParametersAnswer::Accepted,
+                        Err(reason) => ParametersAnswer::Refused { reason },
+                    };
+                    query.reply(query.key(), encode(&answer));
+                }
+                Err(error) => query.reply_err(&error.to_string()),
+            }
+        })?;
+        self.declared.push(queryable);
         Ok(())
     }
 

@@ -49,7 +49,7 @@ mod seat;
 pub use cars::{CallError, Cars, ReceivedCommand};
 pub use cri::{Action, Robot};
 pub use entry::{RobotArgs, main};
-pub use error::{BadParameters, RobotError};
+pub use error::{BadParameters, ParametersCheck, RobotError, read_parameters};
 pub use figure7::{CarsRobotInterface, Paper};
 pub use host::{Host, HostError, HostOptions, Stopper};
 pub use local::LocalHost;

@@ -10,8 +10,13 @@ use protocol::{FieldError, Message, Tick};
 
 use crate::cars::{Cars, ReceivedCommand};
 use crate::cri::{Action, Robot};
-use crate::error::RobotError;
+use crate::error::{BadParameters, RobotError};
 use crate::network::Network;
+
+/// The line of the log for a change of parameters that a robot refuses. The log is part of the record, and a robot in another
+/// language has other words for the reason: that is a diagnostic.
+const KEPT: &str =
+    "error: refuses its new parameters, and keeps those before; its output has the reason";
 
 /// What came of a tick.
 #[derive(Debug)]
@@ -78,6 +83,65 @@ impl Seat {
         turn: &Turn<News>,
         network: &mut dyn Network,
     ) -> Result<Done, RobotError> {
+        if turn.begin == Begin::Init {
+            self.check_later_parameters()?;
+        }
+
+        let mut has_refused = false;
+        loop {
+            let mut log = Vec::new();
+            if has_refused {
+                log.push(KEPT.to_owned());
+            }
+            let acted = self.act(turn, network, &mut log);
+            match acted {
+                Err(RobotError::Parameters(error)) if self.has_earlier_parameters(turn) => {
+                    tracing::warn!("{error}; it keeps those before");
+                    has_refused = true;
+                    self.take_earlier_parameters();
+                }
+                Err(error) => return Err(error),
+                Ok((location, action)) => return self.publish(turn.tick, location, action, log),
+            }
+        }
+    }
+
+    /// Refuses what the scenario will change the parameters to.
+    fn check_later_parameters(&self) -> Result<(), BadParameters> {
+        let Some(check) = self.robot.parameters_check() else {
+            return Ok(());
+        };
+        for later in &self.welcome.later_parameters {
+            check(later).map_err(|reason| BadParameters {
+                robot: self.welcome.name.clone(),
+                reason: format!("as a change of the scenario sets them: {reason}"),
+            })?;
+        }
+
+        Ok(())
+    }
+
+    /// Whether the robot begins in the middle of an epoch, after its parameters have changed.
+    fn has_earlier_parameters(&self, turn: &Turn<News>) -> bool {
+        turn.begin == Begin::TakeOver && !self.welcome.earlier_parameters.is_empty()
+    }
+
+    /// Back to the parameters before, as if nothing had been drawn or sent with those that were refused.
+    fn take_earlier_parameters(&mut self) {
+        let welcome = Arc::make_mut(&mut self.welcome);
+        welcome.parameters = welcome.earlier_parameters.remove(0);
+        self.random = stream(welcome.seed, &welcome.stream);
+        self.outbox.clear();
+        self.gave_up = None;
+    }
+
+    /// Lets the robot perceive and act. Returns where it stands, and what it does.
+    fn act(
+        &mut self,
+        turn: &Turn<News>,
+        network: &mut dyn Network,
+        log: &mut Vec<String>,
+    ) -> Result<(Point, Action), RobotError> {
         let quiet = News::default();
         let news = turn.news.as_ref().unwrap_or(&quiet);
         if turn.begin == Begin::Init {
@@ -95,7 +159,6 @@ impl Seat {
         let welcome = self.welcome.clone();
         let commands = received(news);
 
-        let mut log = Vec::new();
         let mut cars = Cars {
             welcome: &welcome,
             tick: turn.tick,
@@ -105,7 +168,7 @@ impl Seat {
             senses_bodies: self.robot.senses_bodies(),
             random: &mut self.random,
             outbox: &mut self.outbox,
-            log: &mut log,
+            log,
             gave_up: &mut self.gave_up,
             network,
         };
@@ -128,7 +191,7 @@ impl Seat {
                 reason,
             });
         }
-        self.publish(turn.tick, location, action, log)
+        Ok((location, action))
     }
 
     /// Makes the report and the public state of an action, once they are fit to be sent.

@@ -122,6 +122,30 @@ fn classes_can_be_made_and_others_cannot() {
     assert!(robots::make("Cherry").is_none());
 }
 
+/// Before they change, parameters are refused as at the beginning.
+#[test]
+fn the_check_refuses_what_a_robot_would_refuse() {
+    let parameters = |text: &str| serde_json::from_str::<robot::Parameters>(text).unwrap();
+    let robots: [Box<dyn robot::Robot>; 2] =
+        [Box::new(Butler::default()), Box::new(Leguin::default())];
+    for robot in robots {
+        let check = robot.parameters_check().unwrap();
+        assert_eq!(check(&parameters(r#"{"policy": "rules"}"#)), Ok(()));
+        for (text, named) in [
+            (
+                r#"{"policy": "nonsense"}"#,
+                "policy: unknown variant `nonsense`",
+            ),
+            (r#"{"polcy": "rules"}"#, "unknown field `polcy`"),
+            (r#"{"caution": "much"}"#, "caution: "),
+            (r#"{"exchange_radius_m": -1.0}"#, "exchange_radius_m"),
+        ] {
+            let reason = check(&parameters(text)).unwrap_err();
+            assert!(reason.contains(named), "{text}: {reason}");
+        }
+    }
+}
+
 #[test]
 fn senseless_parameters_are_refused_with_their_name() {
     let refusal = |text: &str| {

@@ -52,6 +52,75 @@ impl Scenario {
         Some(&self.robots.get(robot)?.parameters)
     }
 
+    /// The parameters of a robot before the one change and the next, up to a tick: the last first.
+    #[must_use]
+    pub fn parameters_before(&self, robot: &RobotName, tick: Tick) -> Vec<&Parameters> {
+        let until = self.changes.partition_point(|change| change.at <= tick);
+        let mut before = self.parameters_over(robot, &self.changes[..until]);
+        before.pop();
+        before.reverse();
+        before
+    }
+
+    /// The parameters of a robot after each further change, from a tick on.
+    pub fn parameters_after(
+        &self,
+        robot: &RobotName,
+        tick: Tick,
+    ) -> impl Iterator<Item = &Parameters> {
+        let from = self.changes.partition_point(|change| change.at <= tick);
+        Self::set_by(robot, &self.changes[from..])
+    }
+
+    /// The parameters that robots are given from a tick on, by its change and by those after it.
+    #[must_use]
+    pub fn parameters_from(&self, tick: Tick) -> Vec<(RobotName, Parameters)> {
+        let from = self.changes.partition_point(|change| change.at < tick);
+        let mut given = Vec::new();
+        for name in self.robots.keys() {
+            for parameters in Self::set_by(name, &self.changes[from..]) {
+                given.push((name.clone(), parameters.clone()));
+            }
+        }
+        given
+    }
+
+    /// All parameters that the scenario gives to robots, at the beginning and later.
+    #[must_use]
+    pub fn all_parameters(&self) -> Vec<(RobotName, Parameters)> {
+        let mut all = Vec::new();
+        for name in self.robots.keys() {
+            for parameters in self.parameters_over(name, &self.changes) {
+                all.push((name.clone(), parameters.clone()));
+            }
+        }
+        all
+    }
+
+    /// The parameters of a robot at the beginning, and after each of these changes.
+    fn parameters_over<'a>(
+        &'a self,
+        robot: &RobotName,
+        changes: &'a [Change],
+    ) -> Vec<&'a Parameters> {
+        let first = self.robots.get(robot).map(|robot| &robot.parameters);
+        first
+            .into_iter()
+            .chain(Self::set_by(robot, changes))
+            .collect()
+    }
+
+    /// The parameters that these changes give a robot.
+    fn set_by<'a>(
+        robot: &RobotName,
+        changes: &'a [Change],
+    ) -> impl Iterator<Item = &'a Parameters> {
+        let of_robot = changes
+            .iter()
+            .filter(|change| change.restarted.contains(robot));
+        of_robot.filter_map(|change| change.parameters.get(robot))
+    }
+
     /// Robots that start again before a tick, because their parameters are others, or because a fault wants it. One whose process is killed or stopped then has the new
     /// parameters when it takes part again.
     #[must_use]

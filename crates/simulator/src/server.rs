@@ -13,6 +13,7 @@ mod faults;
 mod inbox;
 mod join;
 mod observers;
+mod offers;
 mod orders;
 mod pace;
 mod past;

@@ -5,14 +5,17 @@ use std::sync::Arc;
 
 use lockstep::{Bulletin, Exchange, Membership, Naming, Outcome, Sent};
 use observe::{Observation, RobotState, Watches};
+use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::event::{Blocker, Cause, WaitedFor};
 use protocol::messages::{
     CommandText, Correction, Cut, Delivery, End, FaultKind, HeldProcess, Intervention, NEWS_FLAGS,
-    News, OnLate, Performative, Point, ProcessOrder, PublicState, Report, SensedBody, SensedKind,
-    SensedRobot, Standing, StateVariables, Welcome,
+    News, OnLate, Parameters, ParametersOffer, Performative, Point, ProcessOrder, PublicState,
+    Report, SensedBody, SensedKind, SensedRobot, Standing, StateVariables, Welcome,
 };
 use protocol::random::{Stream, stream};
-use protocol::{Epoch, Event, Generation, Line, PROTOCOL_VERSION, RobotName, RunName, Seq, Tick};
+use protocol::{
+    Epoch, Event, Generation, Line, PROTOCOL_VERSION, RobotName, RunName, Seq, Tick, encode,
+};
 use world::{Body, HallError, Verdict, World};
 
 use crate::digest::{Digest, TickDigest};
@@ -21,6 +24,9 @@ use scenario::{Change, FaultEnd, Lateness, Override, Scenario, to_wire, to_world
 
 /// Most bodies in the news of a robot, so that the news fit into a message.
 const MAX_BODIES: usize = 4096;
+
+/// Most bytes of parameters of one kind of other times in a welcome, so that it fits into a message.
+const MAX_OTHER_PARAMETERS: usize = MAX_MESSAGE_BYTES / 4;
 
 /// Reports, commands and membership changes of a tick.
 pub type Reports = Outcome<Arc<Report>, CommandText>;
@@ -273,6 +279,20 @@ impl Simulation {
             .get_or_insert_with(|| self.scenario.changes.clone());
         self.scenario = changed;
         Ok(())
+    }
+
+    /// What an intervention would change the parameters of robots to, from the next tick on: nothing if it is refused anyway.
+    #[must_use]
+    pub fn parameters_set_by(&self, what: &Intervention) -> Vec<(RobotName, Parameters)> {
+        let at = self.now + 1;
+        let words = self
+            .scenario
+            .words_of(what, at, |counted| self.medium.count(counted));
+        let Ok(changed) = words.map(|set| self.scenario.with_change_by_hand(at, &set)) else {
+            return Vec::new();
+        };
+
+        changed.map_or_else(|_| Vec::new(), |changed| changed.parameters_from(at))
     }
 
     /// Sets by hand what a record says was set by hand before the next tick.
@@ -814,7 +834,10 @@ impl Simulation {
         generation: Generation,
         open: Option<&Report>,
     ) -> Option<Welcome> {
-        let parameters = self.scenario.parameters_at(name, self.next_tick())?;
+        let next_tick = self.next_tick();
+        let parameters = self.scenario.parameters_at(name, next_tick)?;
+        let earlier = self.scenario.parameters_before(name, next_tick).into_iter();
+        let later = self.scenario.parameters_after(name, next_tick);
         let index = self.index(name)?;
         let location = self.location(name)?;
         let open_state = open.map(|report| report.state(location));
@@ -836,6 +859,8 @@ impl Simulation {
             location,
             roster: self.names.clone(),
             parameters: parameters.clone(),
+            earlier_parameters: within_message(earlier),
+            later_parameters: within_message(later),
             news_flag: 1 << (index % NEWS_FLAGS),
             state_before: open_state.as_ref().and(last_state.clone()),
             last_state: open_state.or(last_state),
@@ -1002,6 +1027,23 @@ impl Bulletin<News> for Simulation {
     fn compose(&self, robot: &RobotName, naming: Naming) -> News {
         self.news(robot, naming)
     }
+}
+
+/// The first of these parameters, as many as have a place in a welcome.
+fn within_message<'a>(all: impl Iterator<Item = &'a Parameters>) -> Vec<Parameters> {
+    let mut bytes = 0;
+    let mut within = Vec::new();
+    for parameters in all {
+        bytes += encode(&ParametersOffer {
+            parameters: parameters.clone(),
+        })
+        .len();
+        if bytes > MAX_OTHER_PARAMETERS {
+            break;
+        }
+        within.push(parameters.clone());
+    }
+    within
 }
 
 /// The incarnation that `generation` has after the last one.

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import textwrap
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -197,7 +198,9 @@ def answering(**fields: Any) -> type[Robot]:
     [
         ({}, "a tick returns a cars.Action"),
         ({"state_variables": {"list": []}}, "the state variable \"list\" must be a number, a text, True or False"),
-        ({"speed_mps": "fast"}, "str"),
+        ({"speed_mps": "fast"}, "the speed_mps of a cars.Action must be a number, not .*str"),
+        ({"emotion_state": 3}, "the emotion_state of a cars.Action must be a text, not .*int"),
+        ({"state_variables": 3}, "the state_variables of a cars.Action must be a mapping, not .*int"),
     ],
 )
 def test_an_answer_of_the_wrong_kind_is_named(scenario: Path, fields: dict[str, Any], reason: str) -> None:
@@ -258,6 +261,67 @@ def test_a_robot_that_comes_back_is_made_anew_and_resumes(tmp_path: Path) -> Non
     missed = run.summary["robots"]["A"]["missed"]
     assert missed > 0
     assert run.summary["robots"]["A"]["state_variables"]["count"] == 21 - missed
+
+
+def test_a_change_of_parameters_that_a_robot_refuses_is_a_line_of_its_log(tmp_path: Path) -> None:
+    @dataclass
+    class Set:
+        speed_mps: float = 0.25
+
+    class Walker(Robot):
+        """Walks as fast as it is told."""
+
+        def init(self, cars: Cars) -> None:
+            self.start = cars.random.unit()
+            self.speed_mps = cars.parameters(Set).speed_mps
+            if self.speed_mps > 1:
+                raise ValueError("too fast")
+
+        def tick(self, cars: Cars) -> Action:
+            return Action.go(cars, Point(19, 10), self.speed_mps, state_variables={"start": self.start})
+
+    def changed(*values: str) -> cars.Run:
+        tables = "".join(
+            f"[[change]]\nat = \"{2 + i} s\"\nset = ['robot.A.params.speed_mps={value}']\n" for i, value in enumerate(values)
+        )
+        file = tmp_path / "changed.toml"
+        file.write_text(hall("A", "B", more=tables))
+        return cars.run(file, robots={"A": Walker, "B": Still}, out=tmp_path / str(len(list(tmp_path.iterdir()))))
+
+    with pytest.warns(RuntimeWarning) as warned:
+        run = changed("fast", "0.5", "7", "8", "0.5")
+    reasons = [str(warning.message) for warning in warned if warning.category is RuntimeWarning]
+    assert "parameters of A: speed_mps must be a number, not 'fast'" in reasons[0]
+    # 8 is refused, and so is 7, which was before it.
+    assert [reason.endswith("ValueError: too fast; it keeps those before") for reason in reasons] == [False, True, True, True]
+    log = (run.folder / "cars.log").read_text()
+    assert log.count("error: refuses its new parameters, and keeps those before; its output has the reason") == 3
+    speeds = run.states[run.states.robot == "A"].groupby("tick").speed_mps.first()
+    assert [speeds[tick] for tick in (3, 5, 6, 8, 10, 19)] == [0.25, 0.25, 0.5, 0.5, 0.5, 0.5]
+    with pytest.warns(RuntimeWarning):
+        again = changed("fast", "0.5", "7", "8", "0.5")
+    assert (run.folder / "events.jsonl").read_text() == (again.folder / "events.jsonl").read_text()
+
+
+def test_parameters_that_a_robot_refuses_at_the_beginning_end_its_run(tmp_path: Path) -> None:
+    class Refusing(Still):
+        def init(self, cars: Cars) -> None:
+            raise cars_BadParameters(cars.name, "nothing is right")
+
+    cars_BadParameters = cars.BadParameters
+    file = tmp_path / "hall.toml"
+    file.write_text(hall("A", "B"))
+    with pytest.raises(cars.BadParameters, match="nothing is right"):
+        cars.run(file, robots={"A": Refusing, "B": Still})
+
+
+def test_a_change_that_a_robot_of_rust_refuses_is_refused_at_the_beginning(tmp_path: Path) -> None:
+    with pytest.raises(cars.Error, match="as a change of the scenario sets them: policy:"):
+        cars.run(
+            "hors_doeuvres",
+            set={"change": [{"at": "10 s", "set": ["robot.Butler.params.policy=nonsense"]}]},
+            duration="5 s",
+        )
 
 
 def test_the_same_seed_gives_the_same_run(scenario: Path) -> None:

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import json
+import sys
+
 import pytest
-from lab import PYTHON, RUST, Lab, assert_same
+from lab import EXAMPLES, PYTHON, ROOT, RUST, Lab, assert_same
+
+import cars
 
 LOSSY = (
     'network.commands={ loss = 0.2, duplication = 0.3, delay = { min = "0 s", mode = "1 s", max = "10 s" }, '
@@ -57,3 +62,29 @@ def test_a_leguin_that_falters_gives_the_same_run(lab: Lab, fault: str) -> None:
     assert_same(python, lab.launch("rust", "hors_doeuvres.toml", {name: RUST[name] for name in names}, *changes))
     returned = [event["robot"] for event in lab.of_kind("python", "joined") if event["tick"] > 0]
     assert returned == ([] if fault == "a hang that is waited for" else ["Leguin"])
+
+
+def test_a_change_that_a_robot_refuses_gives_the_same_run(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As a process that is started again with it, and in one process: she keeps what she had, and the record is executed again."""
+    change = {"at": "20 s", "set": ["robot.Leguin.params.policy=nonsense"]}
+    text = f'change=[{{ at = "20 s", set = {json.dumps(change["set"])} }}]'
+    team = {name: PYTHON[name] for name in ("Butler", "Leguin")}
+    launched = lab.launch("launched", "hors_doeuvres.toml", team, "--set", text, "--duration", "40 s", "--speed", "50")
+
+    monkeypatch.setattr(sys, "path", [str(EXAMPLES), *sys.path])
+    from leguin import Leguin
+
+    lab.cars("verify", "launched", "--out", str(lab.folder))
+    with pytest.warns(RuntimeWarning, match="policy must be one of emotion, rules, timer, neither, not 'nonsense'"):
+        cars.run(
+            ROOT / "configs/hors_doeuvres.toml",
+            set={"change": [change], "expect": []},
+            duration="40 s",
+            out=lab.folder,
+            name="own",
+            robots={"Leguin": Leguin},
+        )
+    assert_same(launched, lab.events("own"))
+    assert "error: refuses its new parameters" in (lab.folder / "own/cars.log").read_text()
+    assert "not 'nonsense'" in (lab.folder / "launched/logs/Leguin.log").read_text()
+    assert [event["robot"] for event in lab.of_kind("own", "joined") if event["tick"] > 0] == ["Leguin"]

@@ -229,6 +229,10 @@ fn a_fork_that_cannot_be_made_is_refused_and_the_run_is_kept() {
     let slow = r#"fault=[{ robot = "Leguin", do = "slow", at = "20 s", until = "21 s" }]"#;
     let slow = ["parent@30", "--set", slow, "--set", "on_late=continue"];
     refused(&slow, "needs a process of its own");
+    refused(
+        &["parent@30", "--set", "robot.Butler.params.policy=nonsense"],
+        "parameters of Butler: policy: unknown variant `nonsense`",
+    );
 
     assert_same(("before", &before), ("after", &lab.bytes("parent")));
     assert!(!lab.out().join("parent-fork-30").exists());

@@ -175,6 +175,7 @@ fn the_table_of_keys_is_that_of_the_code() {
         keys.query(&robot, STATE),
         keys.news(&robot),
         keys.panel(&robot),
+        keys.parameters(&robot),
         keys.alive_robot(&robot),
         keys.alive_sim(),
         keys.alive_viewer(),

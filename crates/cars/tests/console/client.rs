@@ -30,6 +30,7 @@ pub(crate) fn program(args: &[&str]) -> Command {
         "CARS_CONSOLE_BIND",
         "CARS_CONSOLE_ALLOW_HOST",
         "CARS_CONSOLE_KEEP",
+        "CARS_CONSOLE_FAILED",
     ] {
         command.env_remove(variable);
     }

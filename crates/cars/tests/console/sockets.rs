@@ -1,6 +1,6 @@
 //! The WebSocket: its limits, and its end.
 
-use std::io::Read;
+use std::io::{Read, Write};
 use std::time::{Duration, Instant};
 
 use proptest::prelude::*;
@@ -232,6 +232,34 @@ fn the_33rd_browser_is_refused_with_the_reason() {
             "there is no room for another browser"
         );
     }
+}
+
+#[test]
+fn silent_connections_make_room_for_a_browser() {
+    let console = Console::live();
+    let mut silent = Vec::new();
+    for number in 0..300 {
+        let mut socket = console.connect();
+        // Some have begun a request, which is never complete.
+        if number % 3 == 0 {
+            socket.write_all(b"GET / HTTP/1.1\r\nHost: ").unwrap();
+        }
+        silent.push(socket);
+    }
+
+    let started = Instant::now();
+    let mut page = console.page();
+    page.until("simulator");
+    let elapsed = started.elapsed();
+    assert!(elapsed < Duration::from_secs(5), "after {elapsed:?}");
+
+    // The first to come are the first to go, and a browser that has been heard stays whoever comes.
+    let first = &mut silent[0];
+    first.set_read_timeout(Some(PATIENCE)).unwrap();
+    assert_eq!(first.read(&mut [0]).unwrap_or(0), 0);
+    silent.extend((0..300).map(|_| console.connect()));
+    page.send_text(&control(1, r#"{"do":"status"}"#));
+    page.until("answer");
 }
 
 #[test]

@@ -280,6 +280,55 @@ fn a_program_that_cannot_be_started_is_a_failure() {
     );
 }
 
+/// A console that stays when the run has failed, until the file `seen` is there; it exits with this status.
+fn staying(status: u8) -> Planned {
+    let script = format!(
+        "trap 'touch $DIR/told; exit 0' TERM; touch $DIR/up
+         until [ -e $DIR/failed.json ]; do sleep 0.01; done; cp $DIR/failed.json $DIR/read
+         until [ -e $DIR/seen ]; do sleep 0.01; done; exit {status}"
+    );
+    Planned {
+        part: Part::Observer,
+        is_required: false,
+        ..shell("console", &script)
+    }
+}
+
+/// The simulator leaves its record, and with it the console may end.
+const RECORDING: &str = "trap 'touch $DIR/seen; exit 0' TERM; touch $DIR/sim; sleep 600 & wait";
+const FAILING: &str =
+    "until [ -e $DIR/up -a -e $DIR/sim ]; do sleep 0.01; done; echo 'error: no way' >&2; exit 3";
+
+#[test]
+fn the_console_outlives_a_failure_and_is_told_why() {
+    for (status, is_to_resume) in [(0, false), (RESUME, true), (1, false)] {
+        let hall = Hall::new(RECORDING)
+            .with(shell("Butler", FAILING))
+            .with(staying(status));
+        let outcome = hall.run(&[], &[]);
+        assert_eq!(outcome.failure.unwrap().code, 3);
+        assert_eq!(outcome.is_to_resume, is_to_resume);
+        assert!(!hall.path("told").exists(), "the console was ended");
+
+        let told: serde_json::Value = serde_json::from_str(&hall.read("read")).unwrap();
+        assert_eq!(told["text"], "Butler ended with exit status 3");
+        assert_eq!(told["lines"], serde_json::json!(["error: no way"]));
+        let command = told["command"].as_str().unwrap();
+        assert!(command.starts_with("cars launch --resume "), "{command}");
+    }
+}
+
+#[test]
+fn ctrl_c_ends_a_console_that_shows_a_failure() {
+    let hall = Hall::new("trap 'exit 0' TERM; touch $DIR/sim; sleep 600 & wait")
+        .with(shell("Butler", FAILING))
+        .with(staying(RESUME));
+    let outcome = hall.run(&["read"], &[Signal::SIGINT]);
+    assert!(outcome.failure.is_some());
+    assert!(!outcome.is_to_resume);
+    assert!(hall.path("told").exists());
+}
+
 #[test]
 fn a_robot_that_is_not_required_may_fail() {
     let robot = Planned {

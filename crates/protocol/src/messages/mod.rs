@@ -29,6 +29,7 @@ pub use point::Point;
 pub use state::{Answer, PublicState};
 pub use step::{
     Clock, Command, CommandText, Correction, Delivery, End, JoinAnswer, JoinRequest, NEWS_FLAGS,
-    News, Parameters, Refusal, Report, SensedBody, SensedKind, SensedRobot, Waiting, Welcome,
+    News, Parameters, ParametersAnswer, ParametersOffer, Refusal, Report, SensedBody, SensedKind,
+    SensedRobot, Waiting, Welcome,
 };
 pub use variables::{StateVariables, Variable};

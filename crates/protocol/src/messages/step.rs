@@ -82,6 +82,34 @@ pub enum Refusal {
 /// Parameters of a robot: all that the scenario has for it, lengths and times in SI units.
 pub type Parameters = BTreeMap<String, serde_json::Value>;
 
+/// Asks a robot whether it can work with these parameters, before they change.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ParametersOffer {
+    /// All of its parameters, as a [`Welcome`] would have them.
+    pub parameters: Parameters,
+}
+
+impl Message for ParametersOffer {
+    as_json!();
+}
+
+/// The answer to a [`ParametersOffer`].
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "answer", rename_all = "snake_case")]
+pub enum ParametersAnswer {
+    /// It can.
+    Accepted,
+    /// It cannot.
+    Refused {
+        /// Which parameter is wrong, and why.
+        reason: String,
+    },
+}
+
+impl Message for ParametersAnswer {
+    as_json!();
+}
+
 /// What a robot needs to know to take part in an epoch.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Welcome {
@@ -115,6 +143,13 @@ pub struct Welcome {
     pub roster: Vec<RobotName>,
     /// Its parameters.
     pub parameters: Parameters,
+    /// If its parameters have changed in this epoch: those before, the last first. A robot that refuses its parameters when it
+    /// takes part again goes on with the first of these that it accepts.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub earlier_parameters: Vec<Parameters>,
+    /// Its parameters after the changes that the scenario has planned: a robot that refuses one of them does so at once.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub later_parameters: Vec<Parameters>,
     /// The flag of [`Clock::news`] that is its own.
     #[serde(default)]
     pub news_flag: u32,

@@ -14,7 +14,8 @@ use affect::{
     Urgency,
 };
 use robot::{
-    Action, BadParameters, Cars, Panel, Point, PublicState, Robot, StateVariables, Widget,
+    Action, BadParameters, Cars, Panel, ParametersCheck, Point, PublicState, Robot, StateVariables,
+    Widget, read_parameters,
 };
 use serde::{Deserialize, Serialize};
 
@@ -125,6 +126,10 @@ impl Robot for Butler {
 
     fn is_quick(&self) -> bool {
         true
+    }
+
+    fn parameters_check(&self) -> Option<ParametersCheck> {
+        Some(|parameters| Self::new(read_parameters(parameters)?).map(drop))
     }
 
     fn senses_bodies(&self) -> bool {

@@ -11,7 +11,8 @@ use affect::behavior::{BehaviorGenerator, BehaviorState};
 use affect::levels::{SensoryMotor, SensoryMotorParameters};
 use affect::{Circumstances, Feeling, Frame, RuleGenerator, StandardEmotion};
 use robot::{
-    Action, BadParameters, Cars, Panel, Point, ReceivedCommand, Robot, StateVariables, Widget,
+    Action, BadParameters, Cars, Panel, ParametersCheck, Point, ReceivedCommand, Robot,
+    StateVariables, Widget, read_parameters,
 };
 use serde::{Deserialize, Serialize};
 
@@ -105,6 +106,10 @@ impl Robot for Leguin {
             .find(|behavior| Some(behavior.name()) == name);
         self.bsg = BehaviorGenerator::new(TABLE, behavior.unwrap_or(Behavior::GoHome));
         cars.log("is back, and takes over where the last one was lost");
+    }
+
+    fn parameters_check(&self) -> Option<ParametersCheck> {
+        Some(|parameters| Self::new(read_parameters(parameters)?).map(drop))
     }
 
     fn is_quick(&self) -> bool {

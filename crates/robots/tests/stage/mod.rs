@@ -360,6 +360,8 @@ pub(crate) fn welcome(
         location: at,
         roster: roster.to_vec(),
         parameters,
+        earlier_parameters: Vec::new(),
+        later_parameters: Vec::new(),
         news_flag: news_flag(robot, roster),
         last_state: None,
         state_before: None,

@@ -36,6 +36,37 @@ impl Server {
             }
         };
 
+        let offers = Self::offers(&control, simulation);
+        if offers.is_empty() {
+            return self.on_request(query, control, simulation);
+        }
+        self.offer(query, control, offers);
+        Ok(())
+    }
+
+    /// Robots have been asked about the parameters that a request sets.
+    pub(super) fn on_offered(
+        &mut self,
+        query: Query,
+        control: Control,
+        refusal: Option<String>,
+        simulation: &mut Simulation,
+    ) -> Result<(), Interrupt> {
+        match refusal {
+            None => self.on_request(query, control, simulation),
+            Some(reason) => {
+                refuse(&query, &reason);
+                Ok(())
+            }
+        }
+    }
+
+    fn on_request(
+        &mut self,
+        query: Query,
+        control: Control,
+        simulation: &mut Simulation,
+    ) -> Result<(), Interrupt> {
         match control {
             Control::Step { n } => {
                 self.on_step(n, query, simulation);
@@ -330,7 +361,7 @@ impl Server {
 }
 
 /// Why something is not done.
-struct Refusal {
+pub(super) struct Refusal {
     explanation: String,
     fields: Vec<FieldError>,
 }
@@ -395,7 +426,7 @@ fn next_scenario(
 }
 
 /// The scenario that a text from outside describes, for the robots that are there.
-fn load(text: &str, running: &Scenario) -> Result<Scenario, Refusal> {
+pub(super) fn load(text: &str, running: &Scenario) -> Result<Scenario, Refusal> {
     let source = Source {
         name: "the scenario".to_owned(),
         text: text.to_owned(),

@@ -8,8 +8,8 @@ use bus::{Bus, BusError, Declared, Publisher, Query};
 use lockstep::{Barrier, Naming, Outcome, Output, Sent, Stamp, Timing};
 use protocol::keys::{Keys, STATE};
 use protocol::messages::{
-    Awaited, Clock, Command, CommandText, End, LogKind, LogRecord, MAX_ENTRIES, Panel, Presence,
-    Reason, Report, Waiting,
+    Awaited, Clock, Command, CommandText, Control, End, LogKind, LogRecord, MAX_ENTRIES, Panel,
+    Presence, Reason, Report, Waiting,
 };
 use protocol::{Generation, Malformed, RobotName, RunName, Tick, decode, encode};
 
@@ -125,6 +125,15 @@ pub enum Event {
     Join(Query),
     /// An operator asks for something.
     Control(Query),
+    /// Robots have been asked about the parameters that an operator wants to set.
+    Offered {
+        /// The request.
+        query: Query,
+        /// What it asks for.
+        control: Box<Control>,
+        /// Why a robot refuses its parameters, if one does.
+        refusal: Option<String>,
+    },
     /// A robot's liveliness token was declared or undeclared.
     Token {
         /// The robot that the key names.
@@ -179,8 +188,8 @@ pub(super) enum Stage {
 /// A simulator process.
 pub struct Server {
     pub(super) options: Options,
-    bus: Bus,
-    keys: Keys,
+    pub(super) bus: Bus,
+    pub(super) keys: Keys,
     inbox: Inbox<Running>,
     events: Events<Running>,
     declared: Vec<Declared>,
@@ -989,6 +998,11 @@ impl Server {
             Event::Join(query) => self.on_join(&query, simulation),
             Event::Token { robot, is_present } => self.on_token(&robot, is_present),
             Event::Control(query) => self.on_control(query, simulation)?,
+            Event::Offered {
+                query,
+                control,
+                refusal,
+            } => self.on_offered(query, *control, refusal, simulation)?,
             Event::Viewer { is_present } => self.viewers.note(is_present),
             Event::Terminate => return Err(Interrupt::End(End::Stopped)),
         }

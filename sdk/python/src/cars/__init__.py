@@ -20,7 +20,7 @@ from ._data import (
     Welcome,
 )
 from ._entry import main, take_part
-from ._errors import BadParameters, CallError, Error, HostError, Interrupted, TooEarly, UnknownRobot, Unreachable
+from ._errors import BadArgument, BadParameters, CallError, Error, HostError, Interrupted, TooEarly, UnknownRobot, Unreachable
 from ._experiment import Experiment, Verdict, experiment
 from ._frames import Frames
 from ._pictures import Page, Picture
@@ -30,6 +30,7 @@ from .panel import Panel
 
 __all__ = [
     "Action",
+    "BadArgument",
     "BadParameters",
     "CallError",
     "Cars",

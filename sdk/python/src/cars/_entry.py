@@ -9,7 +9,7 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from typing import Optional, Union
 
-from . import _cars
+from . import _arguments, _cars
 from ._robot import Robot, checked
 
 
@@ -26,6 +26,10 @@ def main(default_name: str, make: Callable[[str], Robot], arguments: Optional[Se
         signal.signal(signal.SIGINT, signal.SIG_DFL)
     given = sys.argv[1:] if arguments is None else arguments
     return _cars.main(default_name, lambda name: checked(make(name)), [sys.argv[0], *given])
+
+
+def _seconds(name: str, value: Optional[float]) -> Optional[float]:
+    return None if value is None else _arguments.number(name, value, "a number of seconds")
 
 
 def take_part(
@@ -48,15 +52,16 @@ def take_part(
     :raises HostError: it is refused, replaced, or there is no simulator of this run.
     """
     options = {
-        "--run": run,
-        "--connect": connect,
-        "--patience-s": patience_s,
-        "--gone-patience-s": gone_patience_s,
-        "--zenoh-config": zenoh_config,
+        "--run": _arguments.text("run", run),
+        "--connect": _arguments.text("connect", connect),
+        "--patience-s": _seconds("patience_s", patience_s),
+        "--gone-patience-s": _seconds("gone_patience_s", gone_patience_s),
+        "--zenoh-config": None if zenoh_config is None else _arguments.path("zenoh_config", zenoh_config),
     }
     arguments = ["cars"]
     for option, value in options.items():
         if value is not None:
-            text = str(value) if isinstance(value, float) else os.fspath(value)
-            arguments.append(f"{option}={text}")
-    return _cars.take_part([(name, checked(robot)) for name, robot in robots.items()], arguments)
+            arguments.append(f"{option}={value}")
+    given = _arguments.mapping("robots", robots, "a mapping from names to robots")
+    seated = [(name, checked(robot, f"robots[{name!r}] must be")) for name, robot in given.items()]
+    return _cars.take_part(seated, arguments)

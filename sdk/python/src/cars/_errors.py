@@ -6,6 +6,10 @@ class Error(Exception):
     a file."""
 
 
+class BadArgument(Error, ValueError):
+    """A value that an argument may not have; the text names the argument and what is accepted."""
+
+
 class HostError(Error):
     """A robot cannot take part, or cannot go on."""
 

@@ -8,10 +8,14 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, Optional, Union
 
-from . import _cars, _settings
+from . import _arguments, _cars, _settings
 from ._frames import Frame, of_rows, read
 from ._pictures import Page
 from ._run import Name
+
+
+MAX_JOBS = 4096
+"""Most runs at the same time: each has a thread."""
 
 
 class Verdict(NamedTuple):
@@ -117,16 +121,17 @@ def experiment(
     :param jobs: number of runs at the same time; without it the number of processors. The results do not depend on it.
     :param retry_failed: play units that failed once more.
     :raises Error: with the text of the command line, if a file cannot be used.
+    :raises TypeError, BadArgument: which argument has a type or a value that is not accepted.
     """
     folder = _cars.experiment(
-        Path(file),
-        out=None if out is None else Path(out),
-        scenario=None if scenario is None else Path(scenario),
-        seeds=None if seeds is None else list(range(1, seeds + 1) if isinstance(seeds, int) else seeds),
-        duration=_settings.time(duration),
+        _arguments.path("file", file),
+        out=None if out is None else _arguments.path("out", out),
+        scenario=None if scenario is None else _arguments.path("scenario", scenario),
+        seeds=_arguments.seeds("seeds", seeds),
+        duration=_arguments.time("duration", duration),
         set=_settings.changes(set),
-        jobs=jobs,
-        retry_failed=retry_failed,
+        jobs=None if jobs is None else _arguments.whole("jobs", jobs, 1, MAX_JOBS),
+        retry_failed=_arguments.flag("retry_failed", retry_failed),
     )
     played = Experiment(folder)
     if played.failures:

@@ -167,8 +167,8 @@ class CarsRobotInterface(Robot):
         )
 
 
-def checked(robot: object) -> Robot:
-    """A robot, if it is one."""
+def checked(robot: object, what: str = "a robot is") -> Robot:
+    """A robot, if it is one. ``what`` begins the sentence of the error."""
     if isinstance(robot, Robot):
         return robot
-    raise TypeError(f"a robot is an object of a class derived from cars.Robot, not {robot!r}")
+    raise TypeError(f"{what} an object of a class derived from cars.Robot, not {robot!r}")

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Optional, Union
 
-from . import _cars, _settings
+from . import _arguments, _cars, _settings
 from ._errors import Error
 from ._frames import Frame, Frames, read, with_value
 from ._pictures import Page, Picture
@@ -106,8 +106,9 @@ class Run:
         :param whole: draw time in which nothing happens to scale, too.
         """
         self._check()
-        first, last = (None if moment is None else str(moment) for moment in (start, end))
-        svg, notes = _cars.diagram(self.folder, first, last, queries, whole)
+        first, last = _moment("start", start), _moment("end", end)
+        is_whole = _arguments.flag("whole", whole)
+        svg, notes = _cars.diagram(self.folder, first, last, _arguments.flag("queries", queries), is_whole)
         for note in notes:
             warnings.warn(note, stacklevel=2)
         return Picture(svg)
@@ -118,6 +119,15 @@ class Run:
             _, now = _cars.find(Path(), self.folder)
             if now is None or json.loads(now)["digest"] != self.summary["digest"]:
                 raise Error(f"{self.folder} holds another run now; give each run a name or a folder of its own")
+
+
+def _moment(name: str, value: Any) -> Optional[str]:
+    """A tick or a time as a text."""
+    if value is None or isinstance(value, str):
+        return value
+    if isinstance(value, bool) or not hasattr(value, "__index__"):
+        raise _arguments.wrong_type(name, "a tick, or a time such as '120 s'", value)
+    return str(value.__index__())
 
 
 def run(
@@ -149,25 +159,35 @@ def run(
         made by their classes in the scenario. A robot of Python computes under Python's lock; with those of Rust
         alone other threads of Python go on meanwhile.
     :raises Error: with the text of the command line, if a file cannot be used, or a robot cannot run in this process.
+    :raises TypeError, BadArgument: which argument has a type or a value that is not accepted.
     """
 
-    def maker(make: Callable[[], Robot]) -> Callable[[], Robot]:
-        return lambda: checked(make())
+    def maker(of: str, make: Callable[[], Robot]) -> Callable[[], Robot]:
+        return lambda: checked(make(), f"robots[{of!r}] must make")
+
+    file = _arguments.path("scenario", scenario)
+    seed = None if seed is None else _arguments.whole("seed", seed, 0, _arguments.MAX_SEED)
+    settings = _settings.changes(set)
+    lasts = _arguments.time("duration", duration)
+    pace = _arguments.speed("speed", speed)
+    named = _arguments.text("name", name)
+    makers = {of: maker(of, make) for of, make in _arguments.makers("robots", robots).items()}
+    into = None if out is None else _arguments.path("out", out)
 
     keeper = None
-    if out is None:
+    if into is None:
         keeper = tempfile.TemporaryDirectory(prefix="cars-")
-        out = keeper.name
+        into = Path(keeper.name)
     folder, summary = _cars.run(
-        Path(scenario),
+        file,
         seed=seed,
-        set=_settings.changes(set),
-        duration=_settings.time(duration),
-        speed=None if speed is None else str(speed),
-        name=name,
+        set=settings,
+        duration=lasts,
+        speed=pace,
+        name=named,
         replace=replace,
-        out=Path(out),
-        robots={of: maker(make) for of, make in (robots or {}).items()},
+        out=into,
+        robots=makers,
     )
     return Run(folder, json.loads(summary), keeper)
 
@@ -179,5 +199,5 @@ def load(run: Name = "latest", *, out: Name = "runs") -> Run:
     :param out: where run folders are made.
     :raises Error: if there is none.
     """
-    folder, summary = _cars.find(Path(out), Path(run))
+    folder, summary = _cars.find(_arguments.path("out", out), _arguments.path("run", run))
     return Run(folder, None if summary is None else json.loads(summary))
