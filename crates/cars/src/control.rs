@@ -11,6 +11,7 @@ use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{
     Command, Control, ControlAnswer, FaultKind, Intervention, LogRecord, OnLate, Presence, Status,
 };
+use protocol::time::seconds;
 use protocol::{Message, RobotName, RunName, Tick, decode, encode};
 use scenario::Scenario;
 use simulator::RunFolder;
@@ -440,12 +441,12 @@ fn headline(status: &Status) -> String {
         .map_or("max".to_owned(), |speed| format!("{speed}x"));
 
     format!(
-        "{} {}  tick {}  {:.1} of {:.1} s  speed {speed}  seed {}  epoch {}\n",
+        "{} {}  tick {}  {} of {} s  speed {speed}  seed {}  epoch {}\n",
         status.run,
         status.phase,
         status.tick,
-        status.time_s,
-        status.duration_s,
+        seconds(status.time_s, status.tick_s),
+        seconds(status.duration_s, status.tick_s),
         status.seed,
         status.epoch
     )

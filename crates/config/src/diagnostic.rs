@@ -10,6 +10,8 @@ use protocol::plain::{escape_line, escape_text};
 
 use crate::shipped;
 
+/// The byte order mark with which some editors begin a file in UTF-8. It is no part of the text.
+const BYTE_ORDER_MARK: char = '\u{feff}';
 /// Longest file, bytes, so that an endless one cannot exhaust the memory.
 const MAX_FILE_BYTES: u64 = 16 << 20;
 
@@ -182,7 +184,7 @@ pub struct Source {
 }
 
 impl Source {
-    /// Reads a file, from the disk or of those that come with the programs.
+    /// Reads a file, from the disk or of those that come with the programs. A byte order mark at its beginning is left out.
     ///
     /// # Errors
     /// [`FileError`] if it cannot be read, or is longer than 16 MiB.
@@ -193,7 +195,10 @@ impl Source {
             return Ok(Self { name, text });
         }
 
-        let text = read_limited(path).map_err(|error| FileError::unreadable(path, &error))?;
+        let mut text = read_limited(path).map_err(|error| FileError::unreadable(path, &error))?;
+        if text.starts_with(BYTE_ORDER_MARK) {
+            text.drain(..BYTE_ORDER_MARK.len_utf8());
+        }
         if text.len() as u64 > MAX_FILE_BYTES {
             let reason = format!("it is longer than {MAX_FILE_BYTES} bytes");
             return Err(FileError::new(format!("cannot read {name}: {reason}")));
@@ -272,4 +277,28 @@ fn read_limited(path: &Path) -> std::io::Result<String> {
     let mut limited = File::open(path)?.take(MAX_FILE_BYTES + 1);
     limited.read_to_string(&mut text)?;
     Ok(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_byte_order_mark_at_the_beginning_is_no_part_of_the_text() {
+        let path = std::env::temp_dir().join(format!("byte-order-mark-{}", std::process::id()));
+        let read = |text: &str| {
+            std::fs::write(&path, text).unwrap();
+            Source::read(&path).unwrap().text
+        };
+        let marked = read("\u{feff}a = 1\n");
+        let twice = read("\u{feff}\u{feff}a");
+        let inside = read("a\u{feff}");
+        let empty = read("\u{feff}");
+        std::fs::remove_file(&path).unwrap();
+
+        assert_eq!(marked, "a = 1\n");
+        assert_eq!(twice, "\u{feff}a");
+        assert_eq!(inside, "a\u{feff}");
+        assert_eq!(empty, "");
+    }
 }

@@ -1,7 +1,8 @@
 //! Shared parts of scenario, launch and experiment files: quantities with units, errors with file, line and caret, seeds,
-//! speeds, overrides of single values, and the files that come with the programs.
+//! speeds, overrides of single values, lists of fixed lengths, and the files that come with the programs.
 
 pub mod diagnostic;
+mod fixed_list;
 pub mod overrides;
 pub mod seed;
 pub mod shipped;
@@ -9,5 +10,6 @@ pub mod speed;
 pub mod units;
 
 pub use diagnostic::{FileError, Source};
+pub use fixed_list::FixedList;
 pub use overrides::{Changes, Override};
 pub use speed::Speed;

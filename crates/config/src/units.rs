@@ -52,13 +52,11 @@ pub fn quantity(text: &str) -> Option<(f64, Dimension)> {
         text.find(|c: char| !(c.is_ascii_digit() || matches!(c, '.' | '-' | '+' | 'e' | 'E')))?;
     let (number, unit) = text.split_at(split);
     let number: f64 = number.parse().ok()?;
-    if !number.is_finite() {
-        return None;
-    }
 
     let unit = unit.trim();
     let (_, dimension, factor) = UNITS.iter().find(|(name, ..)| *name == unit)?;
-    Some((number * factor, *dimension))
+    let value = number * factor;
+    value.is_finite().then_some((value, *dimension))
 }
 
 macro_rules! quantity_type {
@@ -126,7 +124,17 @@ mod tests {
         assert_eq!(quantity("50 ft"), Some((15.24, Dimension::Length)));
         assert_eq!(quantity("2ft/s"), Some((0.6096, Dimension::Speed)));
         assert_eq!(quantity("1e-1 s"), Some((0.1, Dimension::Time)));
-        for other in ["50", "ft", "50 furlong", "Leguin", "", "5 m5", "inf m"] {
+        for other in [
+            "50",
+            "ft",
+            "50 furlong",
+            "Leguin",
+            "",
+            "5 m5",
+            "inf m",
+            "1e309 m",
+            "1e308 h",
+        ] {
             assert_eq!(quantity(other), None, "{other:?}");
         }
         assert!("2 s".parse::<Length>().is_err());

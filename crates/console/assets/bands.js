@@ -38,6 +38,7 @@ export class Bands {
     const width = this.place.clientWidth;
     const states = new Map([...this.store.history.states].filter(([robot]) => this.isShown(robot)));
     const [first_s, last_s] = this.shown.range_s();
+    const tick_s = this.store.frame?.tick_s;
     const inner = width - GUTTER_PX - MARGIN_PX;
     if (inner <= 0) return;
 
@@ -47,8 +48,8 @@ export class Bands {
       const y = i * (2 * BAND_PX + GAP_PX + ROBOT_GAP_PX);
       return [
         svg`<text class="who" x="8" y=${y + BAND_PX + 5}>${robot.slice(0, 10)}</text>`,
-        ...seen(emotion).map((span) => block(span, x, y, "emotion", robot)),
-        ...seen(behavior).map((span) => block(span, x, y + BAND_PX + GAP_PX, "behavior", robot)),
+        ...seen(emotion).map((span) => block(span, x, y, "emotion", robot, tick_s)),
+        ...seen(behavior).map((span) => block(span, x, y + BAND_PX + GAP_PX, "behavior", robot, tick_s)),
       ];
     });
 
@@ -105,15 +106,16 @@ function visible(spans, first_s, last_s, x) {
  * @param {number} y
  * @param {"emotion" | "behavior"} kind
  * @param {string} robot
+ * @param {number} [tick_s]
  */
-function block({ state, from_s, to_s }, x, y, kind, robot) {
+function block({ state, from_s, to_s }, x, y, kind, robot, tick_s) {
   const left = x(from_s);
   const width = Math.max(1, x(to_s) - left - 0.5);
   const color = stateClass(kind, state);
   const isRoomy = width > LETTER_PX * state.length + 8;
 
   return svg`
-    <g class="band" data-state=${state}><title>${robot}, ${kind} ${state}, ${seconds(from_s)} to ${seconds(to_s)}</title>
+    <g class="band" data-state=${state}><title>${robot}, ${kind} ${state}, ${seconds(from_s, tick_s)} to ${seconds(to_s, tick_s)}</title>
       <rect x=${left} y=${y} width=${width} height=${BAND_PX} rx="2" class=${color}></rect>
       ${isRoomy ? svg`<text class="on-${color}" x=${left + 5} y=${y + 12}>${state}</text>` : nothing}</g>`;
 }

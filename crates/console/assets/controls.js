@@ -120,8 +120,8 @@ export class Controls {
         <div class="now">
           <span class="pill ${store.isPast ? "" : `phase-${phase}`}" data-testid="phase">${word}</span>
           <span class="count">tick <b data-testid="tick">${frame?.tick ?? this.store.status?.tick ?? "–"}</b></span>
-          <span class="count"><b data-testid="time">${frame ? seconds(frame.time_s) : "–"}</b>${
-            frame ? html` of ${seconds(frame.duration_s)}` : nothing
+          <span class="count"><b data-testid="time">${frame ? seconds(frame.time_s, frame.tick_s) : "–"}</b>${
+            frame ? html` of ${seconds(frame.duration_s, frame.tick_s)}` : nothing
           }</span>
         </div>
         ${store.mode === "recording" ? nothing : this.buttons()}

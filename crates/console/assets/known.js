@@ -2,7 +2,7 @@
 // What can be told of a robot without its panel: from its published state, from the simulator and from the log.
 
 import { presence } from "./presence.js";
-import { short } from "./units.js";
+import { seconds, short } from "./units.js";
 
 /** @typedef {import("./types/messages.js").Awaited} Awaited */
 /** @typedef {import("./types/messages.js").LogRecord} LogRecord */
@@ -76,7 +76,7 @@ export function generic(robot, { className, commands, isBegun }) {
   const facts = [["heading", robot.speed_mps > 0 ? heading : "stands"], ["incarnation", String(robot.generation)]];
   if (className) facts.unshift(["class", className]);
   widgets.push({ widget: "table", rows: facts });
-  const words = commands.map(({ time_s, source, text }) => `${time_s.toFixed(1)} s  ${sentence(robot.name, source, text)}`);
+  const words = commands.map(({ time_s, tick_s, source, text }) => `${seconds(time_s, tick_s)}  ${sentence(robot.name, source, text)}`);
   widgets.push({ widget: "text", label: "last commands", text: words.join("\n") || none });
 
   const rows = Object.entries(state_variables).map(([name, value]) => [name, show(value)]);

@@ -1,6 +1,7 @@
 // @ts-check
 // The log: the lines of the log file, filtered. It scrolls to the newest line unless the reader has scrolled up.
 
+import { seconds } from "./units.js";
 import { html, render } from "./vendor/lit-html.js";
 
 /** @typedef {import("./store.js").Store} Store */
@@ -297,7 +298,7 @@ function row(line) {
   };
 
   element.append(
-    part("time", `${line.time_s.toFixed(1).padStart(9)} s  `),
+    part("time", `${seconds(line.time_s, line.tick_s).padStart(11)}  `),
     part("source", `${line.source.padEnd(12)} `),
     part("text", line.text),
   );

@@ -1,6 +1,8 @@
 // @ts-check
 // What stands out on the time line: exchanges, cuts, faults and epochs, known by their lines of the log.
 
+import { seconds } from "./units.js";
+
 /** @typedef {import("./types/messages.js").LogRecord} LogRecord */
 /** @typedef {"exchange" | "cut" | "fault" | "epoch"} MarkKind */
 /** Things at one place of the time line. @typedef {{kind: MarkKind, tick: number, at: number, words: string}} Mark */
@@ -87,10 +89,10 @@ export class Marks {
 
 /** @param {LogRecord[]} lines */
 function wordsOf(lines) {
-  const words = lines.slice(0, MOST_WORDS).map(({ tick, time_s, source, text, kind, epoch }) => {
+  const words = lines.slice(0, MOST_WORDS).map(({ tick, time_s, tick_s, source, text, kind, epoch }) => {
     const who = source === "simulator" ? "" : `${source} `;
     const what = kind === "run" ? `epoch ${epoch} ${text.replace(/, digest .*/, "")}` : `${who}${text}`;
-    return `${time_s.toFixed(1)} s, tick ${tick}: ${what}`;
+    return `${seconds(time_s, tick_s)}, tick ${tick}: ${what}`;
   });
   const more = lines.length - words.length;
   return [...words, ...(more > 0 ? [`and ${more} more`] : [])].join("\n");

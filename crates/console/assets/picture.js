@@ -6,6 +6,7 @@ import { faceShapes } from "./face.js";
 import { intensityOf } from "./known.js";
 import { stateColors } from "./palette.js";
 import { barrier, cross, disk, envelope, line, ring } from "./shapes.js";
+import { seconds } from "./units.js";
 import { Vector } from "./vector.js";
 
 /** @typedef {import("./types/messages.js").Face} Face */
@@ -37,7 +38,7 @@ export function picture(plan, panels) {
 
   const side = new Vector();
   const words = new Words(side, theme);
-  words.bold(frame ? `${frame.run}, ${frame.time_s.toFixed(1)} s` : "", PAD_PX, 26, 15);
+  words.bold(frame ? `${frame.run}, ${seconds(frame.time_s, frame.tick_s)}` : "", PAD_PX, 26, 15);
   let y = 44;
   for (const robot of robots.slice(0, MOST_ROBOTS)) {
     person(side, words, theme, robot, panels.get(robot.name), y);

@@ -2,6 +2,7 @@
 // The time line: a bar with the ticks that can be shown, marks of what stands out, and a way back to the run in progress.
 
 import { ICONS } from "./icons.js";
+import { seconds } from "./units.js";
 import { html, nothing, render } from "./vendor/lit-html.js";
 
 /** @typedef {import("./recording.js").Player} Player */
@@ -40,10 +41,10 @@ export function renderScrub(place, player, shown) {
       <div class="track">
         <div class="marks" data-testid="marks">${marks(place, player)}</div>
         ${span(player, shown)}
-        <input type="range" data-testid="scrub" aria-label="Tick" aria-valuetext="tick ${tick}, ${time_s.toFixed(1)} s"
+        <input type="range" data-testid="scrub" aria-label="Tick" aria-valuetext="tick ${tick}, ${seconds(time_s, tick_s)}"
           min=${first} max=${last} step="1" .value=${String(Math.max(first, tick))} @input=${seek} />
       </div>
-      <span class="count">${time_s.toFixed(1)} / ${(last * tick_s).toFixed(1)} s</span>
+      <span class="count">${seconds(time_s, tick_s).slice(0, -2)} / ${seconds(last * tick_s, tick_s)}</span>
       ${store.mode === "live" ? live(player) : nothing}
       ${note(player)}`,
     place,
@@ -105,7 +106,7 @@ function note(player) {
   const say = (/** @type {string} */ text, /** @type {string} */ why) =>
     html`<p class="past-note muted" data-testid="past-note" role="status" title=${why}>${text}</p>`;
 
-  if (player.isWanting) return say(`Only what this page has seen, from ${(first * tick_s).toFixed(1)} s on: ${missing}.`, missing);
+  if (player.isWanting) return say(`Only what this page has seen, from ${seconds(first * tick_s, tick_s)} on: ${missing}.`, missing);
   const share = newest && newest.ticks > 0 ? player.readTo / newest.ticks : 1;
   if (share < 0.9 && newest && newest.epoch === store.live?.epoch) return say(`Reading what is recorded: ${Math.max(0, Math.floor(100 * share))} %`, "");
   return nothing;

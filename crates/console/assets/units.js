@@ -19,13 +19,29 @@ export function short(value, digits = 2) {
   return String(Number(value.toFixed(digits)));
 }
 
+/** Most decimals of a time, which are nanoseconds. */
+const MAX_DECIMALS = 9;
+
 /**
- * Formats simulated time.
+ * How many decimals tell the times of two ticks apart, at least 1.
+ * @param {number | undefined} tick_s length of a tick
+ * @returns {number}
+ */
+function decimals(tick_s) {
+  const nanos = Math.round((tick_s ?? 0) * 1e9);
+  let decimals = MAX_DECIMALS;
+  for (let unit = 10; decimals > 1 && nanos % unit === 0; unit *= 10) decimals -= 1;
+  return decimals;
+}
+
+/**
+ * Formats simulated time, with the decimals that the length of a tick needs.
  * @param {number} time_s
+ * @param {number} [tick_s]
  * @returns {string}
  */
-export function seconds(time_s) {
-  return `${time_s.toFixed(1)} s`;
+export function seconds(time_s, tick_s) {
+  return `${time_s.toFixed(decimals(tick_s))} s`;
 }
 
 /**

@@ -416,6 +416,7 @@ mod tests {
             epoch: 1,
             tick,
             time_s: 0.0,
+            tick_s: 0.5,
             source: "simulator".to_owned(),
             kind: LogKind::Run,
             text: format!("line {tick}"),

@@ -119,6 +119,7 @@ impl State {
             | Event::DoneLate { .. }
             | Event::Blocked { .. }
             | Event::Say { .. }
+            | Event::Warned { .. }
             | Event::Judged { .. }
             | Event::Tick { .. }
             | Event::End { .. } => {}

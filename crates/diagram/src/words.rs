@@ -3,6 +3,7 @@
 use protocol::Tick;
 use protocol::event::Cause;
 use protocol::messages::FaultKind;
+use protocol::time::time_s;
 
 use crate::items::{
     Absence, Band, BandKind, Change, Command, CommandEnd, Cut, Fault, HeldUp, Joined, Missed,
@@ -46,10 +47,9 @@ pub(crate) fn label(command: &Command) -> String {
     shortened(&command.text, LABEL_LETTERS)
 }
 
-/// Simulated seconds, with at most two decimals.
+/// Simulated seconds, in the fewest digits.
 pub(crate) fn seconds(tick: Tick, tick_s: f64) -> String {
-    let hundredths = (tick as f64 * tick_s * 100.0).round() / 100.0;
-    format!("{hundredths} s")
+    format!("{} s", time_s(tick, tick_s))
 }
 
 /// Why a message was lost, in few words.

@@ -22,6 +22,7 @@ use std::time::{Duration, Instant};
 use miette::{IntoDiagnostic, WrapErr, miette};
 use protocol::Tick;
 use protocol::random::{stream, unit};
+use protocol::time::time_s;
 use serde::Serialize;
 
 pub use case::Case;
@@ -422,7 +423,7 @@ impl Hunt<'_> {
         Finding {
             expectation: name.to_owned(),
             because: failure.because.clone(),
-            time_s: failure.tick as f64 * tick_s,
+            time_s: time_s(failure.tick, tick_s),
             plan,
             drawn: case.faults.clone(),
             case: case.clone(),

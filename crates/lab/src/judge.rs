@@ -6,6 +6,7 @@ use config::FileError;
 use miette::miette;
 use observe::{Expectation, Observation, Watches};
 use protocol::messages::End;
+use protocol::time::time_s;
 use protocol::{Event, Tick};
 use recording::{Recording, Ticks};
 use scenario::Scenario;
@@ -69,7 +70,7 @@ fn observe(
 ) -> Vec<Event> {
     watches.observe(&Observation {
         tick: entry.tick,
-        time_s: entry.tick as f64 * tick_s,
+        time_s: time_s(entry.tick, tick_s),
         events: &entry.events,
         state: &|robot| recorded.and_then(|states| states.last.of(robot)),
     })

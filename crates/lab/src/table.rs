@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use protocol::messages::{End, Verdict};
+use protocol::time::seconds;
 use simulator::Summary;
 use simulator::summary::{Judged, RobotSummary};
 
@@ -32,7 +33,9 @@ pub fn heading(summary: &Summary) -> String {
     let run = &summary.run;
     let ticks = summary.ticks;
     let time_s = summary.time_s;
-    let mut text = format!("{run} {end} after {time_s:.1} s ({ticks} ticks)");
+    let tick_s = time_s / ticks.max(1) as f64;
+    let time = seconds(time_s, tick_s);
+    let mut text = format!("{run} {end} after {time} s ({ticks} ticks)");
 
     let elapsed_s = summary.wall.elapsed_s;
     if elapsed_s > 0.0 {

@@ -8,6 +8,7 @@ use std::io::Write;
 
 use config::FileError;
 use protocol::messages::Awaited;
+use protocol::time::time_s;
 use protocol::{RobotName, Tick};
 use recording::{RecordedTick, Recording, RecordingError};
 use serde::Serialize;
@@ -255,7 +256,7 @@ impl<'a, W: Write> Writer<'a, W> {
         }
 
         let number = tick.tick();
-        let mut args = json!({ "tick": number, "time_s": number as f64 * tick_s });
+        let mut args = json!({ "tick": number, "time_s": time_s(number, tick_s) });
         // The robot that reported last is the one that the clock waited for.
         let last = wall.reports_ns.iter().max_by_key(|(_, arrived)| **arrived);
         if let Some((robot, arrived)) = last {

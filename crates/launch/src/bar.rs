@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use protocol::messages::{Awaited, Phase, Status, WorldFrame};
+use protocol::time::seconds;
 
 /// Most redraws per second.
 const REDRAWS_HZ: u8 = 10;
@@ -18,6 +19,8 @@ pub(super) struct Progress {
     time_s: f64,
     /// Simulated duration of the run, s.
     duration_s: f64,
+    /// Length of a tick, s.
+    tick_s: f64,
     phase: Phase,
     /// Robots for which the clock is held.
     awaiting: Vec<Awaited>,
@@ -30,6 +33,7 @@ impl From<WorldFrame> for Progress {
         Self {
             time_s: frame.time_s,
             duration_s: frame.duration_s,
+            tick_s: frame.tick_s,
             phase: frame.phase,
             awaiting: frame.awaiting,
             at: Instant::now(),
@@ -42,6 +46,7 @@ impl From<Status> for Progress {
         Self {
             time_s: status.time_s,
             duration_s: status.duration_s,
+            tick_s: status.tick_s,
             phase: status.phase,
             awaiting: status.awaiting,
             at: Instant::now(),
@@ -125,7 +130,7 @@ impl Bar {
 
 fn message(progress: &Progress, factor: Option<f64>, now: Instant, has_colors: bool) -> String {
     let phase = progress.phase;
-    let time = describe_time(progress.time_s, progress.duration_s);
+    let time = describe_time(progress);
     match held(&progress.awaiting, now.duration_since(progress.at)) {
         Some(held) if has_colors => return format!("{time}  \u{1b}[33m{held}\u{1b}[0m"),
         Some(held) => return format!("{time}  {held}"),
@@ -138,13 +143,21 @@ fn message(progress: &Progress, factor: Option<f64>, now: Instant, has_colors: b
     }
 }
 
-fn describe_time(time_s: f64, duration_s: f64) -> String {
+fn describe_time(progress: &Progress) -> String {
+    let Progress {
+        time_s,
+        duration_s,
+        tick_s,
+        ..
+    } = *progress;
     let percent = if duration_s > 0.0 {
         (100.0 * time_s / duration_s).floor()
     } else {
         100.0
     };
-    format!("{percent:>3} %  {time_s:.1} of {duration_s:.1} s")
+    let time = seconds(time_s, tick_s);
+    let duration = seconds(duration_s, tick_s);
+    format!("{percent:>3} %  {time} of {duration} s")
 }
 
 fn millis(seconds: f64) -> u64 {
@@ -216,6 +229,7 @@ mod tests {
         Progress {
             time_s: 123.5,
             duration_s: 600.0,
+            tick_s: 0.5,
             phase: Phase::Running,
             awaiting,
             at: Instant::now(),

@@ -4,6 +4,7 @@
 mod line;
 mod program;
 mod proxy;
+mod remarks;
 
 use std::ffi::OsString;
 use std::sync::mpsc::{Receiver, sync_channel};
@@ -19,6 +20,7 @@ use crate::ending::code_of;
 use line::EndReason;
 use program::{ASKING, END_PATIENCE, Program, start_thread};
 use proxy::Proxy;
+use remarks::Remarks;
 
 /// How long to wait for a signal that has killed the program: a signal to the process group reaches this process, too.
 const SAME_SIGNAL: Duration = Duration::from_secs(1);
@@ -55,10 +57,12 @@ pub fn exec(
     let stopper = Arc::new(OnceLock::new());
     let (program, events) = Program::start(name, command, stopper.clone())?;
     let asked = listen(asking, &program, stopper.clone())?;
+    let remarks = Remarks::default();
     let proxy = Box::new(Proxy::new(
         program.clone(),
         events,
         format!("{name}: {silence}"),
+        remarks.clone(),
     ));
     let outcome = Host::connect(vec![(name.clone(), proxy)], options).and_then(|host| {
         let stopper = stopper.get_or_init(|| host.stopper());
@@ -73,14 +77,20 @@ pub fn exec(
     } else {
         Duration::ZERO
     };
+    for remark in remarks.in_words() {
+        terminal::note(format_args!("{name}: {remark}"));
+    }
     if let Ok(signal) = asked.recv_timeout(patience) {
-        program.end(EndReason::Interrupted);
+        let _is_expected = program.end(EndReason::Interrupted);
         return Ok(Ended::BySignal(code_of(signal)));
     }
 
     match outcome {
         Ok(end) => {
-            program.end(end.into());
+            // The run is right without it, so the robot has not failed.
+            if let Some(remark) = program.end(end.into()) {
+                terminal::note(format_args!("{name}: {remark}"));
+            }
             Ok(Ended::WithRun)
         }
         Err(error) => {
@@ -91,7 +101,7 @@ pub fn exec(
                 }
                 error => error.to_string(),
             };
-            program.end(EndReason::Failed);
+            let _is_secondary = program.end(EndReason::Failed);
             Ok(Ended::Failed(reason))
         }
     }
@@ -114,7 +124,10 @@ fn listen(
                 stopper.stop();
                 std::thread::sleep(END_PATIENCE);
             }
-            None => program.end(EndReason::Interrupted), // The robot has not joined yet.
+            None => {
+                // The robot has not joined yet.
+                let _is_expected = program.end(EndReason::Interrupted);
+            }
         }
 
         // The main thread has not ended the process in time, so it hangs.

@@ -379,6 +379,7 @@ mod tests {
             epoch: 1,
             tick: 3,
             time_s: 1.5,
+            tick_s: 0.5,
             source: "Leguin".to_owned(),
             kind: LogKind::Say,
             text: text.to_owned(),

@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::path;
+use crate::plain::cut;
 
 /// Largest message that is accepted, in bytes.
 pub const MAX_MESSAGE_BYTES: usize = 1 << 20;
@@ -95,13 +96,7 @@ pub(crate) fn write(message: &impl Serialize) -> Vec<u8> {
 
 fn shortened(mut text: String) -> String {
     const MAX_BYTES: usize = 500;
-    if text.len() > MAX_BYTES {
-        text.truncate(
-            (0..=MAX_BYTES)
-                .rev()
-                .find(|at| text.is_char_boundary(*at))
-                .unwrap_or(0),
-        );
+    if cut(&mut text, MAX_BYTES) {
         text += "...";
     }
     text
@@ -129,6 +124,14 @@ pub fn decode<M: Message>(key: &str, sender: &str, bytes: &[u8]) -> Result<M, Ma
 
     let message = M::from_json(bytes)
         .map_err(|error| malformed(path::of(&error, bytes), error.to_string()))?;
+
+    // The types also read a list, as their fields in order.
+    let first = bytes.iter().find(|byte| !byte.is_ascii_whitespace());
+    if first == Some(&b'[') {
+        let reason = "a list; a message is a JSON object".to_owned();
+        return Err(malformed(".".to_owned(), reason));
+    }
+
     message
         .check()
         .map_err(|FieldError { field, reason }| malformed(field, reason))?;

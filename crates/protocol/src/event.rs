@@ -10,6 +10,7 @@ use crate::messages::{
 };
 use crate::name::RobotName;
 use crate::plain::escape_line;
+use crate::time::{seconds, time_s};
 use crate::{Epoch, Generation, Seq, Tick};
 
 /// Longest line of the log about a change.
@@ -199,6 +200,13 @@ pub enum Event {
         /// The line.
         text: String,
     },
+    /// The simulator refuses what a robot does. It says so once for each reason, and how often at the end of the run.
+    Warned {
+        /// Who.
+        robot: RobotName,
+        /// What is refused, and the limit.
+        text: String,
+    },
     /// It is decided whether the run has done what its scenario expects of it.
     Judged {
         /// Name of the expectation.
@@ -351,6 +359,7 @@ impl Event {
             Self::Fault { .. } => "fault",
             Self::Changed { .. } => "changed",
             Self::Say { .. } => "say",
+            Self::Warned { .. } => "warned",
             Self::Judged { .. } => "judged",
             Self::Tick { .. } => "tick",
             Self::End { .. } => "end",
@@ -363,18 +372,20 @@ impl Event {
         matches!(self, Self::Tick { .. } | Self::End { .. })
     }
 
-    /// The event as a line of the readable log; `None` for what only machines read.
+    /// The event as a line of the readable log of a run whose ticks last `tick_s`; `None` for what only machines read.
     #[must_use]
-    pub fn log_record(&self, epoch: Epoch, tick: Tick, time_s: f64) -> Option<LogRecord> {
+    pub fn log_record(&self, epoch: Epoch, tick: Tick, tick_s: f64) -> Option<LogRecord> {
         let (source, kind, text) = self.readable()?;
-        Some(LogRecord {
+        let record = LogRecord {
             epoch,
             tick,
-            time_s,
+            time_s: time_s(tick, tick_s),
+            tick_s,
             source,
             kind,
             text,
-        })
+        };
+        Some(record.fitted())
     }
 
     /// The command that the event is about, and its fate, as frames show it; `None` for other events.
@@ -527,6 +538,7 @@ impl Event {
                 simulator(LogKind::Run, shorten(format!("{who}from now on {set}")))
             }
             Self::Say { robot, text } => says(robot, LogKind::Say, text.clone()),
+            Self::Warned { robot, text } => says(robot, LogKind::Say, format!("warning: {text}")),
             Self::Judged {
                 expectation,
                 verdict,
@@ -589,5 +601,6 @@ fn change(what: &str, from: Option<&String>, to: &str) -> String {
 pub fn log_line(record: &LogRecord) -> String {
     let source = escape_line(&record.source);
     let text = escape_line(&record.text);
-    format!("{:>9.1} s  {source:<12} {text}", record.time_s)
+    let time = seconds(record.time_s, record.tick_s);
+    format!("{time:>9} s  {source:<12} {text}")
 }

@@ -16,6 +16,7 @@ mod path;
 pub mod plain;
 pub mod random;
 pub mod schema;
+pub mod time;
 
 pub use codec::{FieldError, Malformed, Message, decode, encode};
 pub use event::{Event, Line};

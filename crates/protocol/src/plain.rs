@@ -47,6 +47,18 @@ fn color_length(text: &str) -> usize {
     }
 }
 
+/// Cuts a text to at most so many bytes, between two characters. Returns whether it was longer.
+pub fn cut(text: &mut String, max_bytes: usize) -> bool {
+    if text.len() <= max_bytes {
+        return false;
+    }
+
+    let mut boundaries = (0..=max_bytes).rev();
+    let end = boundaries.find(|at| text.is_char_boundary(*at));
+    text.truncate(end.unwrap_or(0));
+    true
+}
+
 fn escape(text: &str, is_kept: impl Fn(char) -> bool) -> String {
     let mut escaped = String::with_capacity(text.len());
     for c in text.chars() {
@@ -59,11 +71,12 @@ fn escape(text: &str, is_kept: impl Fn(char) -> bool) -> String {
     escaped
 }
 
-/// Whether a character is a control character (C0, DEL, C1), a line or paragraph separator, or a bidirectional control.
+/// Whether a character is a control character (C0, DEL, C1), a line or paragraph separator, a bidirectional control, or the byte
+/// order mark, which cannot be seen.
 fn is_control(c: char) -> bool {
     let is_separator = matches!(c, '\u{2028}' | '\u{2029}');
     let is_bidirectional = matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
-    c.is_control() || is_separator || is_bidirectional
+    c.is_control() || is_separator || is_bidirectional || c == '\u{feff}'
 }
 
 #[cfg(test)]
@@ -78,6 +91,7 @@ mod tests {
             0x2028..=0x2029,
             0x202a..=0x202e,
             0x2066..=0x2069,
+            0xfeff..=0xfeff,
         ];
         for code in controls.into_iter().flatten() {
             let c = char::from_u32(code).unwrap();

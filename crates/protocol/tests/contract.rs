@@ -3,7 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
 use protocol::messages::{
-    Clock, Command, Control, Correction, Delivery, End, Face, JoinRequest, MAX_ENTRIES,
+    Clock, Command, Control, Correction, Delivery, End, Face, JoinRequest, LogRecord, MAX_ENTRIES,
     MAX_TEXT_BYTES, NEWS_FLAGS, News, Panel, Performative, Point, Report, SensedBody, SensedKind,
     SensedRobot, Tone, Variable, Widget,
 };
@@ -224,6 +224,11 @@ fn malformed_messages_are_named_by_key_sender_and_field() {
         (r#""commands":3"#, r#""commands":3.5"#, "commands"),
         (r#""commands":3"#, r#""commands":4294967296"#, "commands"),
         (r#"{"epoch""#, r#"["epoch""#, "[0]"),
+        (
+            r#""proposal":{"x":0.30000000000000004,"y":1e-300}"#,
+            r#""proposal":[0.3,-2.0]"#,
+            "proposal",
+        ),
         (r#""log":["jokes"]}"#, r#""log":["jokes"]} trailing"#, "."),
     ] {
         assert!(good.contains(from), "{from} is not in {good}");
@@ -291,6 +296,37 @@ fn news_are_bounded() {
     assert!(with_commands(MAX_ENTRIES + 1).is_ok());
     let error = with_commands(100_000).unwrap_err();
     assert!(error.reason.contains("bytes"), "{error}");
+}
+
+/// serde reads a list as the fields of a type in their order, and no schema allows that.
+#[test]
+fn a_list_is_no_message() {
+    let error = decode::<Clock>("cars/demo/clock", "simulator", b" [1, 2]").unwrap_err();
+    assert_eq!(error.field, ".");
+    assert_eq!(error.reason, "a list; a message is a JSON object");
+}
+
+/// Two texts within the limits are in one line: what an event tells can be put on the bus.
+#[test]
+fn the_lines_of_the_log_fit_into_messages() {
+    let long = "\u{e9}".repeat(MAX_TEXT_BYTES / 2);
+    let robot = protocol::RobotName::new("A").unwrap();
+    let change = protocol::Event::Emotion {
+        robot: robot.clone(),
+        from: Some(long.clone()),
+        to: long,
+    };
+    let record = change.log_record(1, 1, 0.5).unwrap();
+    assert_eq!(record.text.len(), "emotion  -> ".len() + 2 * MAX_TEXT_BYTES);
+    assert!(decode::<LogRecord>("log", "simulator", &encode(&record)).is_ok());
+
+    let endless = protocol::Event::Say {
+        robot,
+        text: "\u{e9}".repeat(10_000),
+    };
+    let record = endless.log_record(1, 1, 0.5).unwrap();
+    assert!(record.text.ends_with("\u{e9}..."));
+    assert!(decode::<LogRecord>("log", "simulator", &encode(&record)).is_ok());
 }
 
 #[test]

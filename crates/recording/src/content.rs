@@ -132,10 +132,9 @@ impl RecordedTick {
 }
 
 fn log(tick: Tick, events: &[Event], wall: &Wall, header: &Header) -> Vec<LogRecord> {
-    let time_s = tick as f64 * header.tick_s;
     let mut lines = wall.late.clone();
     for event in events {
-        lines.extend(event.log_record(header.epoch, tick, time_s));
+        lines.extend(event.log_record(header.epoch, tick, header.tick_s));
     }
     lines
 }

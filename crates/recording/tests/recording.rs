@@ -140,6 +140,7 @@ fn tick(tick: Tick) -> RecordedTick {
                 epoch: 1,
                 tick,
                 time_s: 0.0,
+                tick_s: 0.5,
                 source: "simulator".to_owned(),
                 kind: LogKind::Late,
                 text: "the clock is held".to_owned(),

@@ -8,14 +8,41 @@ use protocol::messages::{
     CommandText, MAX_ENTRIES, MAX_TEXT_BYTES, News, Performative, Point, PublicState, SensedBody,
     SensedRobot, StateVariables, Welcome,
 };
+use protocol::plain::cut;
 use protocol::random::Stream;
 use protocol::{RobotName, Tick};
 
 use crate::error::{BadParameters, read_parameters};
 use crate::network::{Network, Undelivered};
 
+/// Most lines that a robot may write to the log in a tick. The rest of a report's lines is for those that the SDK adds.
+const MAX_LOG_LINES: usize = MAX_ENTRIES / 2;
 /// Most bytes that a robot may write to the log in a tick, all lines together.
 const MAX_LOG_BYTES: usize = 256 * 1024;
+
+/// What was left out of the log because of its limits.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct LeftOut {
+    /// Lines that were dropped.
+    pub(crate) lines: u64,
+    /// Lines that were cut at their end.
+    pub(crate) ends: u64,
+}
+
+impl LeftOut {
+    /// The warning for the log; `None` if nothing was left out.
+    pub(crate) fn warning(self) -> Option<String> {
+        let what = match (self.lines, self.ends) {
+            (0, 0) => return None,
+            (lines, 0) => format!("{lines} lines of the log were dropped"),
+            (0, ends) => format!("{ends} lines of the log were cut"),
+            (lines, ends) => format!("{lines} lines of the log were dropped and {ends} cut"),
+        };
+        Some(format!(
+            "{what}: the limits are {MAX_TEXT_BYTES} bytes a line, and {MAX_LOG_LINES} lines and {MAX_LOG_BYTES} bytes a tick"
+        ))
+    }
+}
 
 /// Why a call to another robot failed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -54,6 +81,7 @@ pub struct Cars<'a> {
     pub(crate) senses_bodies: bool,
     pub(crate) outbox: &'a mut Vec<Sent<CommandText>>,
     pub(crate) log: &'a mut Vec<String>,
+    pub(crate) left_out: &'a mut LeftOut,
     pub(crate) gave_up: &'a mut Option<String>,
     pub(crate) network: &'a mut dyn Network,
 }
@@ -160,21 +188,19 @@ impl<'a> Cars<'a> {
         &self.news.bodies
     }
 
-    /// Writes a line to the log of the run. Long lines are truncated, and lines beyond the limit of a tick are dropped.
+    /// Writes a line to the log of the run. Long lines are truncated, and lines beyond the limit of a tick are dropped; the log
+    /// has a warning when this happens first.
     pub fn log(&mut self, line: impl Into<String>) {
         let mut line = line.into();
-        if line.len() > MAX_TEXT_BYTES {
-            let end = (0..=MAX_TEXT_BYTES)
-                .rev()
-                .find(|at| line.is_char_boundary(*at))
-                .unwrap_or(0);
-            line.truncate(end);
+        if cut(&mut line, MAX_TEXT_BYTES) {
+            self.left_out.ends += 1;
         }
 
-        // The rest is for the lines that the SDK adds, and for the other fields of the report.
         let bytes: usize = self.log.iter().map(String::len).sum();
-        if self.log.len() < MAX_ENTRIES / 2 && bytes + line.len() <= MAX_LOG_BYTES {
+        if self.log.len() < MAX_LOG_LINES && bytes + line.len() <= MAX_LOG_BYTES {
             self.log.push(line);
+        } else {
+            self.left_out.lines += 1;
         }
     }
 

@@ -15,7 +15,6 @@ use std::time::{Duration, Instant};
 
 use bus::{Bus, BusError, Declared, Publisher, Role};
 use lockstep::{Action, Admission, Begin, Leave, Naming, Patience, StateQuery, Turn};
-use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{
     Clock, End, JoinAnswer, JoinRequest, News, ParametersAnswer, ParametersOffer, PublicState,
@@ -350,6 +349,7 @@ impl Host {
             };
             working.work(Thread::Own);
             if let Some(outcome) = working.outcome.take() {
+                working.report_left_out();
                 working.leave_bus();
                 return outcome;
             }
@@ -365,6 +365,16 @@ impl Host {
             && let Some((name, action)) = self.shared.next(&mut thread)
         {
             self.outcome = self.carry_out(&name, action).transpose();
+        }
+    }
+
+    /// Says what was left out of the log; the log itself has the first of it only.
+    fn report_left_out(&self) {
+        for (name, member) in &self.members {
+            let seat = member.seat.as_ref();
+            if let Some(left_out) = seat.and_then(Seat::left_out) {
+                tracing::warn!("{name}: {left_out}");
+            }
         }
     }
 
@@ -443,17 +453,6 @@ impl Host {
             report,
         } = outcome?;
         let bytes = encode(report.as_ref());
-        if bytes.len() > MAX_MESSAGE_BYTES {
-            return Err(HostError::Robot(RobotError::TooMuch {
-                robot: name.clone(),
-                field: "its report".to_owned(),
-                reason: format!(
-                    "{} bytes, more than the {MAX_MESSAGE_BYTES} allowed",
-                    bytes.len()
-                ),
-            }));
-        }
-
         if let Some(member) = self.members.get_mut(name) {
             member.seat = Some(seat);
         }

@@ -4,11 +4,12 @@
 use std::sync::Arc;
 
 use lockstep::{Begin, Sent, Turn};
+use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::messages::{Command, CommandText, News, Panel, Point, PublicState, Report, Welcome};
 use protocol::random::{Stream, stream};
-use protocol::{FieldError, Message, Tick};
+use protocol::{FieldError, Message, Tick, encode};
 
-use crate::cars::{Cars, ReceivedCommand};
+use crate::cars::{Cars, LeftOut, ReceivedCommand};
 use crate::cri::{Action, Robot};
 use crate::error::{BadParameters, RobotError};
 use crate::network::Network;
@@ -17,6 +18,12 @@ use crate::network::Network;
 /// language has other words for the reason: that is a diagnostic.
 const KEPT: &str =
     "error: refuses its new parameters, and keeps those before; its output has the reason";
+/// Most bytes that JSON has for a byte of a text: `\u001b`.
+const MAX_ESCAPED: usize = 6;
+/// Most bytes of an entry of a list or a map beside its texts: quotes, colon, comma, a number.
+const MAX_ENTRY: usize = 40;
+/// Most bytes of a report beside its texts and entries.
+const MAX_REST: usize = 1024;
 
 /// What came of a tick.
 #[derive(Debug)]
@@ -37,6 +44,8 @@ pub struct Seat {
     proposal: Point,
     /// The commands of the tick that runs.
     outbox: Vec<Sent<CommandText>>,
+    /// What was left out of the log in this epoch.
+    left_out: LeftOut,
     /// Why the robot cannot go on.
     gave_up: Option<String>,
 }
@@ -51,6 +60,7 @@ impl Seat {
             proposal: welcome.location,
             welcome: Arc::new(welcome),
             outbox: Vec::new(),
+            left_out: LeftOut::default(),
             gave_up: None,
         }
     }
@@ -66,6 +76,13 @@ impl Seat {
         self.random = stream(welcome.seed, &welcome.stream);
         self.proposal = welcome.location;
         self.welcome = Arc::new(welcome);
+        self.left_out = LeftOut::default();
+    }
+
+    /// What was left out of the log in this epoch, in words; `None` if nothing was.
+    #[must_use]
+    pub fn left_out(&self) -> Option<String> {
+        self.left_out.warning()
     }
 
     /// What the robot chooses to display.
@@ -159,6 +176,7 @@ impl Seat {
         let welcome = self.welcome.clone();
         let commands = received(news);
 
+        let left_out_before = self.left_out;
         let mut cars = Cars {
             welcome: &welcome,
             tick: turn.tick,
@@ -169,6 +187,7 @@ impl Seat {
             random: &mut self.random,
             outbox: &mut self.outbox,
             log,
+            left_out: &mut self.left_out,
             gave_up: &mut self.gave_up,
             network,
         };
@@ -190,6 +209,12 @@ impl Seat {
                 robot: welcome.name.clone(),
                 reason,
             });
+        }
+        // Once an epoch, so that the warnings have a bound themselves.
+        if left_out_before == LeftOut::default()
+            && let Some(warning) = self.left_out()
+        {
+            log.push(format!("warning: {warning}"));
         }
         Ok((location, action))
     }
@@ -249,6 +274,7 @@ impl Seat {
         // The simulator would refuse a message beyond the limits, and wait for another one.
         let is_fit = report
             .check()
+            .and_then(|()| check_size(&report))
             .and_then(|()| commands.iter().try_for_each(check_command));
         if let Err(FieldError { field, reason }) = is_fit {
             return Err(RobotError::TooMuch {
@@ -263,6 +289,32 @@ impl Seat {
             report: Arc::new(report),
         })
     }
+}
+
+/// Whether a report fits into a message. Runs without messages have the same limit.
+fn check_size(report: &Report) -> Result<(), FieldError> {
+    if is_small(report) {
+        return Ok(());
+    }
+    match encode(report).len() {
+        0..=MAX_MESSAGE_BYTES => Ok(()),
+        length => Err(FieldError::new(
+            "its report",
+            format!("{length} bytes, more than the {MAX_MESSAGE_BYTES} allowed"),
+        )),
+    }
+}
+
+/// Whether a report fits into a message for certain, without writing it: this runs in every tick.
+fn is_small(report: &Report) -> bool {
+    let mut texts: usize = report.log.iter().map(String::len).sum();
+    texts += report.emotion_state.len() + report.behavior_state.len();
+    for (name, value) in &report.state_variables {
+        texts += name.len() + value.as_str().map_or(0, str::len);
+    }
+
+    let entries = report.log.len() + report.state_variables.len();
+    texts * MAX_ESCAPED + entries * MAX_ENTRY + MAX_REST <= MAX_MESSAGE_BYTES
 }
 
 /// Whether a command stays within the limits of a message.

@@ -201,3 +201,67 @@ fn robots_that_share_a_news_flag_all_run_also_if_only_one_has_news() {
         .collect();
     assert_eq!(proposals, expected);
 }
+
+/// Publishes 300 texts of 4000 bytes.
+struct Librarian;
+
+impl Robot for Librarian {
+    fn init(&mut self, _: &mut Cars<'_>) -> Result<(), BadParameters> {
+        Ok(())
+    }
+
+    fn tick(&mut self, cars: &mut Cars<'_>) -> Action {
+        let mut action = Action::stay(cars);
+        for book in 0..300 {
+            action = action.variable(&format!("book{book}"), "x".repeat(4000));
+        }
+        action
+    }
+}
+
+/// Over the bus it could not be sent.
+#[test]
+fn a_report_that_is_no_message_ends_the_robot_also_in_one_process() {
+    let mut host = LocalHost::new(vec![(Box::new(Librarian), welcome("A"))]);
+    let error = host.exchange(0, BTreeMap::new()).unwrap_err().to_string();
+    assert!(
+        error.starts_with("A says too much: its report: 12")
+            && error.ends_with("bytes, more than the 1048576 allowed"),
+        "{error}"
+    );
+}
+
+/// Writes so many lines in each tick.
+struct Writer(usize);
+
+impl Robot for Writer {
+    fn init(&mut self, _: &mut Cars<'_>) -> Result<(), BadParameters> {
+        Ok(())
+    }
+
+    fn tick(&mut self, cars: &mut Cars<'_>) -> Action {
+        (0..self.0).for_each(|line| cars.log(format!("line {line}")));
+        Action::stay(cars)
+    }
+}
+
+#[test]
+fn lines_that_are_left_out_of_the_log_are_told_once() {
+    let logs = |count: usize| {
+        let mut host = LocalHost::new(vec![(Box::new(Writer(count)), welcome("A"))]);
+        [0, 1].map(|tick| {
+            let outcome = host.exchange(tick, BTreeMap::new()).unwrap();
+            outcome.reports["A"].0.log.clone()
+        })
+    };
+
+    let [first, second] = logs(512);
+    assert_eq!((first.len(), second.len()), (512, 512));
+
+    let [first, second] = logs(600);
+    assert_eq!(
+        first.last().unwrap(),
+        "warning: 88 lines of the log were dropped: the limits are 4096 bytes a line, and 512 lines and 262144 bytes a tick"
+    );
+    assert_eq!((first.len(), second.len()), (513, 512));
+}

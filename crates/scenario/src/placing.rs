@@ -15,6 +15,16 @@ pub(super) struct PlacingError {
     other: Option<RobotName>,
 }
 
+/// The part of a scenario that keeps its bodies from being placed.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum PlacingCause<'a> {
+    Tick,
+    Field,
+    Guests,
+    Obstacle(usize),
+    Robot(&'a RobotName),
+}
+
 /// Places all bodies once.
 pub(super) fn check(scenario: &Scenario) -> Result<(), PlacingError> {
     let stream = protocol::random::stream(scenario.seed, "guests");
@@ -52,20 +62,28 @@ impl PlacingError {
         }
     }
 
-    /// The field of a set-up with the error.
-    pub(super) fn field(&self) -> String {
+    /// The part of the scenario that has to change.
+    pub(super) fn cause(&self) -> PlacingCause<'_> {
         if let Some(robot) = &self.robot {
-            return format!("robots.{robot}");
+            return PlacingCause::Robot(robot);
         }
 
-        let field = match self.error {
-            HallError::ObstacleOffField { .. } => "obstacles",
-            HallError::NoRoom { .. } | HallError::TooManyBodies { .. } => "guests",
-            HallError::OutOfRange { name, .. } if name.contains("guest") => "guest_speed_mps",
-            _ => "field_m",
-        };
+        match self.error {
+            HallError::ObstacleOffField { index, .. } => PlacingCause::Obstacle(index),
+            HallError::NoRoom { .. } | HallError::TooManyBodies { .. } => PlacingCause::Guests,
+            HallError::OutOfRange { name: "tick_s", .. } => PlacingCause::Tick,
+            _ => PlacingCause::Field,
+        }
+    }
 
-        field.to_owned()
+    /// The field of a set-up with the error.
+    pub(super) fn field(&self) -> String {
+        match self.cause() {
+            PlacingCause::Robot(robot) => format!("robots.{robot}"),
+            PlacingCause::Obstacle(_) => "obstacles".to_owned(),
+            PlacingCause::Guests => "guests".to_owned(),
+            PlacingCause::Tick | PlacingCause::Field => "field_m".to_owned(),
+        }
     }
 }
 

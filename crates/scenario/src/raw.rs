@@ -10,10 +10,11 @@ mod unplaced;
 pub(super) mod words;
 
 use std::collections::BTreeMap;
+use std::ops::Range as Span;
 use std::path::{Path, PathBuf};
 
 use config::units::{Length, Speed, Time, quantity};
-use config::{FileError, Source, seed, shipped};
+use config::{FileError, FixedList, Source, seed, shipped};
 use observe::Expectation;
 use protocol::messages::{OnLate, Parameters, Point};
 use protocol::{RobotName, Tick};
@@ -33,10 +34,12 @@ pub(super) use expect::Expectations;
 use super::change::Parent;
 use super::checked::{self, DEFAULT_SEED, Record, RobotSpec};
 use super::lateness::Lateness;
-use super::placing;
+use super::placing::{self, PlacingCause, PlacingError};
 
 /// Most ticks of a scenario.
 const MAX_TICKS: f64 = 1e9;
+/// Longest run, simulated seconds: a recording counts nanoseconds in 64 bits.
+const MAX_DURATION_S: f64 = 18_446_744_073.0;
 /// Most robots of a scenario.
 const MAX_ROBOTS: usize = 1024;
 
@@ -70,7 +73,7 @@ pub(super) struct Scenario {
 #[derive(Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct FieldTable {
-    size: [Length; 2],
+    size: Option<FixedList<Length, 2>>,
     body: Option<Length>,
     max_speed: Option<Speed>,
 }
@@ -102,7 +105,7 @@ struct RecordTable {
 #[derive(Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct Obstacle {
-    at: [Length; 2],
+    at: Spanned<FixedList<Length, 2>>,
 }
 
 #[derive(Debug, Deserialize, Serialize)]
@@ -110,7 +113,7 @@ struct Obstacle {
 struct Robot {
     name: RobotName,
     class: Option<String>,
-    at: [Length; 2],
+    at: FixedList<Length, 2>,
     on_late: Option<OnLate>,
     params_from: Option<Spanned<PathBuf>>,
     #[serde(default)]
@@ -136,7 +139,7 @@ const DURATION: Time = Time(600.0);
 /// Side of every body, 2 ft [D: paper, "Obstacles"].
 const BODY: Length = Length(0.6096);
 /// Size of the field, 50 ft by 50 ft [D: paper, "Experimental Results"].
-const FIELD: [Length; 2] = [Length(15.24), Length(15.24)];
+const FIELD: FixedList<Length, 2> = FixedList([Length(15.24), Length(15.24)]);
 /// Highest speed, 10 ft/s [I]. The fastest shipped robot drives at 4.5 ft/s.
 const MAX_SPEED: Speed = Speed(3.048);
 /// Time without a report after which a robot is late, seconds of wall clock [I].
@@ -192,12 +195,13 @@ impl Scenario {
         let sensing_range = self.sensing.as_ref().map(|table| &table.range);
         let sensing_range_m = positive(source, sensing_range, SENSING_RANGE, "the range")?.0;
         let guests = self.guests(source)?;
-        let guests_span = self.guests.as_ref().map(Spanned::span);
-        let obstacles = self.obstacles.iter().map(|obstacle| point(obstacle.at));
+        let places = Places::of(&self);
+        let obstacles = self.obstacles.iter();
+        let obstacles = obstacles.map(|obstacle| point(*obstacle.at.get_ref()));
         let obstacles = obstacles.collect();
 
         let field = self.field.as_ref().map(Spanned::get_ref);
-        let size = field.map_or(FIELD, |field| field.size);
+        let size = field.and_then(|field| field.size).unwrap_or(FIELD);
         let body = field.and_then(|field| field.body).unwrap_or(BODY);
         let max_speed = field.and_then(|field| field.max_speed);
 
@@ -211,7 +215,7 @@ impl Scenario {
             seed,
             tick_s,
             ticks,
-            field_m: size.map(|length| length.0),
+            field_m: size.0.map(|length| length.0),
             body_m: body.0,
             max_speed_mps: max_speed.unwrap_or(MAX_SPEED).0,
             sensing_range_m,
@@ -229,8 +233,9 @@ impl Scenario {
 
         // A hall that cannot be placed is refused before anything starts.
         if settled == 0 {
-            placing::check(&scenario)
-                .map_err(|error| FileError::at(source, guests_span, &error.to_string()))?;
+            placing::check(&scenario).map_err(|error| {
+                FileError::at(source, places.of_error(&error), &error.to_string())
+            })?;
         }
         scenario.changes = change::check(self.changes, &scenario, source, |changed, at| {
             changed.parse::<Self>()?.check_from(changed, folder, at)
@@ -254,13 +259,22 @@ impl Scenario {
         let duration = self.duration.as_ref();
         let duration_s = positive(source, duration, DURATION, "the duration")?.0;
         let ticks = (duration_s / tick_s).round();
-        let span = duration.map(Spanned::span);
+
+        let tick_span = self.tick.as_ref().map(Spanned::span);
+        let span = duration.map(Spanned::span).or(tick_span);
+        let refuse = |reason: &str| Err(FileError::at(source, span, reason));
         if ticks > MAX_TICKS {
-            return Err(FileError::at(source, span, "more than a billion ticks"));
+            return refuse("more than a billion ticks");
         }
         if ticks < 1.0 {
-            let reason = format!("less than a tick, which lasts {tick_s} s");
-            return Err(FileError::at(source, span, &reason));
+            return refuse(&format!(
+                "the run lasts {duration_s} s, less than a tick, which lasts {tick_s} s"
+            ));
+        }
+        if ticks * tick_s > MAX_DURATION_S {
+            return refuse(&format!(
+                "a run lasts at most {MAX_DURATION_S} s: its times are recorded in nanoseconds, in 64 bits"
+            ));
         }
         Ok(ticks as Tick)
     }
@@ -429,7 +443,42 @@ fn named_parameters(
     read.map_err(|error| error.named_by(&source.name))
 }
 
-fn point([x, y]: [Length; 2]) -> Point {
+/// Where in the file is what can keep a hall from being placed.
+struct Places {
+    tick: Option<Span<usize>>,
+    field: Option<Span<usize>>,
+    guests: Option<Span<usize>>,
+    obstacles: Vec<Span<usize>>,
+    robots: BTreeMap<RobotName, Span<usize>>,
+}
+
+impl Places {
+    fn of(raw: &Scenario) -> Self {
+        let obstacles = raw.obstacles.iter();
+        let robots = raw.robots.iter();
+        Self {
+            tick: raw.tick.as_ref().map(Spanned::span),
+            field: raw.field.as_ref().map(Spanned::span),
+            guests: raw.guests.as_ref().map(Spanned::span),
+            obstacles: obstacles.map(|obstacle| obstacle.at.span()).collect(),
+            robots: robots
+                .map(|robot| (robot.get_ref().name.clone(), robot.span()))
+                .collect(),
+        }
+    }
+
+    fn of_error(&self, error: &PlacingError) -> Option<Span<usize>> {
+        match error.cause() {
+            PlacingCause::Tick => self.tick.clone(),
+            PlacingCause::Field => self.field.clone(),
+            PlacingCause::Guests => self.guests.clone(),
+            PlacingCause::Obstacle(index) => self.obstacles.get(index).cloned(),
+            PlacingCause::Robot(name) => self.robots.get(name).cloned(),
+        }
+    }
+}
+
+fn point(FixedList([x, y]): FixedList<Length, 2>) -> Point {
     Point::new(x.0, y.0)
 }
 
@@ -484,7 +533,7 @@ impl From<&checked::Scenario> for Scenario {
         let tick_s = scenario.tick_s;
         let lateness = &scenario.lateness;
         let field = FieldTable {
-            size: scenario.field_m.map(Length),
+            size: Some(FixedList(scenario.field_m.map(Length))),
             body: Some(Length(scenario.body_m)),
             max_speed: Some(Speed(scenario.max_speed_mps)),
         };
@@ -502,7 +551,9 @@ impl From<&checked::Scenario> for Scenario {
         let changes = changes.map(|change| unplaced(ChangeTable::of(change, tick_s)));
         let expectations = scenario.expectations.iter().cloned().map(unplaced);
         let obstacles = scenario.obstacles.iter();
-        let obstacles = obstacles.map(|at| Obstacle { at: lengths(*at) });
+        let obstacles = obstacles.map(|at| Obstacle {
+            at: unplaced(lengths(*at)),
+        });
         let robots = scenario.robots.iter();
         let robots = robots.map(|(name, spec)| unplaced(Robot::of(name, spec, lateness)));
 
@@ -568,8 +619,8 @@ impl Robot {
     }
 }
 
-fn lengths(at: Point) -> [Length; 2] {
-    [Length(at.x), Length(at.y)]
+fn lengths(at: Point) -> FixedList<Length, 2> {
+    FixedList([Length(at.x), Length(at.y)])
 }
 
 /// The inverse of [`to_json`]; parameters come from TOML, which has no `null`.

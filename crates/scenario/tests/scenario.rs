@@ -40,6 +40,13 @@ fn units_become_si_and_defaults_are_those_of_the_paper() {
 }
 
 #[test]
+fn a_field_without_a_size_has_that_of_the_paper() {
+    let scenario = parse("[field]\nmax_speed = \"5 ft/s\"\n").unwrap();
+    assert_eq!(scenario.field_m, [15.24, 15.24]);
+    assert_eq!(scenario.max_speed_mps, 1.524);
+}
+
+#[test]
 fn parameters_reach_robots_in_si_units() {
     let text = "[[robot]]\nname = \"Butler\"\nat = [\"5 m\", \"5 m\"]\n\
                 params = { speed = \"1 ft/s\", refiller = \"Vonda\", count = 3, nested = { wait = \"2 min\" } }\n";
@@ -83,7 +90,48 @@ fn errors_show_line_place_and_reason() {
             "2 │ duration",
             "less than a tick, which lasts 0.5 s",
         ),
+        (
+            "tick = \"1000000 s\"\nduration = \"2e10 s\"\n",
+            "2 │ duration",
+            "at most 18446744073 s",
+        ),
+        ("tick = \"2000 s\"\n", "1 │ tick", "less than a tick"),
+        (
+            "duration = \"1e7 s\"\ntick = \"2e6 s\"\n",
+            "2 │ tick",
+            "from 1e-6 to 1000000.0",
+        ),
         ("seed = 9007199254740992\n", "1 │ seed", "2^53"),
+        (
+            "[field]\nsize = [\"50 ft\", \"50 ft\", \"10 ft\"]\n",
+            "[hall.toml:2:27]",
+            "a list of exactly 2 elements",
+        ),
+        (
+            "[[obstacle]]\nat = [\"10 ft\", \"10 ft\", \"0 ft\"]\n",
+            "2 │ at",
+            "a list of exactly 2 elements",
+        ),
+        (
+            "[[robot]]\nname = \"A\"\nat = [\"4 ft\", \"4 ft\", \"1 ft\", \"garbage\"]\n",
+            "3 │ at",
+            "string \"1 ft\"",
+        ),
+        (
+            "[[robot]]\nname = \"A\"\nat = [\"4 ft\"]\n",
+            "3 │ at",
+            "a list of exactly 2 elements",
+        ),
+        (
+            "[[obstacle]]\nat = [\"9 m\", \"1 m\"]\n[[obstacle]]\nat = [\"99 m\", \"1 m\"]\n",
+            "4 │ at",
+            "obstacle 1",
+        ),
+        (
+            "[[robot]]\nname = \"A\"\nat = [\"1 m\", \"1 m\"]\n[[robot]]\nname = \"B\"\nat = [\"99 m\", \"1 m\"]\n",
+            "4 │ [[robot]]",
+            "robot B",
+        ),
         (
             "on_late = \"panic\"\n",
             "1 │ on_late",

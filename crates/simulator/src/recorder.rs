@@ -276,10 +276,10 @@ impl Recorder {
         self.write_noted()?;
 
         let mut lines = Vec::new();
-        let time_s = simulation.time_s(record.tick);
+        let tick_s = simulation.scenario().tick_s;
         for event in record.events.iter() {
             self.summary.count(simulation, record.tick, event);
-            lines.extend(event.log_record(simulation.epoch(), record.tick, time_s));
+            lines.extend(event.log_record(simulation.epoch(), record.tick, tick_s));
         }
         let mut wall = Wall::default();
         let mut panels = BTreeMap::new();

@@ -95,6 +95,8 @@ pub struct Simulation {
     /// state of the last tick already is a matter of real time.
     stopped: Vec<RobotName>,
     blocked: Vec<bool>,
+    /// Moves that were refused because they were too fast, by robot.
+    too_fast: BTreeMap<RobotName, u64>,
     /// Generation of each robot's last participation in this epoch, and its incarnation, counted from 1 in the epoch. The
     /// record has incarnations, because generations also count processes that never took part.
     incarnations: BTreeMap<RobotName, (Generation, u32)>,
@@ -146,6 +148,7 @@ impl Simulation {
             late: BTreeMap::new(),
             newcomers: Vec::new(),
             stopped: Vec::new(),
+            too_fast: BTreeMap::new(),
             incarnations: BTreeMap::new(),
             sent: BTreeMap::new(),
             between: Vec::new(),
@@ -513,10 +516,49 @@ impl Simulation {
             let by = self.blocker(*verdict);
             self.blocked[index] = by.is_some();
             if let Some(by) = by {
+                if by == Blocker::TooFast {
+                    self.note_too_fast(index);
+                }
                 self.events.push(Event::Blocked {
                     robot: self.names[index].clone(),
                     by,
                     at: to_wire(self.world.robots()[index]),
+                });
+            }
+        }
+    }
+
+    /// Warns of the first move of a robot that is too fast, and counts them.
+    fn note_too_fast(&mut self, index: usize) {
+        let robot = &self.names[index];
+        let count = self.too_fast.entry(robot.clone()).or_default();
+        *count += 1;
+        if *count > 1 {
+            return;
+        }
+
+        let at = to_wire(self.world.robots()[index]);
+        let proposal = self.reports.get(robot).map_or(at, |report| report.proposal);
+        let max_mps = self.scenario.max_speed_mps;
+        self.events.push(Event::Warned {
+            robot: robot.clone(),
+            text: format!(
+                "it proposed to move {:.3} m in a tick and stays: at most {max_mps} m/s, {:.3} m in {} s, is allowed \
+                 (max_speed of the scenario)",
+                at.distance_m(proposal),
+                max_mps * self.scenario.tick_s,
+                self.scenario.tick_s
+            ),
+        });
+    }
+
+    /// Says how often moves were too fast, where the first warning does not say all.
+    fn count_too_fast(&self, events: &mut Vec<Event>) {
+        for (robot, count) in &self.too_fast {
+            if *count > 1 {
+                events.push(Event::Warned {
+                    robot: robot.clone(),
+                    text: format!("{count} of its moves were refused because they were too fast"),
                 });
             }
         }
@@ -806,6 +848,7 @@ impl Simulation {
     #[must_use]
     pub fn end_waiting(&mut self, reason: End, waited_for: Vec<WaitedFor>) -> TickRecord {
         let mut events = self.watches.end(reason);
+        self.count_too_fast(&mut events);
         events.push(Event::End {
             reason,
             waited_for,
@@ -962,7 +1005,7 @@ impl Simulation {
     /// Simulated time of a tick, seconds.
     #[must_use]
     pub fn time_s(&self, tick: Tick) -> f64 {
-        tick as f64 * self.scenario.tick_s
+        protocol::time::time_s(tick, self.scenario.tick_s)
     }
 
     /// The robots, in the order of their names.

@@ -8,9 +8,9 @@ use std::path::Path;
 use std::sync::Arc;
 
 use lockstep::{Bulletin, Exchange, Naming, Outcome, Sent};
-use protocol::event::{Blocker, Cause};
+use protocol::event::{Blocker, Cause, log_line};
 use protocol::messages::{
-    CommandText, Delivery, News, Performative, Point, Report, SensedKind, StateVariables,
+    CommandText, Delivery, End, News, Performative, Point, Report, SensedKind, StateVariables,
 };
 use protocol::{RobotName, RunName, Tick};
 use scenario::Scenario;
@@ -235,6 +235,42 @@ fn no_robot_leaves_the_field_or_jumps() {
     assert_eq!(simulation.location(&name("A")), Some(Point::new(1.5, 2.0)));
     assert_eq!(simulation.location(&name("B")), Some(Point::new(4.0, 2.0)));
     assert_eq!(blockers(&records[1]), [Blocker::Edge, Blocker::TooFast]);
+}
+
+#[test]
+fn moves_that_are_too_fast_are_told_once_with_the_limit_and_counted_at_the_end() {
+    let (mut simulation, _, mut records) = play(TWO, 4, |name, report, _| {
+        report.proposal.x += if name.as_str() == "B" { 5.0 } else { 0.0 };
+    });
+    records.push(simulation.end(End::Finished));
+
+    let mut warnings = vec![];
+    for record in &records {
+        for event in record.events.iter() {
+            if let Event::Warned { robot, text } = event {
+                warnings.push(format!("{} {robot} {text}", record.tick));
+            }
+        }
+    }
+    assert_eq!(
+        warnings,
+        [
+            "1 B it proposed to move 5.000 m in a tick and stays: at most 3.048 m/s, 1.524 m in 0.5 s, is allowed (max_speed of \
+             the scenario)",
+            "4 B 4 of its moves were refused because they were too fast",
+        ]
+    );
+    let line = records[1].events.iter().find_map(|event| {
+        let record = event.log_record(1, 1, 0.5)?;
+        record
+            .text
+            .starts_with("warning: ")
+            .then(|| log_line(&record))
+    });
+    assert!(
+        line.unwrap()
+            .starts_with("      0.5 s  B            warning: it proposed")
+    );
 }
 
 #[test]

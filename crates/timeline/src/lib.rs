@@ -81,6 +81,7 @@ impl States {
             | Event::Fault { .. }
             | Event::Changed { .. }
             | Event::Say { .. }
+            | Event::Warned { .. }
             | Event::Judged { .. }
             | Event::Tick { .. }
             | Event::End { .. } => Vec::new(),

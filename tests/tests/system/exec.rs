@@ -5,5 +5,6 @@ mod forging;
 mod limits;
 mod program;
 mod rubbish;
+mod silence;
 mod skeletons;
 mod stage;

@@ -222,3 +222,30 @@ fn a_launch_survives_its_terminal() {
         }
     }
 }
+
+/// Three ticks of 25 ms end at 0.075 s, which is not 3 * 0.025 in floating point.
+#[test]
+fn times_have_the_decimals_of_the_tick_and_are_the_same_in_every_table() {
+    let lab = Lab::new();
+    let scenario = "tick = \"25 ms\"\nduration = \"100 ms\"\n[[robot]]\nname = \"Butler\"\nat = [\"5 m\", \"5 m\"]\n";
+    let scenario = lab.write("quick.toml", scenario).display().to_string();
+    let printed = lab.ok(&["run", &scenario, "--run", "decimals"]);
+    assert!(printed.contains("after 0.100 s (4 ticks)"), "{printed}");
+
+    let log = std::fs::read_to_string(lab.file("decimals", "cars.log")).unwrap();
+    let times: Vec<&str> = log
+        .lines()
+        .filter_map(|line| line.split_whitespace().next())
+        .collect();
+    assert_eq!(times.first(), Some(&"0.000"), "{log}");
+    assert_eq!(times.last(), Some(&"0.100"), "{log}");
+
+    let to = lab.out().join("tables").display().to_string();
+    lab.ok(&["export", "decimals", "-o", &to, "--csv"]);
+    for table in ["events", "states"] {
+        let file = lab.out().join("tables").join(format!("{table}.csv"));
+        let text = std::fs::read_to_string(file).unwrap();
+        let at_3 = text.lines().find(|line| line.starts_with("1,3,")).unwrap();
+        assert!(at_3.starts_with("1,3,0.075,"), "{table}: {at_3}");
+    }
+}

@@ -487,6 +487,10 @@ export interface Status {
    */
   tick: number;
   /**
+   * Length of a tick, simulated seconds; 0 if it is not known.
+   */
+  tick_s?: number;
+  /**
    * Simulated time at `tick`, seconds.
    */
   time_s: number;
@@ -545,6 +549,10 @@ export interface LogRecord {
    * The tick.
    */
   tick: number;
+  /**
+   * Length of a tick, seconds, which decides about the decimals of the time; 0 if it is not known.
+   */
+  tick_s?: number;
   /**
    * Simulated time, seconds.
    */

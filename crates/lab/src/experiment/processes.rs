@@ -7,6 +7,7 @@ use config::FileError;
 use miette::{IntoDiagnostic, miette};
 use observe::Observation;
 use protocol::Event;
+use protocol::time::time_s;
 use recording::{Recording, Ticks};
 use scenario::Scenario;
 use simulator::RunFolder;
@@ -186,7 +187,7 @@ fn read(scenario: &Scenario, run: &RunFolder, follower: &mut impl Follow) -> mie
         {
             follower.observe(&Observation {
                 tick: number,
-                time_s: number as f64 * scenario.tick_s,
+                time_s: time_s(number, scenario.tick_s),
                 events: &events,
                 state: &|robot| states.of(robot),
             });

@@ -145,6 +145,7 @@ fn own_event(event: &Event) -> Option<(&RobotName, String)> {
         Event::Emotion { robot, to, .. } => (robot, format!("emotion {to}")),
         Event::Behavior { robot, to, .. } => (robot, format!("behavior {to}")),
         Event::Say { robot, text } => (robot, format!("says: {text}")),
+        Event::Warned { robot, text } => (robot, format!("warning: {text}")),
         _ => return None,
     };
     Some(named)

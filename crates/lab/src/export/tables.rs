@@ -5,6 +5,7 @@ use std::path::Path;
 use config::FileError;
 use protocol::event::Blocker;
 use protocol::messages::{Report, Variable};
+use protocol::time::time_s;
 use protocol::{Epoch, Event, RobotName, Seq, Tick};
 use recording::{PlacedRobot, RecordedTick, Recording, RecordingError, Ticks};
 use serde::Serialize;
@@ -150,7 +151,7 @@ fn add_events(sheet: &mut Sheet, files: &EpochFiles) -> Result<Option<Entry>, Fi
         let when = When {
             epoch: files.epoch,
             tick: entry.tick,
-            time_s: entry.tick as f64 * tick_s,
+            time_s: time_s(entry.tick, tick_s),
         };
         for event in &entry.events {
             sheet.add(when.cells().into_iter().chain(event_cells(event)))?;
@@ -254,7 +255,7 @@ fn add_recording(
         let when = When {
             epoch: files.epoch,
             tick: tick.tick(),
-            time_s: tick.tick() as f64 * tick_s,
+            time_s: time_s(tick.tick(), tick_s),
         };
         add_states(states, variables, when, &tick)?;
         count += 1;
@@ -350,7 +351,8 @@ fn event_cells(event: &Event) -> Vec<Cell<'_>> {
         | Event::Emotion { .. }
         | Event::Behavior { .. }
         | Event::Fault { .. }
-        | Event::Say { .. } => robot_cells(event),
+        | Event::Say { .. }
+        | Event::Warned { .. } => robot_cells(event),
         Event::CommandSent { .. }
         | Event::CommandDelivered { .. }
         | Event::CommandDropped { .. }
@@ -406,7 +408,7 @@ fn robot_cells(event: &Event) -> Vec<Cell<'_>> {
             ("fault", json_name(kind)),
             ("begins", (*begins).into()),
         ],
-        Event::Say { robot, text } => vec![
+        Event::Say { robot, text } | Event::Warned { robot, text } => vec![
             ("robot", robot.as_str().into()),
             ("text", text.as_str().into()),
         ],

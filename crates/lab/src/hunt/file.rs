@@ -8,6 +8,7 @@ use config::shipped;
 use miette::{IntoDiagnostic, miette};
 use protocol::name::MAX_NAME_LEN;
 use protocol::plain::escape_line;
+use protocol::time::time_s;
 use toml::Value;
 
 use super::case::Case;
@@ -161,7 +162,7 @@ fn described(fault: &PlannedFault, played: &Played, tick_s: f64) -> String {
         Some(message) => format!(
             "{words}: \"{}\", sent at {} s",
             message.text,
-            message.tick as f64 * tick_s
+            time_s(message.tick, tick_s)
         ),
         None => words,
     }

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use config::FileError;
 use protocol::messages::{End, Verdict};
+use protocol::time::time_s;
 use protocol::{Event, RobotName, Tick};
 use recording::{Recording, RecordingError};
 use report::{Band, Floor};
@@ -137,7 +138,7 @@ impl RunFacts {
 
     /// Simulated time of the last complete tick, seconds.
     pub(super) fn time_s(&self) -> f64 {
-        self.last_tick as f64 * self.tick_s
+        time_s(self.last_tick, self.tick_s)
     }
 
     /// The sum over all links.

@@ -4,8 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use miette::miette;
-use protocol::RobotName;
 use protocol::messages::{End, Variable};
+use protocol::time::{self, tick_seconds, time_s};
+use protocol::{RobotName, Tick};
 use report::{BandRow, Cell, Column, Figure, Page, Panel, Part, State, Table};
 use simulator::{EpochFiles, RunFolder, Summary};
 
@@ -123,9 +124,9 @@ fn write_lead(page: &mut Page, runs: &[Run]) {
     if let [run] = runs {
         let facts = &run.facts;
         let text = format!(
-            "The run {} after {:.1} s of simulated time ({} ticks of {} s), with seed {} and {}.",
+            "The run {} after {} s of simulated time ({} ticks of {} s), with seed {} and {}.",
             ending(facts.end),
-            facts.time_s(),
+            tick_seconds(facts.last_tick, facts.tick_s),
             facts.last_tick,
             facts.tick_s,
             facts.seed,
@@ -257,7 +258,7 @@ fn runs_table(runs: &[Run]) -> Table {
             Cell::text(&run.name),
             Cell::Count(facts.seed),
             Cell::text(end),
-            Cell::Number(facts.time_s(), 1),
+            time_cell(facts.last_tick, facts.tick_s),
             Cell::Count(commands.sent),
             Cell::Count(commands.delivered),
             Cell::Count(commands.dropped),
@@ -542,7 +543,7 @@ fn write_expectations(page: &mut Page, runs: &[Run]) {
                     Cell::text(&run.name),
                     Cell::text(&one.expectation),
                     Cell::text(one.verdict.to_string()),
-                    Cell::Number(one.tick as f64 * run.facts.tick_s, 1),
+                    time_cell(one.tick, run.facts.tick_s),
                     Cell::text(&one.because),
                 ]);
             }
@@ -563,17 +564,22 @@ fn write_expectations(page: &mut Page, runs: &[Run]) {
     page.table(&[Part::text(caption)], &table);
 }
 
+/// The time of a tick, with the decimals that it needs.
+fn time_cell(tick: Tick, tick_s: f64) -> Cell {
+    Cell::Number(time_s(tick, tick_s), time::decimals(tick_s))
+}
+
 fn disturbance_row(run: &Run, one: &Disturbance) -> Vec<Cell> {
     let tick_s = run.facts.tick_s;
     let end = match one.end {
-        Some(end) => Cell::Number(end as f64 * tick_s, 1),
+        Some(end) => time_cell(end, tick_s),
         None => Cell::text("the end"),
     };
     vec![
         Cell::text(&run.name),
         Cell::text(&one.what),
         Cell::text(&one.whom),
-        Cell::Number(one.begin as f64 * tick_s, 1),
+        time_cell(one.begin, tick_s),
         end,
     ]
 }

@@ -14,8 +14,23 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+/// Fields of a line `done`.
+const DONE_FIELDS: &[&str] = &[
+    "proposal",
+    "speed_mps",
+    "direction_rad",
+    "emotion_state",
+    "behavior_state",
+    "state_variables",
+];
+/// Most unknown fields that are named.
+const MAX_UNKNOWN: usize = 5;
+/// Most characters of an unknown field that are shown.
+const MAX_NAME_CHARS: usize = 40;
 /// Most characters of a bad line in an error.
 const QUOTED: usize = 200;
+/// The byte order mark, with which some languages begin a stream in UTF-8.
+const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
 /// The lines that a program may write, for errors.
 const EXPECTED: &str = "expected is one JSON object a line with a \"type\" of query, percept, random, command, log, panel or \
                         done";
@@ -144,6 +159,36 @@ impl<'a> ToProgram<'a> {
     }
 }
 
+/// A line from the program, as it was read.
+#[derive(Debug)]
+pub(super) struct ReadLine {
+    pub(super) message: FromProgram,
+    pub(super) unknown: Option<UnknownFields>,
+}
+
+/// Fields of a line that have no meaning, and are ignored.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) struct UnknownFields {
+    /// The type of the line.
+    pub(super) kind: &'static str,
+    names: Vec<String>,
+    known: &'static [&'static str],
+}
+
+impl std::fmt::Display for UnknownFields {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let names: Vec<String> = self.names.iter().map(|name| format!("`{name}`")).collect();
+        let fields = if names.len() == 1 { "field" } else { "fields" };
+        write!(
+            f,
+            "unknown {fields} {} of a line `{}` ignored; its fields are {}",
+            names.join(", "),
+            self.kind,
+            self.known.join(", ")
+        )
+    }
+}
+
 /// A line from the program.
 #[derive(Debug)]
 pub(super) enum FromProgram {
@@ -200,30 +245,36 @@ struct RawDone {
     state_variables: BTreeMap<String, Value>,
 }
 
-impl FromProgram {
+impl ReadLine {
     /// Reads a line.
     ///
     /// # Errors
     /// A sentence that quotes the line and names what is expected.
-    pub(super) fn read(line: &[u8]) -> Result<Self, String> {
+    pub(super) fn of(line: &[u8]) -> Result<Self, String> {
         parse(line)
             .map_err(|reason| format!("its line {} is not understood: {reason}", quote(line)))
     }
+}
 
+impl FromProgram {
     /// Whether the line becomes part of the report of the tick.
     pub(super) fn is_reported(&self) -> bool {
         matches!(self, Self::Command(_) | Self::Log(_) | Self::Done(_))
     }
 }
 
-fn parse(line: &[u8]) -> Result<FromProgram, String> {
+fn parse(line: &[u8]) -> Result<ReadLine, String> {
+    if line.starts_with(BYTE_ORDER_MARK) {
+        return Err("it begins with a byte order mark (U+FEFF): write UTF-8 without it".to_owned());
+    }
+
     let value: Value = serde_json::from_slice(line)
         .map_err(|error| format!("it is not valid JSON ({error}); {EXPECTED}"))?;
     let Some(kind) = value.get("type").and_then(Value::as_str) else {
         return Err(format!("it has no type; {EXPECTED}"));
     };
 
-    Ok(match kind {
+    let message = match kind {
         "query" => FromProgram::Query(fields(&value)?),
         "percept" => FromProgram::Percept,
         "random" => FromProgram::Random,
@@ -232,7 +283,48 @@ fn parse(line: &[u8]) -> Result<FromProgram, String> {
         "panel" => FromProgram::Panel(check(fields(&value)?)?),
         "done" => FromProgram::Done(check_done(fields(&value)?)?),
         unknown => return Err(format!("there is no type {unknown:?}; {EXPECTED}")),
-    })
+    };
+    let unknown = unknown_fields(&message, &value);
+    Ok(ReadLine { message, unknown })
+}
+
+/// The fields of a line that have no meaning: mistakes in writing, or meant for a later version.
+fn unknown_fields(message: &FromProgram, value: &Value) -> Option<UnknownFields> {
+    let (kind, known): (_, &[_]) = match message {
+        FromProgram::Query(_) => ("query", &["of", "what"]),
+        FromProgram::Percept => ("percept", &["type"]),
+        FromProgram::Random => ("random", &["type"]),
+        FromProgram::Command(_) => ("command", &["to", "command"]),
+        FromProgram::Log(_) => ("log", &["text"]),
+        FromProgram::Panel(_) => ("panel", &["widgets"]),
+        FromProgram::Done(_) => ("done", DONE_FIELDS),
+    };
+
+    let mut names = Vec::new();
+    for name in keys(value) {
+        if name != "type" && !known.contains(&name) {
+            names.push(shown(name));
+        }
+    }
+    for name in value.get("proposal").into_iter().flat_map(keys) {
+        if kind == "done" && !matches!(name, "x" | "y") {
+            names.push(format!("proposal.{}", shown(name)));
+        }
+    }
+    names.truncate(MAX_UNKNOWN);
+
+    let is_any = !names.is_empty();
+    is_any.then_some(UnknownFields { kind, names, known })
+}
+
+fn keys(value: &Value) -> impl Iterator<Item = &str> {
+    let object = value.as_object().into_iter();
+    object.flat_map(|object| object.keys().map(String::as_str))
+}
+
+/// A name for the log, in one line and not too long.
+fn shown(name: &str) -> String {
+    escape_line(&name.chars().take(MAX_NAME_CHARS).collect::<String>())
 }
 
 fn fields<T: DeserializeOwned>(value: &Value) -> Result<T, String> {
@@ -394,7 +486,7 @@ mod tests {
 
     #[test]
     fn a_tick_may_end_with_no_more_than_its_type() {
-        let FromProgram::Done(done) = FromProgram::read(b"{\"type\":\"done\"}\n").unwrap() else {
+        let FromProgram::Done(done) = read(b"{\"type\":\"done\"}\n") else {
             panic!("it is done")
         };
         assert_eq!(
@@ -402,7 +494,7 @@ mod tests {
             (None, 0.0, "")
         );
         let text = br#"{"type":"done","new":1,"proposal":{"x":1,"y":-0.1},"state_variables":{"a":7,"b":true,"c":"d"}}"#;
-        let FromProgram::Done(done) = FromProgram::read(text).unwrap() else {
+        let FromProgram::Done(done) = read(text) else {
             panic!("it is done")
         };
         assert_eq!(done.proposal, Some(Point::new(1.0, -0.1)));
@@ -415,10 +507,82 @@ mod tests {
         );
     }
 
+    fn read(line: &[u8]) -> FromProgram {
+        ReadLine::of(line).unwrap().message
+    }
+
+    #[test]
+    fn unknown_fields_are_named_and_known_ones_are_not() {
+        for (line, unknown) in [
+            (
+                r#"{"type":"done","propsal":{"x":1,"y":2}}"#,
+                Some(
+                    "unknown field `propsal` of a line `done` ignored; its fields are proposal, speed_mps",
+                ),
+            ),
+            (
+                r#"{"type":"done","proposal":{"x":1,"y":2,"z":3}}"#,
+                Some("unknown field `proposal.z`"),
+            ),
+            (
+                r#"{"type":"query","of":"A","what":"speed","a":1,"b":2}"#,
+                Some("unknown fields `a`, `b` of a line `query`"),
+            ),
+            (
+                r#"{"type":"percept","of":"A"}"#,
+                Some("unknown field `of` of a line `percept`"),
+            ),
+            (
+                r#"{"type":"random","\u001b":1}"#,
+                Some(r"unknown field `\u{1b}` of a line `random`"),
+            ),
+            (
+                r#"{"type":"done","proposal":{"x":1,"y":2},"speed_mps":1,"direction_rad":1,"emotion_state":"","behavior_state":"","state_variables":{"any":1}}"#,
+                None,
+            ),
+            (r#"{"type":"command","to":"A","command":"go"}"#, None),
+            (r#"{"type":"log","text":"proposal"}"#, None),
+            (r#"{"type":"panel","widgets":[]}"#, None),
+        ] {
+            let found = ReadLine::of(line.as_bytes()).unwrap().unknown;
+            let found = found.map(|unknown| unknown.to_string());
+            match unknown {
+                None => assert_eq!(found, None, "{line}"),
+                Some(expected) => assert!(
+                    found
+                        .as_ref()
+                        .is_some_and(|found| found.starts_with(expected)),
+                    "{line}: {found:?}"
+                ),
+            }
+        }
+    }
+
+    #[test]
+    fn a_proposal_is_an_object() {
+        let wrong = ReadLine::of(br#"{"type":"done","proposal":[1,2]}"#).unwrap_err();
+        assert!(
+            wrong.contains(
+                "field proposal: invalid type: sequence, expected an object with the fields x and y"
+            ),
+            "{wrong}"
+        );
+    }
+
+    #[test]
+    fn a_byte_order_mark_is_named() {
+        let wrong = ReadLine::of("\u{feff}{\"type\":\"done\"}\n".as_bytes()).unwrap_err();
+        assert_eq!(
+            wrong,
+            "its line `\\u{feff}{\"type\":\"done\"}` is not understood: it begins with a byte order mark (U+FEFF): write UTF-8 \
+             without it"
+        );
+    }
+
     #[test]
     fn a_bad_line_is_quoted_in_part_and_harmless() {
-        let wrong = FromProgram::read(format!("\u{1b}[2J{}\r\n", "\u{e9}".repeat(300)).as_bytes())
-            .unwrap_err();
+        let wrong =
+            ReadLine::of(format!("\u{1b}[2J{}\r\n", "\u{e9}".repeat(300)).as_bytes()).unwrap_err();
         assert!(
             wrong.starts_with("its line `\\u{1b}[2J\u{e9}\u{e9}"),
             "{wrong}"

@@ -191,8 +191,9 @@ impl Program {
         let _woken = self.queue.try_send(ProgramEvent::Interrupted);
     }
 
-    /// Sends the line `end` and closes the pipe; kills the program if it does not exit in time.
-    pub(super) fn end(self: &Arc<Self>, reason: EndReason) {
+    /// Sends the line `end` and closes the pipe; kills the program if it does not exit in time. Returns what is wrong with its
+    /// end, which no other line tells.
+    pub(super) fn end(self: &Arc<Self>, reason: EndReason) -> Option<String> {
         // A program that does not read blocks this thread until it is killed.
         let program = self.clone();
         let says_so = start_thread(move || {
@@ -204,10 +205,25 @@ impl Program {
             drop(lock(&self.stdin).take());
         }
 
-        if self.wait(END_PATIENCE).is_none() {
+        if self.wait(END_PATIENCE).is_none() && !self.has_exited() {
             self.kill();
             self.wait(END_PATIENCE);
+            return Some(format!(
+                "its program had not exited {} s after the line `end`, and was killed",
+                END_PATIENCE.as_secs()
+            ));
         }
+
+        let status = self.wait(END_PATIENCE).filter(|status| !status.success())?;
+        Some(format!(
+            "its program {} after the line `end`, where exit status 0 is expected",
+            Ended::Exited(status)
+        ))
+    }
+
+    /// Whether the process has exited, although another one may hold its pipes.
+    fn has_exited(&self) -> bool {
+        matches!(lock(&self.child).try_wait(), Ok(Some(_)))
     }
 
     /// Kills the program.

@@ -10,8 +10,11 @@ use protocol::random::unit;
 use robot::{Action, BadParameters, CallError, Cars, ReceivedCommand, Robot};
 use serde_json::Value;
 
-use super::line::{Answered, Arrived, Done, FromProgram, Query, ToProgram, quote};
+use super::line::{
+    Answered, Arrived, Done, FromProgram, Query, ReadLine, ToProgram, UnknownFields, quote,
+};
 use super::program::{MAX_LINE, Program, ProgramEvent};
+use super::remarks::Remarks;
 
 /// Most lines that a program may write in a tick.
 const MAX_LINES: usize = 1 << 16;
@@ -30,6 +33,7 @@ pub(super) struct Proxy {
     silence: Option<String>,
     /// Whether the line `init` was the last one that the program was sent, so that it may be answering it.
     is_initializing: bool,
+    remarks: Remarks,
     /// The last line `done`.
     done: Done,
     panel: Panel,
@@ -40,12 +44,14 @@ impl Proxy {
         program: Arc<Program>,
         events: Receiver<ProgramEvent>,
         silence: String,
+        remarks: Remarks,
     ) -> Self {
         Self {
             program,
             events,
             silence: Some(silence),
             is_initializing: false,
+            remarks,
             done: Done::default(),
             panel: Panel::default(),
         }
@@ -82,7 +88,10 @@ impl Proxy {
                 other => return Err(self.failure(other)),
             };
 
-            let message = FromProgram::read(&line)?;
+            let ReadLine { message, unknown } = ReadLine::of(&line)?;
+            if let Some(unknown) = unknown {
+                self.remark(cars, &unknown);
+            }
             if message.is_reported() {
                 reported += line.len();
             }
@@ -102,6 +111,13 @@ impl Proxy {
         Err(format!(
             "its program said more than {MAX_LINES} lines in one tick and not done"
         ))
+    }
+
+    /// Explains the first unknown fields of a type of lines in the log of the run.
+    fn remark(&self, cars: &mut Cars<'_>, unknown: &UnknownFields) {
+        if self.remarks.add(unknown.kind) {
+            cars.log(format!("warning: {unknown}"));
+        }
     }
 
     /// Waits for the next event of the program. The first long wait is reported.
@@ -225,6 +241,7 @@ impl Robot for Proxy {
     fn init(&mut self, cars: &mut Cars<'_>) -> Result<(), BadParameters> {
         self.done = Done::default();
         self.panel = Panel::default();
+        self.remarks.start_over();
 
         let welcome = cars.welcome();
         let begun = self.begin(&ToProgram::init(welcome, cars.tick(), cars.sensed_robots()));

@@ -2,6 +2,7 @@
 
 use config::units::Time;
 use protocol::messages::{Point, Variable};
+use protocol::time::tick_seconds;
 use protocol::{Event, RobotName, Tick};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -667,7 +668,7 @@ fn unpublished(robot: &RobotName, variable: &str) -> String {
 
 /// A tick and its time, in words.
 pub(super) fn place(tick: Tick, tick_s: f64) -> String {
-    format!("tick {tick} ({:.1} s)", tick as f64 * tick_s)
+    format!("tick {tick} ({} s)", tick_seconds(tick, tick_s))
 }
 
 fn number(state: RobotState<'_>, variable: &str) -> Option<f64> {

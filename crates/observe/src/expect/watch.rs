@@ -2,6 +2,7 @@
 
 use config::units::Time;
 use protocol::messages::{End, Standing, Verdict};
+use protocol::time::tick_seconds;
 use protocol::{Event, RobotName, Tick};
 
 use super::condition::{Evaluation, first_event, place, shortened};
@@ -214,9 +215,9 @@ impl Watch {
                 )
             }
             Rule::After { .. } | Rule::Eventually { .. } => format!(
-                "it happened each time ({}) until {here}, at the latest after {:.1} s",
+                "it happened each time ({}) until {here}, at the latest after {} s",
                 self.met,
-                self.longest as f64 * self.tick_s
+                tick_seconds(self.longest, self.tick_s)
             ),
         };
         Judgment::new(Verdict::Pass, because)

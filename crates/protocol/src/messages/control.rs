@@ -418,6 +418,9 @@ pub struct Status {
     pub time_s: f64,
     /// Simulated time at which the run ends, seconds.
     pub duration_s: f64,
+    /// Length of a tick, simulated seconds; 0 if it is not known.
+    #[serde(default)]
+    pub tick_s: f64,
     /// Seed of the epoch.
     pub seed: u64,
     /// The recorded run of which this is a replay; none in a run in progress.

@@ -5,6 +5,8 @@ use crate::codec::FieldError;
 
 /// Longest text in a message, in bytes: a command, a state's name, a log line.
 pub const MAX_TEXT_BYTES: usize = 4096;
+/// Longest line of the log, in bytes: an event tells of at most two texts, in its own words.
+pub const MAX_LINE_BYTES: usize = 4 * MAX_TEXT_BYTES;
 /// Most entries of any list or map in a message.
 pub const MAX_ENTRIES: usize = 1024;
 
@@ -28,12 +30,17 @@ pub(super) fn counted(tick: Tick, field: &str) -> Result<(), FieldError> {
 
 /// Refuses a text above [`MAX_TEXT_BYTES`].
 pub(super) fn short(text: &str, field: &str) -> Result<(), FieldError> {
-    if text.len() <= MAX_TEXT_BYTES {
+    at_most(MAX_TEXT_BYTES, text, field)
+}
+
+/// Refuses a text of more bytes.
+pub(super) fn at_most(max_bytes: usize, text: &str, field: &str) -> Result<(), FieldError> {
+    if text.len() <= max_bytes {
         return Ok(());
     }
 
     let reason = format!(
-        "{} bytes of text, more than the {MAX_TEXT_BYTES} allowed",
+        "{} bytes of text, more than the {max_bytes} allowed",
         text.len()
     );
     Err(FieldError::new(field, reason))

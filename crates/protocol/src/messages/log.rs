@@ -3,9 +3,13 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::limits::short;
+use super::limits::{MAX_LINE_BYTES, at_most, short};
 use super::numbers::{Epoch, Tick};
 use crate::codec::{FieldError, Message, as_json};
+use crate::plain::cut;
+
+/// The end of a line that is cut.
+const ELLIPSIS: &str = "...";
 
 /// One line of the log.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -16,6 +20,9 @@ pub struct LogRecord {
     pub tick: Tick,
     /// Simulated time, seconds.
     pub time_s: f64,
+    /// Length of a tick, seconds, which decides about the decimals of the time; 0 if it is not known.
+    #[serde(default)]
+    pub tick_s: f64,
     /// A robot's name, or `simulator`.
     pub source: String,
     /// What kind of line it is.
@@ -29,7 +36,19 @@ impl Message for LogRecord {
 
     fn check(&self) -> Result<(), FieldError> {
         short(&self.source, "source")?;
-        short(&self.text, "text")
+        at_most(MAX_LINE_BYTES, &self.text, "text")
+    }
+}
+
+impl LogRecord {
+    /// The record with a text that fits into a message: a longer one is cut, and says so.
+    #[must_use]
+    pub fn fitted(mut self) -> Self {
+        if self.text.len() > MAX_LINE_BYTES {
+            cut(&mut self.text, MAX_LINE_BYTES - ELLIPSIS.len());
+            self.text.push_str(ELLIPSIS);
+        }
+        self
     }
 }
 
@@ -51,7 +70,7 @@ pub enum LogKind {
     Command,
     /// The medium cut a link, or healed it.
     Network,
-    /// A robot said something.
+    /// A robot said something, or the simulator warns of what a robot does.
     Say,
     /// It was decided whether an expectation is met.
     Verdict,

@@ -17,7 +17,7 @@ pub use control::{
     Presence, ProcessOrder, Range, Reason, RobotStatus, Setup, SetupAnswer, Status,
 };
 pub(crate) use limits::is_false;
-pub use limits::{MAX_ENTRIES, MAX_TEXT_BYTES};
+pub use limits::{MAX_ENTRIES, MAX_LINE_BYTES, MAX_TEXT_BYTES};
 pub use log::{LogKind, LogRecord};
 pub use numbers::{Epoch, Generation, Seq, Tick};
 pub use observe::{

@@ -1,13 +1,14 @@
 //! Places on the field.
 
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::de::{Error, IgnoredAny, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
 
 use super::limits::finite;
 use crate::codec::FieldError;
 
 /// A place on the field: meters from its lower left corner.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, JsonSchema)]
 pub struct Point {
     /// Meters to the right.
     pub x: f64,
@@ -40,5 +41,51 @@ impl Point {
 
         finite(self.x, &format!("{field}.x"))?;
         finite(self.y, &format!("{field}.y"))
+    }
+}
+
+/// A point is an object in every message. A derived implementation would also read a list, `[x, y]`, which no schema allows.
+impl<'de> Deserialize<'de> for Point {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_struct("Point", &["x", "y"], PointVisitor)
+    }
+}
+
+struct PointVisitor;
+
+/// A field of a point.
+#[derive(Deserialize)]
+#[serde(field_identifier, rename_all = "snake_case")]
+enum Field {
+    X,
+    Y,
+    #[serde(other)]
+    Unknown,
+}
+
+impl<'de> Visitor<'de> for PointVisitor {
+    type Value = Point;
+
+    fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("an object with the fields x and y")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Point, A::Error> {
+        let mut x = None;
+        let mut y = None;
+        while let Some(field) = map.next_key()? {
+            match field {
+                Field::X if x.is_some() => return Err(A::Error::duplicate_field("x")),
+                Field::Y if y.is_some() => return Err(A::Error::duplicate_field("y")),
+                Field::X => x = Some(map.next_value()?),
+                Field::Y => y = Some(map.next_value()?),
+                Field::Unknown => drop(map.next_value::<IgnoredAny>()?),
+            }
+        }
+
+        Ok(Point {
+            x: x.ok_or_else(|| A::Error::missing_field("x"))?,
+            y: y.ok_or_else(|| A::Error::missing_field("y"))?,
+        })
     }
 }

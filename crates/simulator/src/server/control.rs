@@ -332,6 +332,7 @@ impl Server {
             pending_steps: self.pace.pending_steps,
             time_s: simulation.time_s(simulation.tick()),
             duration_s: scenario.duration_s(),
+            tick_s: scenario.tick_s,
             seed: scenario.seed,
             replay_of: None,
             phase: self.pace.phase,

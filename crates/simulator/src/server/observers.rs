@@ -10,6 +10,7 @@ use protocol::messages::{
     Awaited, ControlAnswer, Flight, LogKind, LogRecord, MAX_ENTRIES, MAX_FLIGHTS, Presence,
     RobotFrame, Status, WorldFrame,
 };
+use protocol::time::seconds;
 use protocol::{Event, RobotName, Tick};
 
 use crate::simulation::Simulation;
@@ -115,8 +116,8 @@ impl Observers {
             return None;
         }
         let text = format!(
-            "the clock is held at {:.1} s: waiting for {}",
-            status.time_s,
+            "the clock is held at {} s: waiting for {}",
+            seconds(status.time_s, simulation.scenario().tick_s),
             name_all(&status.awaiting)
         );
         let line = self.late(simulation, &text);
@@ -139,10 +140,12 @@ impl Observers {
             epoch: simulation.epoch(),
             tick,
             time_s: simulation.time_s(tick),
+            tick_s: simulation.scenario().tick_s,
             source: "simulator".to_owned(),
             kind: LogKind::Late,
             text: text.to_owned(),
         };
+        let line = line.fitted();
 
         self.log(std::slice::from_ref(&line));
         line

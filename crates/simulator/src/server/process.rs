@@ -873,6 +873,7 @@ impl Server {
             epoch: simulation.epoch(),
             tick,
             time_s: simulation.time_s(tick),
+            tick_s: simulation.scenario().tick_s,
             source: "simulator".to_owned(),
             kind: LogKind::Run,
             text:

@@ -14,6 +14,7 @@ use protocol::messages::{
     Control, ControlAnswer, JoinAnswer, LogKind, LogRecord, OnLate, Panel, Phase, Presence,
     Refusal, RobotStatus, Status,
 };
+use protocol::time::time_s;
 use protocol::{RobotName, RunName, Tick, decode, encode};
 use recording::{Recording, RecordingError};
 
@@ -446,7 +447,8 @@ impl Replay {
         self.observers.log(&[LogRecord {
             epoch: header.epoch,
             tick,
-            time_s: tick as f64 * header.tick_s,
+            time_s: time_s(tick, header.tick_s),
+            tick_s: header.tick_s,
             source: "simulator".to_owned(),
             kind: LogKind::Run,
             text: format!("the replay continues at tick {tick}"),
@@ -521,8 +523,9 @@ impl Replay {
             epoch: header.epoch,
             tick,
             pending_steps: self.pace.pending_steps,
-            time_s: tick as f64 * header.tick_s,
+            time_s: time_s(tick, header.tick_s),
             duration_s: header.duration_s,
+            tick_s: header.tick_s,
             seed: header.seed,
             replay_of: Some(header.run.clone()),
             phase: self.pace.phase,
