@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use config::{Changes, FileError, Source};
+use config::{Changes, Source};
 use lab::experiment::{Experiment, Plan, Request, Robots};
 use lab::inspect::inspect;
 use lab::run::Local;
@@ -159,7 +159,6 @@ fn describe_experiment(path: &Path) -> miette::Result<String> {
         experiment,
         set: Vec::new(),
         robots: Robots::InProcess,
-        origin: None,
     })?;
     let needs_processes = plan.needs_processes()?;
     if needs_processes.is_none() {

@@ -279,9 +279,6 @@ impl PlanArgs {
         let plan = Plan::new(&request)?;
         plan.check()?;
         plan.check_begins()?;
-        if self.out.is_none() {
-            plan.check_origin(&folder)?;
-        }
 
         for (one, other) in plan.equal_arms() {
             terminal::note(equal_arms(one, other));
@@ -340,7 +337,6 @@ impl PlanArgs {
             experiment,
             set: self.set.clone(),
             robots,
-            origin: self.file.canonicalize().ok(),
         })
     }
 }

@@ -34,7 +34,6 @@ fn main() -> miette::Result<()> {
         experiment,
         set: Vec::new(),
         robots: Robots::InProcess,
-        origin: None,
     })?;
 
     let mut bare = Vec::new();

@@ -24,8 +24,6 @@ pub(super) const ZENOH_CONFIG: &str = "CARS_ZENOH_CONFIG";
 /// Environment variable with the file in which the console keeps its address and its token, so that browsers find it again when
 /// it was killed and is started again.
 const KEEP_VARIABLE: &str = "CARS_CONSOLE_KEEP";
-/// Name of that file, among the logs.
-const CONSOLE_KEPT: &str = "console.kept";
 /// Environment variable with the file in which the launcher says why the run has failed.
 const FAILED_VARIABLE: &str = "CARS_CONSOLE_FAILED";
 /// Name of that file, among the logs.

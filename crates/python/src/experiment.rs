@@ -52,14 +52,12 @@ pub(crate) fn experiment(
         .unwrap_or_default()
         .to_string_lossy()
         .into_owned();
-    let is_own_folder = out.is_none();
     let folder = out.unwrap_or_else(|| Path::new(engine::OUT).join(&name));
     let request = Request {
         name,
         experiment,
         set,
         robots: Robots::InProcess,
-        origin: file.canonicalize().ok().filter(|_| is_own_folder),
     };
     let jobs = jobs.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
 
@@ -105,7 +103,6 @@ fn play(
     let plan = Plan::new(request)?;
     plan.check()?;
     plan.check_begins()?;
-    plan.check_origin(folder)?;
     plan.save(folder)?;
 
     let options = Options {

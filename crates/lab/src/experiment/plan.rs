@@ -44,8 +44,6 @@ pub struct Request {
     pub set: Vec<Override>,
     /// How its units are played.
     pub robots: Robots,
-    /// The experiment file, if it is a file: another one of the same name is another experiment.
-    pub origin: Option<PathBuf>,
 }
 
 /// How the robots of a unit run. The run is the same.
@@ -82,9 +80,6 @@ struct Sealed {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Written {
     name: String,
-    /// The experiment file.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    origin: Option<PathBuf>,
     program: Program,
     units: usize,
     duration_s: f64,
@@ -277,7 +272,6 @@ impl Plan {
         experiment.report.check_units(experiment.source(), units)?;
         let written = Written {
             name: request.name.clone(),
-            origin: request.origin.clone(),
             program: Program::this(),
             units,
             duration_s: experiment.duration_s,
@@ -418,31 +412,6 @@ impl Plan {
     /// If the plan that is there cannot be read.
     pub fn is_in(&self, folder: &Path) -> miette::Result<bool> {
         Ok(read(folder)?.is_some_and(|there| there.is_same(&self.written)))
-    }
-
-    /// Checks that the folder has no plan of another experiment file of the same name: the results of the one would replace those
-    /// of the other.
-    ///
-    /// # Errors
-    /// If it has one.
-    pub fn check_origin(&self, folder: &Path) -> miette::Result<()> {
-        // A plan that cannot be read is made again, and is of the same file as far as anyone knows.
-        let Ok(Some(before)) = read(folder) else {
-            return Ok(());
-        };
-        match (&before.origin, &self.written.origin) {
-            (Some(before), Some(now)) if before != now => Err(miette!(
-                help = format!(
-                    "choose another folder with --out; if the file has moved, go on with `--out {}`",
-                    shell::path(folder)
-                ),
-                "{} has the experiment {}, and this is {}",
-                folder.display(),
-                before.display(),
-                now.display()
-            )),
-            _ => Ok(()),
-        }
     }
 
     /// The arms that play the same runs under every condition, by two: a comparison of them shows nothing.

@@ -91,10 +91,7 @@ fn runs_without_a_number_are_counted_beside_each_number() {
 
     let wait = contrast("wait");
     assert_eq!(wait["excluded_baseline"]["no_pair"], not_at_risk);
-    assert!(
-        text.contains(&format!("{not_at_risk} no pair")),
-        "{text}"
-    );
+    assert!(text.contains(&format!("{not_at_risk} no pair")), "{text}");
 
     // No link is cut.
     let never = contrast("never");
