@@ -138,7 +138,7 @@ pub(crate) fn launch(args: LaunchArgs) -> miette::Result<ExitCode> {
                         .map(ToString::to_string)
                         .collect::<String>(),
                 );
-                let resumed = launch.resumed(&folder)?;
+                let mut resumed = launch.resumed(&folder)?;
                 (outcome, folder) = resumed.play(|text| terminal::note(text))?;
             }
             conclude(&outcome, &folder, is_quiet)
