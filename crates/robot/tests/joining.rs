@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use bus::{Bus, Role};
 use protocol::keys::Keys;
 use protocol::{RobotName, RunName};
-use robot::{Action, Cars, Host, HostError, HostOptions, Robot};
+use robot::{Action, BadParameters, Cars, Host, HostError, HostOptions, Robot};
 
 /// How long a robot tries to join.
 const PATIENCE: Duration = Duration::from_millis(200);
@@ -16,6 +16,10 @@ const PATIENCE: Duration = Duration::from_millis(200);
 struct Statue;
 
 impl Robot for Statue {
+    fn init(&mut self, _: &mut Cars<'_>) -> Result<(), BadParameters> {
+        Ok(())
+    }
+
     fn tick(&mut self, cars: &mut Cars<'_>) -> Action {
         Action::stay(cars)
     }

@@ -223,7 +223,7 @@ impl Robot for Librarian {
 #[test]
 fn a_report_that_is_no_message_ends_the_robot_also_in_one_process() {
     let mut host = LocalHost::new(vec![(Box::new(Librarian), welcome("A"))]);
-    let error = host.exchange(0, BTreeMap::new()).unwrap_err().to_string();
+    let error = host.exchange(0, &BTreeMap::new()).unwrap_err().to_string();
     assert!(
         error.starts_with("A says too much: its report: 12")
             && error.ends_with("bytes, more than the 1048576 allowed"),
@@ -250,7 +250,7 @@ fn lines_that_are_left_out_of_the_log_are_told_once() {
     let logs = |count: usize| {
         let mut host = LocalHost::new(vec![(Box::new(Writer(count)), welcome("A"))]);
         [0, 1].map(|tick| {
-            let outcome = host.exchange(tick, BTreeMap::new()).unwrap();
+            let outcome = host.exchange(tick, &BTreeMap::new()).unwrap();
             outcome.reports["A"].0.log.clone()
         })
     };

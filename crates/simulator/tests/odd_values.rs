@@ -7,7 +7,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use config::shipped;
-use lockstep::{Exchange, Outcome};
+use lockstep::{Bulletin, Exchange, Outcome};
 use miette::{GraphicalReportHandler, GraphicalTheme};
 use proptest::prelude::*;
 use protocol::Tick;
@@ -72,7 +72,7 @@ impl Exchange<News, Arc<Report>, CommandText> for Nobody {
     fn exchange(
         &mut self,
         _: Tick,
-        _: std::collections::BTreeMap<protocol::RobotName, News>,
+        _: &dyn Bulletin<News>,
     ) -> Result<Outcome<Arc<Report>, CommandText>, Infallible> {
         Ok(Outcome::default())
     }

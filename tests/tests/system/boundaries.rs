@@ -505,7 +505,7 @@ fn cycles_of_imports_are_found() {
 /// is not there.
 #[test]
 fn the_configuration_of_cargo_has_only_what_builds_and_tests_here_need() {
-    let text = std::fs::read_to_string(root().join(".cargo/config.toml")).unwrap();
+    let text = std::fs::read_to_string(system_tests::root().join(".cargo/config.toml")).unwrap();
     let config: toml::Table = text.parse().unwrap();
     let tables: Vec<&String> = config.keys().collect();
     assert_eq!(tables, ["env"]);
@@ -529,7 +529,7 @@ fn the_configuration_of_cargo_has_only_what_builds_and_tests_here_need() {
             "const TLS_ACCEPT_THROTTLE_TIME: u64 = 1000;",
         ),
     ] {
-        let text = std::fs::read_to_string(root().join(file)).unwrap();
+        let text = std::fs::read_to_string(system_tests::root().join(file)).unwrap();
         assert!(text.contains(constant), "{constant} is not in {file}");
     }
 }
