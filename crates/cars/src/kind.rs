@@ -5,6 +5,7 @@ use std::path::Path;
 use config::{FileError, Source};
 use lab::experiment::is_experiment_file;
 use launch::is_launch_file;
+use observe::words::is_almost;
 
 /// Tables and keys that only scenarios have.
 const OF_SCENARIO: [&str; 16] = [
@@ -63,7 +64,8 @@ impl Kind {
         }
 
         let table: toml::Table = source.parse()?;
-        let is_of_scenario = |key: &String| OF_SCENARIO.contains(&key.as_str());
+        // A misspelled key of a scenario is no parameter.
+        let is_of_scenario = |key: &String| OF_SCENARIO.iter().any(|known| is_almost(key, known));
         Ok(if table.contains_key(OF_LINKS) {
             Self::Links
         } else if table.is_empty() || table.keys().any(is_of_scenario) {
@@ -75,7 +77,8 @@ impl Kind {
 }
 
 fn is_toml(path: &Path) -> bool {
-    path.extension().is_none_or(|extension| extension == "toml")
+    path.extension()
+        .is_some_and(|extension| extension == "toml")
 }
 
 /// Whether each line is one word, as the classes of a roster are. TOML has no such lines but the heads of tables.

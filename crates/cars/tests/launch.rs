@@ -234,7 +234,7 @@ fn a_dry_run_prints_everything_and_starts_nothing() {
 
     for part in [
         "# simulator\n",
-        "runs/demo/scenario.toml --run=demo --listen=tcp/127.0.0.1:7999 --out=runs --speed=2 --no-verdict --paused\n",
+        "runs/demo/scenario.toml --run=demo --listen=tcp/127.0.0.1:7999 --out=runs --speed=2 --no-verdict --paused --prepared\n",
         "# Butler\n",
         "CARS_CONNECT=tcp/127.0.0.1:7999 CARS_RUN=demo",
         "--name Butler\n",

@@ -1,17 +1,8 @@
-//! A run that failed: its launcher leaves the reason in a file, pages show it, and the console stays while a browser shows it.
-//! What follows is the launcher's again, which learns it from the exit status: the end, or the run once more.
+//! Why a run has failed: its launcher leaves the reason in a file, and pages show it.
 
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
-
-use crate::app::App;
-
-/// How often to look whether the run has failed.
-const LOOK_EVERY: Duration = Duration::from_millis(250);
-/// A browser that is gone for less than this may be loading the page again, or has been started and is not here yet.
-const GRACE: Duration = Duration::from_secs(10);
 
 /// Why a run has failed, as its launcher says.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -26,18 +17,9 @@ pub(crate) struct Failed {
     command: String,
 }
 
-/// How the console ends after a failure.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Next {
-    /// Nobody looks any more.
-    End,
-    /// A person wants the run to go on.
-    Resume,
-}
-
 impl Failed {
     /// `None` while there is no such file. It appears as a whole.
-    fn read(file: &Path) -> Option<Self> {
+    pub(crate) fn read(file: &Path) -> Option<Self> {
         let text = std::fs::read(file).ok()?;
         match serde_json::from_slice(&text) {
             Ok(failed) => Some(failed),
@@ -45,31 +27,6 @@ impl Failed {
                 tracing::warn!("{}: {error}", file.display());
                 None
             }
-        }
-    }
-}
-
-/// Looks for the file in which the launcher says that the run has failed, and tells browsers. Returns when a person wants the run
-/// to go on, or when it has failed and no browser shows it. `awaits_browser` is whether one has been started.
-pub(crate) async fn watch(file: &Path, app: &App, awaits_browser: bool) -> Next {
-    let mut seen_at = awaits_browser.then(|| Instant::now() + GRACE);
-    loop {
-        tokio::select! {
-            () = app.resumed() => return Next::Resume,
-            () = tokio::time::sleep(LOOK_EVERY) => {}
-        }
-        if app.is_viewed() {
-            seen_at = seen_at.max(Some(Instant::now()));
-        }
-
-        if app.failed().borrow().is_none() {
-            let Some(failed) = Failed::read(file) else {
-                continue;
-            };
-            app.fail(failed);
-        }
-        if seen_at.is_none_or(|seen_at| seen_at.elapsed() >= GRACE) {
-            return Next::End;
         }
     }
 }

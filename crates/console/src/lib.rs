@@ -8,6 +8,7 @@ mod app;
 mod browser;
 mod diagrams;
 mod failed;
+mod failing;
 mod feed;
 mod guard;
 mod kept;
@@ -33,7 +34,7 @@ use tokio::runtime::Runtime;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 
 use app::{App, Mode};
-use failed::Next;
+use failing::Next;
 use guard::{AllowedHost, Guard};
 use kept::Kept;
 use live::Live;
@@ -205,7 +206,7 @@ async fn serve(mode: Mode, past: Option<Past>, how: Serving) -> Result<Next, Str
     let is_opening = how.opens && !was_open && opening::open(&url, app.clone());
     let failure = async {
         match &how.failed {
-            Some(file) => failed::watch(file, &app, is_opening || was_open).await,
+            Some(file) => failing::watch(file, &app, is_opening || was_open).await,
             None => std::future::pending().await,
         }
     };

@@ -191,9 +191,9 @@ fn inspect_log(
         }
         let mut record = Record::of_events(&files.events)?;
         while let Some(entry) = record.next_entry()? {
-            let time_s = entry.tick as f64 * scenario.tick_s;
             for event in &entry.events {
-                let Some(expected) = event.log_record(files.epoch, entry.tick, time_s) else {
+                let Some(expected) = event.log_record(files.epoch, entry.tick, scenario.tick_s)
+                else {
                     continue;
                 };
                 let Some((number, line)) = lines.next() else {

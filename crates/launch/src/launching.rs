@@ -15,15 +15,15 @@ use simulator::recorder::{LOGS, SCENARIO};
 use simulator::{IfTaken, RunFolder, RunLock};
 
 use super::compose;
-use super::ending::Failure;
 use super::endpoint;
+use super::failure::{FAILED, Failure};
 use super::file::{self, LaunchFile};
 use super::launched::Launched;
 use super::leftovers::Leftovers;
 use super::link::ProcessLink;
 use super::observe::{Observer, Watch};
 use super::options::RunOptions;
-use super::plan::{self, Execution, FAILED, Part, Planned};
+use super::plan::{self, Execution, Part, Planned};
 use super::screen::{Screen, ScreenOptions};
 use super::secure::Secured;
 use super::signals;

@@ -12,6 +12,7 @@ use simulator::folder::CONSOLE_KEPT;
 use simulator::recorder::{LOGS, SCENARIO};
 
 use super::child::{self, AtExit};
+use super::failure::FAILED;
 use super::file::{CONSOLE, LaunchFile, Process, SIMULATOR};
 use super::program::{NotFound, Places};
 use super::restart::Restart;
@@ -26,8 +27,6 @@ pub(super) const ZENOH_CONFIG: &str = "CARS_ZENOH_CONFIG";
 const KEEP_VARIABLE: &str = "CARS_CONSOLE_KEEP";
 /// Environment variable with the file in which the launcher says why the run has failed.
 const FAILED_VARIABLE: &str = "CARS_CONSOLE_FAILED";
-/// Name of that file, among the logs.
-pub(super) const FAILED: &str = "failed.json";
 
 /// Environment variable with the time for which a robot tries to reach the simulator and to join, seconds.
 const PATIENCE_VARIABLE: &str = "CARS_PATIENCE_S";

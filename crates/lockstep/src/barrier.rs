@@ -7,8 +7,8 @@ use std::time::Duration;
 use protocol::messages::{Clock, End, FaultKind, NEWS_FLAGS, OnLate, Presence, Reason};
 use protocol::{Epoch, Generation, RobotName, Tick};
 
-use crate::exchange::{Membership, Outcome, Sent};
-use crate::member::{Admission, Attendance, Lateness, Member, Naming, Turn};
+use crate::exchange::{Membership, Naming, Outcome, Sent};
+use crate::member::{Admission, Attendance, Lateness, Member, Turn};
 use crate::rules::{Rule, Rules};
 
 /// How long the barrier waits for what.

@@ -6,8 +6,9 @@ use protocol::RobotName;
 use protocol::messages::{Command, CommandText, News, Refusal, Report, Welcome};
 
 use crate::barrier::{Refused, Stamp};
+use crate::exchange::Naming;
 use crate::exchange::Sent;
-use crate::member::{Admission, Naming};
+use crate::member::Admission;
 use crate::participant::Answer;
 use crate::states::StateQuery;
 

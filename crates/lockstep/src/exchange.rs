@@ -4,8 +4,6 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use protocol::{Generation, RobotName, Tick};
 
-use crate::member::Naming;
-
 /// A tick as the simulation sees it: news go out, reports come back.
 ///
 /// In one process it is a function call. Over the bus the same two steps are spread over time.
@@ -22,6 +20,15 @@ pub trait Exchange<N, R, C> {
         tick: Tick,
         news: &dyn Bulletin<N>,
     ) -> Result<Outcome<R, C>, Self::Error>;
+}
+
+/// The incarnations that a robot's news name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub struct Naming {
+    /// The incarnation that takes part from this tick on.
+    pub joined: Option<Generation>,
+    /// The incarnation that takes part no more, and whose process is to join again.
+    pub rejoin: Option<Generation>,
 }
 
 /// The news of a tick. Those of a robot are composed when it is known which incarnations they name.

@@ -42,15 +42,6 @@ pub struct Admission {
     pub news_flag: u32,
 }
 
-/// The incarnations that a robot's news name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub struct Naming {
-    /// The incarnation that takes part from this tick on.
-    pub joined: Option<Generation>,
-    /// The incarnation that takes part no more, and whose process is to join again.
-    pub rejoin: Option<Generation>,
-}
-
 /// Who takes part in a tick that is executed again, as its record has it.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
 pub struct Attendance {

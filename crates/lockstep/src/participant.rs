@@ -6,8 +6,9 @@ use std::time::Duration;
 use protocol::messages::{Clock, End, Refusal};
 use protocol::{Epoch, Generation, RobotName, Tick};
 
+use crate::exchange::Naming;
 use crate::exchange::Sent;
-use crate::member::{Admission, Naming};
+use crate::member::Admission;
 use crate::rules::{Rule, Rules};
 use crate::states::{NoState, StateQuery, States};
 

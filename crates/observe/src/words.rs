@@ -108,7 +108,7 @@ impl Words {
                 .into_iter()
                 .map(|other| (distance(&word.word, other), other))
                 .min()
-                .filter(|(distance, _)| 3 * distance <= word.word.chars().count().max(3));
+                .filter(|(_, other)| is_almost(&word.word, other));
             unheard.push(Unheard {
                 word: word.clone(),
                 like: like.map(|(_, other)| other.to_owned()),
@@ -148,6 +148,12 @@ impl std::fmt::Display for Word {
         }
         Ok(())
     }
+}
+
+/// Whether a word may be meant by another one: a third of its characters are wrong at the most.
+#[must_use]
+pub fn is_almost(word: &str, meant: &str) -> bool {
+    3 * distance(word, meant) <= word.chars().count().max(3)
 }
 
 /// How many characters of a word have to be changed, added, left out, or exchanged with their neighbor to make another one.

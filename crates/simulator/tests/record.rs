@@ -4,9 +4,7 @@
 
 use std::collections::BTreeMap;
 use std::convert::Infallible;
-use std::fs::File;
 use std::path::Path;
-use std::process::Command;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -31,31 +29,6 @@ impl Exchange<News, Arc<Report>, CommandText> for Absent {
     ) -> Result<Outcome<Arc<Report>, CommandText>, Infallible> {
         Ok(Outcome::default())
     }
-}
-
-#[test]
-fn events_have_no_end_unless_the_recording_is_finished() {
-    let out = tempfile::tempdir().unwrap();
-    let (folder, _lock, scenario) = prepare(out.path(), "");
-
-    // The recording is a pipe: what is written after its reader has gone is an error.
-    let pipe = folder.file(RECORDING);
-    let made = Command::new("mkfifo").arg(&pipe).status().unwrap();
-    assert!(made.success());
-    let reader = std::thread::spawn(move || File::open(pipe).unwrap());
-    let mut simulation = Simulation::new(scenario, 1).unwrap();
-    let mut recorder = Recorder::begin(&folder, &run(), &simulation).unwrap();
-    let reader = reader.join().unwrap();
-    let tick = simulation.init(&mut Absent).unwrap();
-    recorder.write(&simulation, &tick).unwrap();
-    drop(reader);
-
-    let end = simulation.end(End::Finished);
-    let error = recorder.write(&simulation, &end).unwrap_err();
-    assert!(error.to_string().contains(RECORDING), "{error}");
-    let events = std::fs::read_to_string(folder.file(EVENTS)).unwrap();
-    assert!(events.contains("\"event\":\"tick\""), "{events}");
-    assert!(!events.contains("\"event\":\"end\""), "{events}");
 }
 
 /// A folder for the record of a run of ten seconds with one robot, and its scenario with further settings.

@@ -96,6 +96,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "conform",
             "bus",
             "config",
+            "observe",
             "protocol",
             "recording",
             "terminal",

@@ -148,8 +148,17 @@ pub(crate) fn lines_of(text: &str) -> (usize, usize) {
 #[test]
 fn a_record_that_ends_anywhere_is_good_up_to_its_last_complete_tick() {
     let lab = Lab::new();
-    lab.ok(&["run", HALL, "--duration", "10 s", "--run", "cut"]);
+    let no_frames = ["--set", "record.frames=false"];
+    lab.ok(&[
+        &["run", HALL, "--duration", "10 s", "--run", "cut"][..],
+        &no_frames,
+    ]
+    .concat());
     let folder = lab.out().join("cut");
+    // What a process writes at the end, and a log that cannot be longer than the events.
+    for later in ["summary.json", "cars.log"] {
+        std::fs::remove_file(folder.join(later)).unwrap();
+    }
     let path = folder.display().to_string();
     let events = folder.join("events.jsonl");
     let whole = std::fs::read(&events).unwrap();
@@ -170,12 +179,13 @@ fn a_record_that_ends_anywhere_is_good_up_to_its_last_complete_tick() {
     }
 }
 
-/// A file may not grow beyond some blocks, as on a full disk.
-fn with_little_space(lab: &Lab, args: &[&str]) -> Command {
+/// A file may not grow beyond so many blocks, as on a full disk.
+fn with_little_space(lab: &Lab, blocks: u32, args: &[&str]) -> Command {
     let mut command = Command::new("sh");
     let program = programs().join("cars");
+    let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$@\"");
     command
-        .args(["-c", "trap '' XFSZ; ulimit -f 64; exec \"$@\"", "sh"])
+        .args(["-c", &script, "sh"])
         .arg(program)
         .args(args)
         .arg("--out")
@@ -191,7 +201,7 @@ fn a_record_that_cannot_be_written_is_named_and_ends_the_run() {
     let long = ["--duration", "5000 s", "--run"];
     let launch = ["launch", HALL, "--no-console", "--speed", "max"];
     for (run, args) in [("full-run", &["run", HALL][..]), ("full-launch", &launch)] {
-        let mut command = with_little_space(&lab, args);
+        let mut command = with_little_space(&lab, 64, args);
         let output = command.args(long).arg(run).output().unwrap();
         let text = String::from_utf8_lossy(&output.stderr);
         let text: String = text
@@ -210,6 +220,26 @@ fn a_record_that_cannot_be_written_is_named_and_ends_the_run() {
         assert_eq!(code, 0, "{said}");
         assert!(said.contains("no end"), "{said}");
     }
+}
+
+/// The one chunk of a short recording is written when all ticks are there.
+#[test]
+fn events_have_no_end_unless_the_recording_is_finished() {
+    let lab = Lab::new();
+    let args = ["run", HALL, "--duration", "8 s", "--run", "full"];
+    let output = with_little_space(&lab, 130, &args).output().unwrap();
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{text}");
+
+    let events = std::fs::read_to_string(lab.out().join("full/events.jsonl")).unwrap();
+    let ticks = events
+        .lines()
+        .filter(|line| line.contains("\"event\":\"tick\""));
+    assert_eq!(ticks.count(), 17, "{events}");
+    assert!(!events.contains("\"event\":\"end\""), "{events}");
+    let (code, said) = check(&lab, &lab.out().join("full").display().to_string());
+    assert_eq!(code, 0, "{said}");
+    assert!(said.contains("16 ticks, no end"), "{said}");
 }
 
 #[test]

@@ -7,8 +7,9 @@ use protocol::{Epoch, Generation, RobotName, Tick};
 
 use super::simulation::{self, News, Order, Report, Simulation, Violation};
 use crate::barrier::{Refused, Stamp};
+use crate::exchange::Naming;
 use crate::exchange::Sent;
-use crate::member::{Admission, Naming};
+use crate::member::Admission;
 use crate::participant::{Action, Begin, Leave, Participant, Patience, RobotTimer, Turn};
 use crate::rules::{Rule, Rules};
 

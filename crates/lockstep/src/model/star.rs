@@ -10,8 +10,9 @@ use stateright::{Model, Property};
 use super::process::{Around, Down, Process, Robot, Up};
 use super::simulation::{News, Order, Ordered, Report, Simulation, Violation};
 use crate::barrier::{Barrier, Output, Timer, Timing};
+use crate::exchange::Naming;
 use crate::exchange::{Membership, Outcome};
-use crate::member::{Lateness, Naming};
+use crate::member::Lateness;
 use crate::participant::RobotTimer;
 use crate::rules::{Rule, Rules};
 
