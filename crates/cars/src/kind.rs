@@ -6,25 +6,10 @@ use config::{FileError, Source};
 use lab::experiment::is_experiment_file;
 use launch::is_launch_file;
 
-/// Tables and keys that only scenarios have.
-const OF_SCENARIO: [&str; 16] = [
-    "seed",
-    "tick",
-    "duration",
-    "on_late",
-    "deadline",
-    "lose_after",
-    "field",
-    "sensing",
-    "guests",
-    "network",
-    "record",
-    "fault",
-    "change",
-    "expect",
-    "obstacle",
-    "robot",
-];
+/// The folder of parameters of robots, beside the scenarios that name them.
+const OF_PARAMETERS: &str = "robots";
+/// The list of a scenario.
+const OF_SCENARIO: &str = "robot";
 /// The list of a plan of faults of real links.
 const OF_LINKS: &str = "link_fault";
 
@@ -63,19 +48,35 @@ impl Kind {
         }
 
         let table: toml::Table = source.parse()?;
-        let is_of_scenario = |key: &String| OF_SCENARIO.contains(&key.as_str());
         Ok(if table.contains_key(OF_LINKS) {
             Self::Links
-        } else if table.is_empty() || table.keys().any(is_of_scenario) {
+        } else if table.contains_key(OF_SCENARIO) {
             Self::Scenario
-        } else {
+        } else if class_of(path).is_some() || is_in(path, OF_PARAMETERS) {
             Self::Parameters
+        } else {
+            Self::Scenario
         })
     }
 }
 
+/// The class that comes with the programs and whose parameters a file has by its name.
+pub(crate) fn class_of(path: &Path) -> Option<&'static str> {
+    let stem = path.file_stem()?.to_str()?;
+    let mut classes = robots::CLASSES.iter();
+    classes
+        .find(|class| class.eq_ignore_ascii_case(stem))
+        .copied()
+}
+
+fn is_in(path: &Path, folder: &str) -> bool {
+    let parent = path.parent().and_then(Path::file_name);
+    parent.is_some_and(|parent| parent == folder)
+}
+
 fn is_toml(path: &Path) -> bool {
-    path.extension().is_none_or(|extension| extension == "toml")
+    path.extension()
+        .is_some_and(|extension| extension == "toml")
 }
 
 /// Whether each line is one word, as the classes of a roster are. TOML has no such lines but the heads of tables.
