@@ -15,8 +15,8 @@ use simulator::recorder::{LOGS, SCENARIO};
 use simulator::{IfTaken, RunFolder, RunLock};
 
 use super::compose;
-use super::ending::Failure;
 use super::endpoint;
+use super::failure::Failure;
 use super::file::{self, LaunchFile};
 use super::launched::Launched;
 use super::leftovers::Leftovers;

@@ -7,6 +7,7 @@ mod compose;
 mod ending;
 mod endpoint;
 pub mod exec;
+mod failure;
 mod file;
 mod launched;
 mod launching;
@@ -27,7 +28,8 @@ mod signals;
 mod supervise;
 mod tail;
 
-pub use ending::{Failure, code_of};
+pub use ending::code_of;
+pub use failure::Failure;
 pub use file::{LaunchFile, Process, is_launch_file, scenario_file};
 pub use launching::{Launch, LaunchOptions, What};
 pub use leftovers::guard;

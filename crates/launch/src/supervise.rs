@@ -11,7 +11,8 @@ use protocol::RobotName;
 use protocol::messages::{FaultKind, ProcessOrder};
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender};
 
-use super::ending::{Ended, Failure};
+use super::ending::Ended;
+use super::failure::Failure;
 use super::leftovers::Leftovers;
 use super::log::{LIMIT_BYTES, ProcessLog};
 use super::plan::{Part, Planned, quote};
