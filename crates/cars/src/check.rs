@@ -18,7 +18,7 @@ use simulator::seal::Checked;
 use terminal::OutputError;
 
 use crate::experiment::equal_arms;
-use crate::kind::Kind;
+use crate::kind::{Kind, class_of};
 use crate::{named, remarks};
 
 /// `cars check`.
@@ -100,12 +100,7 @@ fn describe_parameters(path: &Path) -> miette::Result<String> {
     let table: toml::Table = source.parse()?;
     let number = count(table.len(), "parameter", "parameters");
 
-    let stem = path.file_stem().and_then(|stem| stem.to_str());
-    let stem = stem.unwrap_or_default();
-    let class = robots::CLASSES
-        .iter()
-        .find(|class| class.eq_ignore_ascii_case(stem));
-    let Some(class) = class else {
+    let Some(class) = class_of(path) else {
         return Ok(format!(
             "{number}, for a class that decides about them itself"
         ));

@@ -5,27 +5,11 @@ use std::path::Path;
 use config::{FileError, Source};
 use lab::experiment::is_experiment_file;
 use launch::is_launch_file;
-use observe::words::is_almost;
 
-/// Tables and keys that only scenarios have.
-const OF_SCENARIO: [&str; 16] = [
-    "seed",
-    "tick",
-    "duration",
-    "on_late",
-    "deadline",
-    "lose_after",
-    "field",
-    "sensing",
-    "guests",
-    "network",
-    "record",
-    "fault",
-    "change",
-    "expect",
-    "obstacle",
-    "robot",
-];
+/// The folder of parameters of robots, beside the scenarios that name them.
+const OF_PARAMETERS: &str = "robots";
+/// The list of a scenario.
+const OF_SCENARIO: &str = "robot";
 /// The list of a plan of faults of real links.
 const OF_LINKS: &str = "link_fault";
 
@@ -50,10 +34,11 @@ impl Kind {
     /// The kind of a file.
     ///
     /// # Errors
-    /// [`FileError`] if it cannot be read, or is neither TOML nor a roster.
+    /// [`FileError`] if it cannot be read, is empty, or is neither TOML nor a roster.
     pub(crate) fn of(path: &Path) -> Result<Self, FileError> {
         let source = Source::read(path)?;
-        if !is_toml(path) && is_roster(&source.text) {
+        let is_blank = source.text.trim().is_empty();
+        if !is_blank && !is_toml(path) && is_roster(&source.text) {
             return Ok(Self::Roster);
         }
         if is_experiment_file(path)? {
@@ -64,16 +49,37 @@ impl Kind {
         }
 
         let table: toml::Table = source.parse()?;
-        // A misspelled key of a scenario is no parameter.
-        let is_of_scenario = |key: &String| OF_SCENARIO.iter().any(|known| is_almost(key, known));
+        if table.is_empty() {
+            return Err(FileError::new(format!(
+                "{} is empty: it is neither a scenario nor a launch file nor an experiment",
+                path.display()
+            )));
+        }
+
         Ok(if table.contains_key(OF_LINKS) {
             Self::Links
-        } else if table.is_empty() || table.keys().any(is_of_scenario) {
+        } else if table.contains_key(OF_SCENARIO) {
             Self::Scenario
-        } else {
+        } else if class_of(path).is_some() || is_in(path, OF_PARAMETERS) {
             Self::Parameters
+        } else {
+            Self::Scenario
         })
     }
+}
+
+/// The class that comes with the programs and whose parameters a file has by its name.
+pub(crate) fn class_of(path: &Path) -> Option<&'static str> {
+    let stem = path.file_stem()?.to_str()?;
+    let mut classes = robots::CLASSES.iter();
+    classes
+        .find(|class| class.eq_ignore_ascii_case(stem))
+        .copied()
+}
+
+fn is_in(path: &Path, folder: &str) -> bool {
+    let parent = path.parent().and_then(Path::file_name);
+    parent.is_some_and(|parent| parent == folder)
 }
 
 fn is_toml(path: &Path) -> bool {

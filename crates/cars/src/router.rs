@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use bus::{Bus, Role};
 use clap::Args;
-use miette::IntoDiagnostic;
+use miette::{IntoDiagnostic, WrapErr};
 use terminal::OutputError;
 
 /// `cars router`.
@@ -34,6 +34,9 @@ pub(crate) struct RouterArgs {
 /// Forwards until a signal ends it.
 pub(crate) fn router(args: &RouterArgs) -> miette::Result<ExitCode> {
     bus::runtime::use_router_threads();
+    bus::runtime::check_threads()
+        .into_diagnostic()
+        .wrap_err("no thread can be started")?;
 
     let (end, ended) = std::sync::mpsc::sync_channel(1);
     ctrlc::set_handler(move || {

@@ -372,14 +372,15 @@ fn check_reads_files_of_every_kind() {
         "butler.toml",
         "refiller = \"Leguin\"\ntreat_capacity = 12\n",
     );
-    write("rosie.toml", "pace = \"1 ft/s\"\n");
+    std::fs::create_dir(folder.path("robots")).unwrap();
+    write("robots/rosie.toml", "pace = \"1 ft/s\"\n");
     write("roster.txt", "# two\nButler\n\nLeguin\n");
     write("CARSConfig", "Butler\n");
 
     let files = [
         "links.toml",
         "butler.toml",
-        "rosie.toml",
+        "robots/rosie.toml",
         "roster.txt",
         "CARSConfig",
     ];
@@ -387,7 +388,7 @@ fn check_reads_files_of_every_kind() {
     assert!(is_good, "{stderr}");
     let expected = "ok links.toml: 1 fault of a link\n\
                     ok butler.toml: 2 parameters, which Butler takes\n\
-                    ok rosie.toml: 1 parameter, for a class that decides about them itself\n\
+                    ok robots/rosie.toml: 1 parameter, for a class that decides about them itself\n\
                     ok roster.txt: a roster: 2 robots, 100 guests, 1200 ticks\n\
                     ok CARSConfig: a roster: 1 robot, 100 guests, 1200 ticks\n";
     assert_eq!(stdout, expected);

@@ -151,8 +151,7 @@ impl std::fmt::Display for Word {
 }
 
 /// Whether a word may be meant by another one: a third of its characters are wrong at the most.
-#[must_use]
-pub fn is_almost(word: &str, meant: &str) -> bool {
+fn is_almost(word: &str, meant: &str) -> bool {
     3 * distance(word, meant) <= word.chars().count().max(3)
 }
 

@@ -96,7 +96,6 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "conform",
             "bus",
             "config",
-            "observe",
             "protocol",
             "recording",
             "terminal",

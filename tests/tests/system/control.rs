@@ -310,7 +310,7 @@ fn orders_are_carried_out_whatever_a_launch_prints() {
         ("orders-no-console", &["--no-console"]),
     ] {
         let lab = Lab::new();
-        let mut args = vec!["--duration", "30 s", "--speed", "max"];
+        let mut args = vec!["--duration", "30 s"];
         args.extend(more);
         let mut launch = paused(&lab, run, &args);
         lab.step(run, 10);
@@ -329,14 +329,7 @@ fn orders_are_carried_out_whatever_a_launch_prints() {
 fn a_run_with_orders_is_resumed_without_a_word_and_without_a_console() {
     let lab = Lab::new();
     let run = "orders-resumed";
-    let quiet = [
-        "--duration",
-        "30 s",
-        "--speed",
-        "max",
-        "--quiet",
-        "--no-console",
-    ];
+    let quiet = ["--duration", "30 s", "--quiet", "--no-console"];
     let mut launch = paused(&lab, run, &quiet);
     lab.step(run, 10);
     lab.ctl(run, &["restart", "Leguin"]);
@@ -345,19 +338,8 @@ fn a_run_with_orders_is_resumed_without_a_word_and_without_a_console() {
     send(simulator, Signal::SIGKILL);
     assert!(!launch.wait().success());
 
-    let mut launch = lab.start(
-        run,
-        &[
-            "launch",
-            "--resume",
-            run,
-            "--quiet",
-            "--no-console",
-            "--speed",
-            "max",
-        ],
-    );
-    launch.finish();
+    let resume = ["launch", "--quiet", "--no-console", "--resume", run];
+    lab.ok(&[&resume[..], &["--speed", "max"]].concat());
     assert_eq!(lab.summary(run)["ticks"], 60);
     lab.ok(&["verify", &lab.out().join(run).display().to_string()]);
 }

@@ -72,10 +72,8 @@ impl Hall {
         let (sender, gone) = std::sync::mpsc::channel();
         let leftovers = Leftovers::unguarded();
         let mut planned = self.planned.clone();
-        for process in &mut planned {
-            if process.part == Part::Robots {
-                process.command.env.extend([leftovers.mark(&process.name)]);
-            }
+        for process in planned.iter_mut().filter(|one| one.part == Part::Robots) {
+            process.command.env.extend([leftovers.mark(&process.name)]);
         }
         let outcome = runtime().block_on(async {
             let supervisor = Supervisor::new(
