@@ -9,7 +9,7 @@ use crate::population::{NUMBERS, Population, TIMES, draw};
 use crate::{ERRORS, before, error};
 
 /// Sizes of samples, and how many of each: with 64 pairs, a test takes a hundred times as long as with 8.
-const SAMPLES: [(usize, usize); 3] = [(8, 2_000), (16, 300), (64, 100)];
+const SAMPLES: [(usize, usize); 3] = [(8, 2_000), (16, 600), (64, 200)];
 /// Shares of p values below these limits are counted.
 const LIMITS: [f64; 3] = [0.05, 0.1, 0.5];
 

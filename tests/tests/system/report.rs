@@ -431,11 +431,11 @@ fn assert_has_two_runs(document: &Document<'_>, html: &str, folder: &str) {
     );
 }
 
-/// An experiment with two factors, two arms, four measures and 24 units.
+/// An experiment with two factors, two arms, four measures and 36 units: three seeds, the fewest that are compared.
 fn small_experiment(report: &str) -> String {
     let scenario = system_tests::root().join("configs/hors_doeuvres.toml");
     let mut file = format!(
-        "question = \"What is shown?\"\nscenario = {scenario:?}\nseeds = 2\nduration = \"20 s\"\nbaseline = \"a\"\n{report}\n\
+        "question = \"What is shown?\"\nscenario = {scenario:?}\nseeds = 3\nduration = \"20 s\"\nbaseline = \"a\"\n{report}\n\
          [[factor]]\nname = \"guests\"\npath = \"guests.count\"\nvalues = [5, 10, 15]\n\
          [[factor]]\nname = \"loss\"\nset = [\"network.commands={{ loss = {{value}} }}\"]\nvalues = [0, 0.5]\n\
          [[arm]]\nname = \"a\"\n[[arm]]\nname = \"b\"\nset = [\"robot.Butler.params.caution=0.9\"]\n\
@@ -494,7 +494,7 @@ fn a_report_shows_what_its_experiment_names_and_results_stay_as_they_are() {
     lab.write("small.toml", &small_experiment(report));
     let (status, text) = lab.cars_without_out(&["experiment", "run", file, "-o", &folder]);
     assert_eq!(status, 0, "{text}");
-    assert!(text.contains("24 are there, 0 to play"), "{text}");
+    assert!(text.contains("36 are there, 0 to play"), "{text}");
     assert_eq!(results(), before);
 
     let html = lab.ok(&["report", &folder]);
@@ -542,7 +542,7 @@ fn a_report_of_what_there_is_not_is_refused_before_anything_runs() {
     for (report, reason) in [
         ("measures = [\"served\"]", "there is no measure \"served\""),
         ("show = [\"all\"]", "unknown variant `all`"),
-        ("runs = [24]", "there is no unit 24"),
+        ("runs = [36]", "there is no unit 36"),
     ] {
         let text = small_experiment(&format!("[report]\n{report}"));
         let file = lab.write("small.toml", &text);

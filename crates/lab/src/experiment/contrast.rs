@@ -115,7 +115,7 @@ impl Difference {
                 pairs.len(),
             ),
             // Most pairs are alike and few differ by much, which is as skewed as the times of one arm.
-            restricted_mean_s: Estimate::mean(&times.differences_s),
+            restricted_mean_s: within(Estimate::mean(&times.differences_s), times.until_s),
             until_s: times.until_s,
             test: SignFlip::of(&times.differences_s),
         }
@@ -217,6 +217,15 @@ fn paired<T>(
         pairs.extend(number(run).zip(other));
     }
     pairs
+}
+
+/// An estimate of a difference of times none of which is longer than this.
+fn within(mut estimate: Estimate, until_s: f64) -> Estimate {
+    if let Interval::Ends { low, high } = &mut estimate.interval {
+        *low = low.max(-until_s);
+        *high = high.min(until_s);
+    }
+    estimate
 }
 
 /// Corrects the p values of a family of contrasts: of those that have one.
@@ -482,6 +491,23 @@ mod tests {
         assert_eq!(least_p_holm(&served), 8.0 * 2.0 / 256.0);
         assert_eq!(served[0].p_holm, Some(least_p_holm(&served)));
         assert_eq!(least_p_holm(&[]), 1.0);
+    }
+
+    #[test]
+    fn no_difference_of_times_is_longer_than_the_times() {
+        let at = |time_s| Measured::Reached { time_s };
+        let experiment = Experiment::find(Path::new("deadlock")).unwrap();
+        let arm = [80.0, 80.0, 80.0, 0.0, 0.0, 0.0, 0.0, 0.0].map(at);
+        let outcomes = measured(&experiment, &arm[..], &[0.0; 8].map(at));
+        let outcomes: Vec<Outcome> = outcomes.into_iter().filter(|run| run.seed < 5).collect();
+        let contrasts = experiment.contrast(&outcomes);
+        let Difference::Time { restricted_mean_s, until_s, .. } =
+            &find(&contrasts, "deadlock", "rules").difference
+        else {
+            panic!("{contrasts:?}");
+        };
+        assert_eq!((restricted_mean_s.value, *until_s), (60.0, 80.0));
+        assert_eq!(restricted_mean_s.bounds().unwrap().1, 80.0);
     }
 
     #[test]
