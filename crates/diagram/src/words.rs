@@ -47,9 +47,14 @@ pub(crate) fn label(command: &Command) -> String {
     shortened(&command.text, LABEL_LETTERS)
 }
 
-/// Simulated seconds, in the fewest digits.
+/// Simulated seconds, in the fewest digits: to the millisecond, unless ticks are shorter.
 pub(crate) fn seconds(tick: Tick, tick_s: f64) -> String {
-    format!("{} s", time_s(tick, tick_s))
+    let time_s = time_s(tick, tick_s);
+    if tick_s < 0.001 {
+        return format!("{time_s} s");
+    }
+
+    format!("{} s", (time_s * 1000.0).round() / 1000.0)
 }
 
 /// Why a message was lost, in few words.
@@ -242,7 +247,9 @@ mod tests {
     fn times_have_one_form() {
         assert_eq!(seconds(58, 0.5), "29 s");
         assert_eq!(seconds(3, 0.1), "0.3 s");
-        assert_eq!(seconds(1, 1.0 / 3.0), "0.33 s");
+        assert_eq!(seconds(3, 0.025), "0.075 s");
+        assert_eq!(seconds(1, 1.0 / 3.0), "0.333 s");
+        assert_eq!(seconds(3, 0.000_5), "0.0015 s");
     }
 
     #[test]

@@ -6,7 +6,6 @@ use config::FileError;
 use miette::miette;
 use observe::{Expectation, Observation, Watches};
 use protocol::messages::End;
-use protocol::time::time_s;
 use protocol::{Event, Tick};
 use recording::{Recording, Ticks};
 use scenario::Scenario;
@@ -70,7 +69,7 @@ fn observe(
 ) -> Vec<Event> {
     watches.observe(&Observation {
         tick: entry.tick,
-        time_s: time_s(entry.tick, tick_s),
+        tick_s,
         events: &entry.events,
         state: &|robot| recorded.and_then(|states| states.last.of(robot)),
     })

@@ -171,3 +171,55 @@ fn moves(robot: &RobotSummary) -> String {
     }
     lines.join("\n")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn robot(sent: &[(&str, u64)]) -> RobotSummary {
+        let sent = sent
+            .iter()
+            .map(|(text, count)| ((*text).to_owned(), *count));
+        RobotSummary {
+            sent: sent.collect(),
+            received: 3,
+            ..RobotSummary::default()
+        }
+    }
+
+    #[test]
+    fn the_most_frequent_five_texts_of_commands_have_a_line_each() {
+        let five = [("a", 1), ("b", 5), ("c", 2), ("d", 9), ("e", 4)];
+        let lines = "9 d\n5 b\n4 e\n2 c\n1 a";
+        assert_eq!(commands(&robot(&five)), format!("{lines}\n3 received"));
+
+        // Of those that are as frequent the first by name is shown.
+        let more = [&five[..], &[("f", 1), ("g", 1)]].concat();
+        assert_eq!(
+            commands(&robot(&more)),
+            format!("{lines}\n2 with 2 further texts\n3 received")
+        );
+    }
+
+    #[test]
+    fn the_time_in_which_a_robot_takes_no_part_has_a_line_of_its_own() {
+        let times_s = |times_s: &[(&str, f64)]| {
+            let times_s = times_s
+                .iter()
+                .map(|(state, time_s)| ((*state).to_owned(), *time_s));
+            times_s.collect::<BTreeMap<_, _>>()
+        };
+        let states = |text: &str| {
+            let lines = text.lines().map(|line| line.split("  ").next().unwrap());
+            lines.map(str::to_owned).collect::<Vec<_>>()
+        };
+
+        let lost = shares(&times_s(&[("SERVE", 3.0), ("WAIT", 1.0)]), 10.0, None);
+        assert_eq!(states(&lost), ["SERVE", "WAIT", "(takes no part) ██████"]);
+        assert!(lost.ends_with(" 60 %"), "{lost}");
+
+        // Sums of decimals are not exact.
+        let whole = shares(&times_s(&[("X", 0.1), ("Y", 0.2)]), 0.3, None);
+        assert!(!whole.contains(ABSENT), "{whole}");
+    }
+}

@@ -19,12 +19,20 @@ pub use words::Words;
 pub struct Observation<'a> {
     /// The tick; at the end of the run, the last one again.
     pub tick: Tick,
-    /// Its simulated time, seconds.
-    pub time_s: f64,
+    /// Length of a tick, seconds.
+    pub tick_s: f64,
     /// What happened in it.
     pub events: &'a [Event],
     /// What a robot reported last; `None` before its first report.
     pub state: &'a dyn Fn(&RobotName) -> Option<RobotState<'a>>,
+}
+
+impl Observation<'_> {
+    /// The simulated time of the tick, seconds.
+    #[must_use]
+    pub fn time_s(&self) -> f64 {
+        protocol::time::time_s(self.tick, self.tick_s)
+    }
 }
 
 /// What a robot reported last. Borrowed, because a run is observed in every tick.

@@ -401,15 +401,16 @@ impl TryFrom<RawMeasure> for Measure {
     }
 }
 
-/// Checks that two patterns, each with its key, say whose events they are where both could: events of different robots make no
-/// pair unless that is wanted.
+/// Checks that two patterns, each with its key, say whose events they are where the events of both have the field: events of
+/// different robots make no pair unless that is wanted. One that names a robot makes pairs with any robot of one that does not.
 fn check_pair(
     (key, one): (&'static str, &Pattern),
     (other_key, other): (&'static str, &Pattern),
     fields: &[&'static str],
 ) -> Result<(), MeasureError> {
     for field in fields {
-        if one.leaves_open(field) && other.leaves_open(field) {
+        let is_in_both = one.has_robot(field) && other.has_robot(field);
+        if is_in_both && (one.leaves_open(field) || other.leaves_open(field)) {
             return Err(MeasureError::Open(key, other_key, field));
         }
     }
@@ -678,6 +679,16 @@ mod tests {
             (
                 "time = { after = { event = 'lost' }, to = { event = 'joined' } }",
                 "`after` and `to` leave open whose events they are",
+            ),
+            // One of them is enough.
+            (
+                "time = { after = { event = 'lost', robot = 'A' }, to = { event = 'joined' } }",
+                "`after` and `to` leave open whose events they are",
+            ),
+            (
+                "between = { begin = { event = 'behavior', to = 'X' }, \
+                 end = { event = 'behavior', robot = 'A', from = 'X' }, as = 'sum' }",
+                "name `robot` in both",
             ),
             ("", "exactly one of"),
             (

@@ -274,10 +274,14 @@ impl Pattern {
             .all(|(field, wanted)| wanted.has(&event[field]))
     }
 
+    /// Whether its events have this field, with the name of a robot.
+    pub(crate) fn has_robot(&self, field: &str) -> bool {
+        KINDS[&self.kind].get(field) == Some(&Domain::Robot)
+    }
+
     /// Whether its events have a field with the name of a robot, of which it says nothing.
     pub(crate) fn leaves_open(&self, field: &str) -> bool {
-        let is_robot = KINDS[&self.kind].get(field) == Some(&Domain::Robot);
-        is_robot && !self.fields.contains_key(field)
+        self.has_robot(field) && !self.fields.contains_key(field)
     }
 
     /// The words that robots choose and that it names.

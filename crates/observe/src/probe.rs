@@ -1,5 +1,6 @@
 //! Takes a measure of a run, one observation after the other.
 
+use protocol::time::time_s;
 use protocol::{RobotName, Tick};
 use serde_json::Value;
 use timeline::{Kind as StateKind, Stay};
@@ -16,8 +17,9 @@ const OCCURRED: [&str; 4] = ["emotions_s", "behaviors_s", "entered", "sent"];
 /// A measure of one run.
 #[derive(Debug)]
 pub struct Probe<'a> {
-    /// Time of the last observation, simulated seconds. A run begins at 0.
-    now_s: f64,
+    /// The last tick. A run begins with 0.
+    now: Tick,
+    tick_s: f64,
     tally: Tally<'a>,
 }
 
@@ -45,19 +47,18 @@ impl<'a> Probe<'a> {
             }),
             Kind::Time(time) => Tally::Time(TimeTally {
                 definition: time,
-                begun_s: time.after.is_none().then_some(0.0),
-                reached_s: None,
+                begun: time.after.is_none().then_some(0),
+                reached: None,
             }),
             Kind::Between(between) => Tally::Between(BetweenTally {
                 definition: between,
-                open_s: None,
+                open: None,
                 durations: Durations::default(),
             }),
             Kind::Share(share) => Tally::Share(ShareTally {
                 definition: share,
                 robots: timeline::States::default(),
                 ticks: 0,
-                now: 0,
             }),
             Kind::Variable(variable) => Tally::Variable(VariableTally {
                 definition: variable,
@@ -66,16 +67,21 @@ impl<'a> Probe<'a> {
             Kind::Stalled(stalled) => Tally::Stalled(StalledTally {
                 definition: stalled,
                 values: vec![None; stalled.progress.len()],
-                progress_s: 0.0,
+                progress: 0,
             }),
         };
 
-        Self { now_s: 0.0, tally }
+        Self {
+            now: 0,
+            tick_s: 0.0,
+            tally,
+        }
     }
 
     /// Takes a tick, or the end of the run, into account.
     pub fn observe(&mut self, observation: &Observation<'_>) {
-        self.now_s = observation.time_s;
+        self.now = observation.tick;
+        self.tick_s = observation.tick_s;
         match &mut self.tally {
             Tally::Summary(_) => {}
             Tally::Count(tally) => tally.observe(observation),
@@ -90,15 +96,16 @@ impl<'a> Probe<'a> {
     /// What the measure gives at the end of the run, the summary of which is given as JSON.
     #[must_use]
     pub fn measured(&self, summary: &Value) -> Measured {
-        let now_s = self.now_s;
+        let now = self.now;
+        let tick_s = self.tick_s;
         match &self.tally {
             Tally::Summary(path) => summary_number(summary, path),
             Tally::Count(tally) => Measured::from(tally.count as f64),
-            Tally::Time(tally) => tally.measured(now_s),
-            Tally::Between(tally) => tally.measured(now_s),
-            Tally::Share(tally) => tally.measured(),
-            Tally::Variable(tally) => tally.measured(now_s),
-            Tally::Stalled(tally) => tally.measured(now_s),
+            Tally::Time(tally) => tally.measured(now, tick_s),
+            Tally::Between(tally) => tally.measured(now, tick_s),
+            Tally::Share(tally) => tally.measured(now),
+            Tally::Variable(tally) => tally.measured(now, tick_s),
+            Tally::Stalled(tally) => tally.measured(now, tick_s),
         }
     }
 }
@@ -166,8 +173,8 @@ impl CountTally<'_> {
         let (from_s, until_s) = self.condition_s;
         let is_counting = match self.definition.when {
             None => true,
-            Some(When::During) => (from_s..until_s).contains(&observation.time_s),
-            Some(When::After) => observation.time_s >= until_s,
+            Some(When::During) => (from_s..until_s).contains(&observation.time_s()),
+            Some(When::After) => observation.time_s() >= until_s,
         };
         if !is_counting {
             return;
@@ -184,39 +191,39 @@ impl CountTally<'_> {
 #[derive(Debug)]
 struct TimeTally<'a> {
     definition: &'a TimeTo,
-    /// Begin and end of the time, simulated seconds.
-    begun_s: Option<f64>,
-    reached_s: Option<f64>,
+    /// In which tick the time began, and in which it ended.
+    begun: Option<Tick>,
+    reached: Option<Tick>,
 }
 
 impl TimeTally<'_> {
     fn observe(&mut self, observation: &Observation<'_>) {
-        if self.reached_s.is_some() {
+        if self.reached.is_some() {
             return;
         }
 
         let events = observation.events;
         if let Some(after) = &self.definition.after
-            && self.begun_s.is_none()
+            && self.begun.is_none()
             && events.iter().any(|event| after.matches(event))
         {
-            self.begun_s = Some(observation.time_s);
+            self.begun = Some(observation.tick);
         }
 
         let to = &self.definition.to;
-        if self.begun_s.is_some() && events.iter().any(|event| to.matches(event)) {
-            self.reached_s = Some(observation.time_s);
+        if self.begun.is_some() && events.iter().any(|event| to.matches(event)) {
+            self.reached = Some(observation.tick);
         }
     }
 
-    fn measured(&self, now_s: f64) -> Measured {
-        match (self.begun_s, self.reached_s) {
+    fn measured(&self, now: Tick, tick_s: f64) -> Measured {
+        match (self.begun, self.reached) {
             (None, _) => Measured::NotAtRisk,
-            (Some(begun_s), Some(reached_s)) => Measured::Reached {
-                time_s: reached_s - begun_s,
+            (Some(begun), Some(reached)) => Measured::Reached {
+                time_s: time_s(reached - begun, tick_s),
             },
-            (Some(begun_s), None) => Measured::NotReached {
-                waited_s: now_s - begun_s,
+            (Some(begun), None) => Measured::NotReached {
+                waited_s: time_s(now - begun, tick_s),
             },
         }
     }
@@ -225,32 +232,34 @@ impl TimeTally<'_> {
 #[derive(Debug)]
 struct BetweenTally<'a> {
     definition: &'a Between,
-    /// Begin of the pair that is open, simulated seconds.
-    open_s: Option<f64>,
+    /// In which tick the pair that is open began.
+    open: Option<Tick>,
     durations: Durations,
 }
 
+/// How long pairs lasted, in ticks: sums of seconds would not be exact.
 #[derive(Debug, Clone, Copy, Default)]
 struct Durations {
     count: u64,
-    sum_s: f64,
-    max_s: f64,
+    sum: Tick,
+    max: Tick,
 }
 
 impl Durations {
-    fn add(&mut self, duration_s: f64) {
+    fn add(&mut self, duration: Tick) {
         self.count += 1;
-        self.sum_s += duration_s;
-        self.max_s = self.max_s.max(duration_s);
+        self.sum += duration;
+        self.max = self.max.max(duration);
     }
 
     /// A number of them; `None` if it does not exist.
-    fn number(&self, number: OfDurations) -> Option<f64> {
+    fn number(&self, number: OfDurations, tick_s: f64) -> Option<f64> {
         let has_any = self.count > 0;
+        let sum_s = time_s(self.sum, tick_s);
         match number {
-            OfDurations::Mean => has_any.then(|| self.sum_s / self.count as f64),
-            OfDurations::Max => has_any.then_some(self.max_s),
-            OfDurations::Sum => Some(self.sum_s),
+            OfDurations::Mean => has_any.then(|| sum_s / self.count as f64),
+            OfDurations::Max => has_any.then(|| time_s(self.max, tick_s)),
+            OfDurations::Sum => Some(sum_s),
             OfDurations::Count => Some(self.count as f64),
         }
     }
@@ -259,30 +268,30 @@ impl Durations {
 impl BetweenTally<'_> {
     fn observe(&mut self, observation: &Observation<'_>) {
         for event in observation.events {
-            if let Some(begun_s) = self.open_s
+            if let Some(begun) = self.open
                 && self.definition.end.matches(event)
             {
-                self.durations.add(observation.time_s - begun_s);
-                self.open_s = None;
+                self.durations.add(observation.tick - begun);
+                self.open = None;
             }
-            if self.open_s.is_none() && self.definition.begin.matches(event) {
-                self.open_s = Some(observation.time_s);
+            if self.open.is_none() && self.definition.begin.matches(event) {
+                self.open = Some(observation.tick);
             }
         }
     }
 
-    fn measured(&self, now_s: f64) -> Measured {
+    fn measured(&self, now: Tick, tick_s: f64) -> Measured {
         let definition = self.definition;
         let mut durations = self.durations;
         let mut is_finished = true;
-        if let Some(begun_s) = self.open_s
+        if let Some(begun) = self.open
             && (definition.until_end || definition.number != OfDurations::Count)
         {
-            durations.add(now_s - begun_s);
+            durations.add(now - begun);
             is_finished = definition.until_end;
         }
 
-        match durations.number(definition.number) {
+        match durations.number(definition.number, tick_s) {
             None => Measured::NoPair,
             Some(value) if is_finished => Measured::from(value),
             Some(at_least) => Measured::Unfinished { at_least },
@@ -296,13 +305,10 @@ struct ShareTally<'a> {
     robots: timeline::States,
     /// Ticks in the states before.
     ticks: Tick,
-    /// The last tick.
-    now: Tick,
 }
 
 impl ShareTally<'_> {
     fn observe(&mut self, observation: &Observation<'_>) {
-        self.now = observation.tick;
         for event in observation.events {
             for stay in self.robots.apply(observation.tick, event) {
                 self.ticks += self.counted(&stay);
@@ -321,15 +327,15 @@ impl ShareTally<'_> {
         if is_counted { stay.ticks() } else { 0 }
     }
 
-    fn measured(&self) -> Measured {
-        if self.now == 0 {
+    fn measured(&self, now: Tick) -> Measured {
+        if now == 0 {
             let reason = "a run that ends with tick 0 lasts for no time".to_owned();
             return Measured::Missing { reason };
         }
 
-        let lasting = self.robots.lasting(self.now);
+        let lasting = self.robots.lasting(now);
         let lasting: Tick = lasting.iter().map(|stay| self.counted(stay)).sum();
-        Measured::from((self.ticks + lasting) as f64 / self.now as f64)
+        Measured::from((self.ticks + lasting) as f64 / now as f64)
     }
 }
 
@@ -342,19 +348,19 @@ struct VariableTally<'a> {
 
 #[derive(Debug, Clone, Copy)]
 struct Values {
-    /// When the variable got its first value, simulated seconds.
-    begun_s: f64,
+    /// The tick in which the variable got its first value.
+    begun: Tick,
     last: f64,
-    /// When it got its last value, simulated seconds.
-    last_s: f64,
+    /// The tick in which it got its last value.
+    since: Tick,
     max: f64,
-    /// Integral up to `last_s`.
-    area: f64,
+    /// Sum over the ticks before `since`.
+    sum: f64,
 }
 
 impl Values {
-    fn area(&self, now_s: f64) -> f64 {
-        self.area + self.last * (now_s - self.last_s)
+    fn sum(&self, now: Tick) -> f64 {
+        self.sum + self.last * (now - self.since) as f64
     }
 }
 
@@ -365,34 +371,34 @@ impl VariableTally<'_> {
             return;
         };
 
-        let now_s = observation.time_s;
+        let now = observation.tick;
         let values = self.values.get_or_insert(Values {
-            begun_s: now_s,
+            begun: now,
             last: value,
-            last_s: now_s,
+            since: now,
             max: value,
-            area: 0.0,
+            sum: 0.0,
         });
         if value.to_bits() != values.last.to_bits() {
-            values.area = values.area(now_s);
+            values.sum = values.sum(now);
             values.last = value;
-            values.last_s = now_s;
+            values.since = now;
             values.max = values.max.max(value);
         }
     }
 
-    fn measured(&self, now_s: f64) -> Measured {
+    fn measured(&self, now: Tick, tick_s: f64) -> Measured {
         let definition = self.definition;
         let Some(values) = self.values else {
             return no_variable(&definition.robot, &definition.name);
         };
 
-        let duration_s = now_s - values.begun_s;
+        let ticks = now - values.begun;
         Measured::from(match definition.number {
-            OfValues::Mean if duration_s > 0.0 => values.area(now_s) / duration_s,
+            OfValues::Mean if ticks > 0 => values.sum(now) / ticks as f64,
             OfValues::End | OfValues::Mean => values.last,
             OfValues::Max => values.max,
-            OfValues::Area => values.area(now_s),
+            OfValues::Area => values.sum(now) * tick_s,
         })
     }
 }
@@ -402,8 +408,8 @@ struct StalledTally<'a> {
     definition: &'a Stalled,
     /// Last values of the variables of progress. A robot that is lost makes no progress.
     values: Vec<Option<f64>>,
-    /// Time of the last progress, simulated seconds.
-    progress_s: f64,
+    /// The tick of the last progress.
+    progress: Tick,
 }
 
 impl StalledTally<'_> {
@@ -413,24 +419,26 @@ impl StalledTally<'_> {
                 continue;
             };
             if before.is_some_and(|before| now > before) {
-                self.progress_s = observation.time_s;
+                self.progress = observation.tick;
             }
             *before = Some(now);
         }
     }
 
-    fn measured(&self, now_s: f64) -> Measured {
+    fn measured(&self, now: Tick, tick_s: f64) -> Measured {
         for (counter, value) in self.definition.progress.iter().zip(&self.values) {
             if value.is_none() {
                 return no_variable(&counter.robot, &counter.variable);
             }
         }
 
-        if now_s - self.progress_s < self.definition.lasting_s {
-            return Measured::NotReached { waited_s: now_s };
+        if time_s(now - self.progress, tick_s) < self.definition.lasting_s {
+            return Measured::NotReached {
+                waited_s: time_s(now, tick_s),
+            };
         }
         Measured::Reached {
-            time_s: self.progress_s,
+            time_s: time_s(self.progress, tick_s),
         }
     }
 }
@@ -498,6 +506,11 @@ mod tests {
     /// Takes a measure of a run with these ticks, the last of which is observed again at the end. The condition lasts from
     /// 1 s to 2 s.
     fn take(text: &str, ticks: &[Tick]) -> Measured {
+        take_at(TICK_S, text, ticks)
+    }
+
+    /// The same with ticks of another length.
+    fn take_at(tick_s: f64, text: &str, ticks: &[Tick]) -> Measured {
         let measure = measure(text);
         let mut probe = Probe::new(&measure, (1.0, 2.0));
         let mut variables = BTreeMap::new();
@@ -508,22 +521,23 @@ mod tests {
                 state_variables.insert("is_high", Variable::Flag(v > 3.0));
             }
             variables.insert(name("A"), state_variables);
-            observe(&mut probe, tick, &happening.events, &variables);
+            observe(&mut probe, tick_s, tick, &happening.events, &variables);
         }
 
-        observe(&mut probe, ticks.len() - 1, &[], &variables);
+        observe(&mut probe, tick_s, ticks.len() - 1, &[], &variables);
         probe.measured(&Value::Null)
     }
 
     fn observe(
         probe: &mut Probe<'_>,
+        tick_s: f64,
         tick: usize,
         events: &[Event],
         variables: &BTreeMap<RobotName, StateVariables>,
     ) {
         probe.observe(&Observation {
             tick: tick as u64,
-            time_s: tick as f64 * TICK_S,
+            tick_s,
             events,
             state: &|robot| {
                 variables.get(robot).map(|state_variables| RobotState {
@@ -598,7 +612,8 @@ mod tests {
     #[test]
     fn a_time_ends_with_the_first_event_or_is_censored_at_the_end() {
         let to_y = "time = { to = { event = 'behavior', to = 'Y' } }";
-        let after_z = "time = { to = { event = 'behavior', to = 'Y' }, after = { event = 'behavior', to = 'Z' } }";
+        let after_z = "time = { to = { event = 'behavior', robot = '*', to = 'Y' }, \
+                       after = { event = 'behavior', robot = '*', to = 'Z' } }";
         let y = enters("A", "X", "Y");
         let z = enters("A", "X", "Z");
         let come = |time_s| Measured::Reached { time_s };
@@ -630,8 +645,8 @@ mod tests {
         let numbers = |ticks: &[Tick]| {
             ["mean", "max", "sum", "count"].map(|number| {
                 let text = format!(
-                    "between = {{ begin = {{ event = 'behavior', to = 'Y' }}, \
-                     end = {{ event = 'behavior', from = 'Y' }}, as = '{number}' }}"
+                    "between = {{ begin = {{ event = 'behavior', robot = 'A', to = 'Y' }}, \
+                     end = {{ event = 'behavior', robot = 'A', from = 'Y' }}, as = '{number}' }}"
                 );
                 take(&text, ticks)
             })
@@ -671,14 +686,47 @@ mod tests {
         pairs.push(happens(&[&begin]));
         pairs.push(nothing);
         assert_eq!(numbers(&pairs), unfinished([1.0, 1.5, 3.0], 2.0));
-        let until_end = "between = { begin = { event = 'behavior', to = 'Y' }, \
-                         end = { event = 'lost' }, as = 'count', until_end = true }";
+        let until_end = "between = { begin = { event = 'behavior', robot = 'A', to = 'Y' }, \
+                         end = { event = 'lost', robot = 'A' }, as = 'count', until_end = true }";
         assert_eq!(certain_of(until_end, &pairs), 1.0);
         let until_end = until_end.replace("count", "sum");
         assert_eq!(certain_of(&until_end, &pairs), 4.0);
         // One event may end a pair and begin the next.
         let chain = [happens(&[&begin]), happens(&[&again]), Tick::default()];
         assert_eq!(numbers(&chain), unfinished([0.5, 0.5, 1.0], 1.0));
+    }
+
+    /// Times are ticks times the length of a tick: 0.4 s - 0.1 s is not 0.3 s in floating-point numbers.
+    #[test]
+    fn times_are_the_shortest_decimals_that_are_right() {
+        let x = enters("A", "Y", "X");
+        let y = enters("A", "X", "Y");
+        let mut ticks = vec![Tick::default(); 9];
+        ticks[1] = happens(&[&y]);
+        ticks[4] = happens(&[&x]);
+        ticks[5] = happens(&[&y]);
+        ticks[8] = happens(&[&x]);
+
+        let begin = "{ event = 'behavior', robot = 'A', to = 'Y' }";
+        let end = "{ event = 'behavior', robot = 'A', to = 'X' }";
+        let other = "{ event = 'behavior', robot = 'A', to = 'Z' }";
+        let time = format!("time = {{ after = {begin}, to = {end} }}");
+        let waits = format!("time = {{ after = {end}, to = {other} }}");
+        let pairs =
+            |number| format!("between = {{ begin = {begin}, end = {end}, as = '{number}' }}");
+        let reached = |time_s| Measured::Reached { time_s };
+        let waited = |waited_s| Measured::NotReached { waited_s };
+        for (tick_s, text, expected) in [
+            (0.1, time.clone(), reached(0.3)),
+            (1.0 / 3.0, time, reached(1.0)),
+            (0.1, waits, waited(0.4)),
+            (0.1, pairs("max"), 0.3.into()),
+            (0.1, pairs("sum"), 0.6.into()),
+            (0.1, pairs("mean"), 0.3.into()),
+            (0.025, pairs("max"), 0.075.into()),
+        ] {
+            assert_eq!(take_at(tick_s, &text, &ticks), expected, "{tick_s}: {text}");
+        }
     }
 
     #[test]
@@ -802,7 +850,8 @@ mod tests {
             let area: u32 = lasting.iter().map(|behavior| u32::from(*behavior)).sum();
             let run_s = lasting.len() as f64 * TICK_S;
 
-            let stays = "begin = { event = 'behavior', to = 'Y' }, end = { event = 'behavior', from = 'Y' }";
+            let stays = "begin = { event = 'behavior', robot = '*', to = 'Y' }, \
+                         end = { event = 'behavior', robot = '*', from = 'Y' }";
             let share = in_y / lasting.len() as f64;
             let area = f64::from(area) * TICK_S;
             let entered = certain_of("count = { event = 'behavior', to = 'Y' }", &ticks);

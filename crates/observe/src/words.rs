@@ -216,7 +216,7 @@ mod tests {
         ];
         words.observe(&Observation {
             tick: 0,
-            time_s: 0.0,
+            tick_s: 0.5,
             events: &events,
             state: &|_| None,
         });
@@ -248,9 +248,9 @@ mod tests {
         assert_eq!(
             after_a_run(&measures, &expectations),
             [
-                "the emotion \"HAPPY\" of B",
                 "the emotion \"HAPY\" of A: HAPPY",
                 "the emotion \"SAD\" of A",
+                "the emotion \"HAPPY\" of B",
                 "the behavior \"REST\"",
                 "the behavior \"SERVES\" of B: SERVE",
                 "the behavior \"SREVE\" of B: SERVE",

@@ -79,7 +79,7 @@ impl Run {
         let robots = &self.robots;
         let judgment = self.watch.observe(&Observation {
             tick: self.tick,
-            time_s: self.tick as f64 * TICK_S,
+            tick_s: TICK_S,
             events,
             state: &|robot| {
                 robots.get(robot).map(|stated| RobotState {
@@ -402,7 +402,7 @@ fn each_expectation_is_judged_once() {
         let events = [say("")];
         judged.extend(watches.observe(&Observation {
             tick,
-            time_s: 0.0,
+            tick_s: TICK_S,
             events: &events,
             state: &|_| None,
         }));

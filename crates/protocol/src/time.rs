@@ -23,6 +23,12 @@ pub fn time_s(tick: Tick, tick_s: f64) -> f64 {
     product_s
 }
 
+/// How much later one simulated time is than another, seconds: without the error of a difference of floating-point numbers.
+#[must_use]
+pub fn between_s(earlier_s: f64, later_s: f64) -> f64 {
+    time_s(1, later_s - earlier_s)
+}
+
 /// How many decimals a text needs to tell the times of two ticks apart, at least 1.
 #[must_use]
 pub fn decimals(tick_s: f64) -> usize {
@@ -56,6 +62,13 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+
+    #[test]
+    fn a_difference_of_times_is_the_shortest_decimal_that_is_right() {
+        assert_eq!(between_s(0.1, 0.4), 0.3);
+        assert_eq!(between_s(1.7, 1.8), 0.1);
+        assert_eq!(between_s(3.0, 3.0), 0.0);
+    }
 
     #[test]
     fn the_time_of_a_tick_is_the_shortest_decimal_that_is_right() {

@@ -401,7 +401,7 @@ impl Simulation {
         let mut watches = std::mem::take(&mut self.watches);
         let judged = watches.observe(&Observation {
             tick: self.tick,
-            time_s: self.time_s(self.tick),
+            tick_s: self.scenario.tick_s,
             events: &self.events,
             state: &|name| self.robot_state(name),
         });

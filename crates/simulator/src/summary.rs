@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use protocol::event::WaitedFor;
 use protocol::messages::{End, StateVariables, Verdict};
+use protocol::time::time_s;
 use protocol::{Event, RobotName, RunName, Tick};
 use serde::{Deserialize, Serialize};
 use timeline::{Kind, States, Stay};
@@ -52,6 +53,9 @@ pub struct Summary {
     begun: Option<Instant>,
     #[serde(skip)]
     states: States,
+    /// Ticks in each state: sums of seconds would not be exact.
+    #[serde(skip)]
+    ticks_in: BTreeMap<(RobotName, Kind, String), Tick>,
 }
 
 /// A verdict on an expectation.
@@ -138,6 +142,7 @@ impl Summary {
             wall: Wall::default(),
             begun: None,
             states: States::default(),
+            ticks_in: BTreeMap::new(),
         }
     }
 
@@ -199,13 +204,17 @@ impl Summary {
 
     /// Adds the time in a state that is over.
     fn add(&mut self, stay: Stay, tick_s: f64) {
-        let ticks = stay.ticks();
+        let key = (stay.robot.clone(), stay.kind, stay.state.clone());
+        let total = self.ticks_in.entry(key).or_default();
+        *total += stay.ticks();
+        let total_s = time_s(*total, tick_s);
+
         let robot = self.robot(&stay.robot);
         let times_s = match stay.kind {
             Kind::Emotion => &mut robot.emotions_s,
             Kind::Behavior => &mut robot.behaviors_s,
         };
-        *times_s.entry(stay.state).or_default() += ticks as f64 * tick_s;
+        times_s.insert(stay.state, total_s);
     }
 
     /// The verdict on the run: the worst of its expectations. A run of which nothing is expected passes.

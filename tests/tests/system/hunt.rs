@@ -277,3 +277,31 @@ fn a_named_command_is_lost_in_runs_launches_and_forks() {
     assert_eq!(scripted(&lab, "fork"), [4]);
     lab.ok(&["verify", "fork"]);
 }
+
+/// That an expectation was not seen to fail means something only if a plan has asked it.
+#[test]
+fn an_expectation_that_no_plan_has_asked_is_named() {
+    let lab = Lab::new();
+    let unasked = "after = { event = 'behavior', robot = 'Butler', to = 'NOWHERE' }, \
+                   eventually = { robot = 'Butler', behavior = 'SERVE' }, within = '5 s'";
+    let asked = unasked.replace("NOWHERE", "SERVE");
+    let expect = format!("expect=[{{ name = 'odd', {unasked} }}, {{ name = 'even', {asked} }}]");
+    let args = [
+        "hunt",
+        HALL,
+        "--plans",
+        "3",
+        "--set",
+        "duration=20 s",
+        "--set",
+    ];
+    let args = [&args[..], &[&expect]].concat();
+
+    let printed = lab.ok(&args);
+    assert!(printed.contains("\nnever asked: odd\n"), "{printed}");
+    assert!(printed.contains("\nnot seen to fail: even\n"), "{printed}");
+
+    let report = lab.ok(&[&args[..], &["--json"]].concat());
+    let report: Value = serde_json::from_str(&report).unwrap();
+    assert_eq!(report["never_asked"], serde_json::json!(["odd"]));
+}

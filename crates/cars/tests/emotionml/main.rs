@@ -299,6 +299,7 @@ fn says_what_the_record_says(lab: &Lab, run: &str, emotions: &[Emotion]) {
                 .push(rounded);
         }
     }
+    let end_ms = (lab.ticks(run).len() as u64 - 1) * 500;
     let mut exported: BTreeMap<String, Vec<f64>> = BTreeMap::new();
     for one in emotions {
         let trace = exported.entry(one.robot.clone()).or_default();
@@ -309,6 +310,14 @@ fn says_what_the_record_says(lab: &Lab, run: &str, emotions: &[Emotion]) {
             one.id
         );
         trace.extend(one.trace.as_ref().unwrap());
+        // An episode lasts until the next one, and the last one until the last tick.
+        let lasted_ms = (trace.len() as u64 * 500).min(end_ms);
+        assert_eq!(
+            one.offset_ms + one.duration_ms,
+            lasted_ms,
+            "{run}: {}",
+            one.id
+        );
     }
     assert_eq!(exported, recorded, "{run}");
 }
@@ -738,7 +747,7 @@ fn a_robot_that_publishes_no_intensity_has_emotions_without() {
             &all[0].trace,
             all[0].duration_ms
         ),
-        (Some("CURIOUS"), &None, 500)
+        (Some("CURIOUS"), &None, 0)
     );
 
     let (document, notes) = lab.export(&["made", "--standard"]);
@@ -754,7 +763,8 @@ fn what_a_crash_cut_off_is_left_out_and_damage_is_an_error() {
     let happy = json!([robot("Ada", "HAPPY", "", &json!({"intensity": 0.5}))]);
     lab.record("whole", &vec![happy.clone(); 10_000]);
     let all = emotions(&lab.export(&["whole"]).0);
-    assert_eq!((all.len(), all[0].duration_ms), (1, 5_000_000));
+    // 10,000 ticks, the last of which has no time.
+    assert_eq!((all.len(), all[0].duration_ms), (1, 4_999_500));
 
     let bytes = std::fs::read(lab.recording("whole")).unwrap();
     lab.record("broken", &[]);

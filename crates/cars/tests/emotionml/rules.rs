@@ -83,6 +83,7 @@ pub(crate) fn broken(text: &str) -> BTreeSet<String> {
         }
     }
 
+    rules.end_ms = elements(root, "emotion").filter_map(end_ms).max();
     for emotion in elements(root, "emotion") {
         rules.emotion(root, emotion, &vocabularies);
     }
@@ -93,6 +94,15 @@ pub(crate) fn broken(text: &str) -> BTreeSet<String> {
 #[derive(Default)]
 struct Rules {
     broken: BTreeSet<String>,
+    /// When the last emotion ends.
+    end_ms: Option<i64>,
+}
+
+/// When an emotion ends, after the reference.
+fn end_ms(emotion: Node) -> Option<i64> {
+    let offset_ms: i64 = emotion.attribute("offset-to-start")?.parse().ok()?;
+    let duration_ms: i64 = emotion.attribute("duration")?.parse().ok()?;
+    Some(offset_ms + duration_ms)
 }
 
 impl Rules {
@@ -241,11 +251,13 @@ impl Rules {
                 .attribute("duration")
                 .and_then(|text| text.parse::<f64>().ok());
             if let (Some(frequency_hz), Some(duration_ms)) = (frequency_hz, duration_ms) {
-                // To the rounding of the times.
-                self.demand(
-                    "trace",
-                    (count / frequency_hz * 1000.0 - duration_ms).abs() <= 1.0,
-                );
+                // A sample lasts until the next one. The run ends with its last sample, which lasts for no time.
+                let is_until_end = end_ms(emotion) == self.end_ms;
+                let lasts = |samples: f64| {
+                    let rounding_ms = 1.0;
+                    (samples / frequency_hz * 1000.0 - duration_ms).abs() <= rounding_ms
+                };
+                self.demand("trace", lasts(count) || is_until_end && lasts(count - 1.0));
             }
         }
     }

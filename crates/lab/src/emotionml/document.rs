@@ -434,7 +434,8 @@ fn about(facts: &Facts, keys: &Keys) -> String {
 
     format!(
         "Emotions of robots in the simulated run {run}{epoch}, seed {seed}, from its {file}, by cars {}. \
-         Times are simulated milliseconds since tick 0 of {}; a tick lasts {tick_s} s and a trace has one sample a tick. \
+         Times are simulated milliseconds since tick 0 of {}; a tick lasts {tick_s} s and a trace has one sample a tick, \
+         each of which lasts until the next tick; the run ends with its last tick, so the sample of that lasts for no time. \
          Robots are named by their addresses on the network. A category is as intense as its trace; dimensions and \
          appraisals are means over the episode of what the robot published.",
         env!("CARGO_PKG_VERSION"),

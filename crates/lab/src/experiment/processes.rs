@@ -7,7 +7,6 @@ use config::FileError;
 use miette::{IntoDiagnostic, miette};
 use observe::Observation;
 use protocol::Event;
-use protocol::time::time_s;
 use recording::{Recording, Ticks};
 use scenario::Scenario;
 use simulator::RunFolder;
@@ -187,7 +186,7 @@ fn read(scenario: &Scenario, run: &RunFolder, follower: &mut impl Follow) -> mie
         {
             follower.observe(&Observation {
                 tick: number,
-                time_s: time_s(number, scenario.tick_s),
+                tick_s: scenario.tick_s,
                 events: &events,
                 state: &|robot| states.of(robot),
             });

@@ -32,7 +32,7 @@ impl Follow for Script {
             let urgency = state.and_then(|state| state.state_variables.get(URGENCY)?.as_f64());
 
             let mut shown = Table::new();
-            shown.insert("at_s".to_owned(), observation.time_s.into());
+            shown.insert("at_s".to_owned(), observation.time_s().into());
             shown.insert("emotion".to_owned(), to.clone().into());
             shown.insert(URGENCY.to_owned(), urgency.unwrap_or(0.0).into());
             let entries = self.robots.entry(robot.clone()).or_default();

@@ -239,7 +239,7 @@ fn follow_in_process(scenario: Scenario, follower: &mut impl Follow) -> miette::
         }
         follower.observe(&Observation {
             tick: record.tick,
-            time_s: simulation.time_s(record.tick),
+            tick_s: simulation.scenario().tick_s,
             events: &record.events,
             state: &|robot| simulation.robot_state(robot),
         });

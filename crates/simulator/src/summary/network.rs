@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use protocol::event::Cause;
+use protocol::time::{between_s, time_s};
 use protocol::{Event, RobotName, Tick};
 use serde::{Deserialize, Serialize};
 
@@ -89,7 +90,7 @@ impl NetworkSummary {
         if let Some(cut) = last_first.into_iter().find(|cut| cut.is_of(from, to))
             && let Some(until_s) = cut.until_s
         {
-            cut.healed_after_s.get_or_insert(now_s - until_s);
+            cut.healed_after_s.get_or_insert(between_s(until_s, now_s));
         }
     }
 
@@ -99,7 +100,8 @@ impl NetworkSummary {
         if because == Cause::Partition
             && let Some(cut) = self.open_cut(from, to)
         {
-            cut.detected_after_s.get_or_insert(now_s - cut.from_s);
+            cut.detected_after_s
+                .get_or_insert(between_s(cut.from_s, now_s));
         }
     }
 
@@ -116,7 +118,8 @@ impl NetworkSummary {
         }
 
         if queries && let Some(cut) = self.open_cut(from, to) {
-            cut.detected_after_s.get_or_insert(now_s - cut.from_s);
+            cut.detected_after_s
+                .get_or_insert(between_s(cut.from_s, now_s));
         }
     }
 
@@ -129,7 +132,7 @@ impl NetworkSummary {
                 let link = self.link(asker, target);
                 link.unreachable_ticks += 1;
                 link.stale_ticks += 1;
-                link.longest_stale_s = link.longest_stale_s.max(link.stale_ticks as f64 * tick_s);
+                link.longest_stale_s = link.longest_stale_s.max(time_s(link.stale_ticks, tick_s));
                 aged.insert(key(asker, target));
             }
         }
