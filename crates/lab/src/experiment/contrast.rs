@@ -501,8 +501,11 @@ mod tests {
         let outcomes = measured(&experiment, &arm[..], &[0.0; 8].map(at));
         let outcomes: Vec<Outcome> = outcomes.into_iter().filter(|run| run.seed < 5).collect();
         let contrasts = experiment.contrast(&outcomes);
-        let Difference::Time { restricted_mean_s, until_s, .. } =
-            &find(&contrasts, "deadlock", "rules").difference
+        let Difference::Time {
+            restricted_mean_s,
+            until_s,
+            ..
+        } = &find(&contrasts, "deadlock", "rules").difference
         else {
             panic!("{contrasts:?}");
         };
