@@ -17,9 +17,7 @@ fn without_threads(program: &str, args: &[&str]) -> Command {
         NOBODY_ELSE,
         "--clear-groups",
     ];
-    command
-        .args(user)
-        .args(["sh", "-c", "ulimit -u 1; exec \"$0\" \"$@\""]);
+    command.args(user).args(["prlimit", "--nproc=1"]);
     command
         .arg(programs().join(program))
         .args(args)
