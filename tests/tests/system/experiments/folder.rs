@@ -409,7 +409,7 @@ fn two_experiment_files_of_one_name_do_not_share_a_folder_by_chance() {
     let (code, printed) = play("other", "Is it another", &[]);
     assert_eq!(code, Some(1), "{printed}");
     assert!(
-        printed.contains("choose another folder with --out"),
+        printed.contains("choose another folder with -o"),
         "{printed}"
     );
     let out = ["--out", "runs/experiments/twice"];
