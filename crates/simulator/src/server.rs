@@ -7,8 +7,10 @@
 //!
 //! A [`Replay`] is in the simulator's place, too, with a recording instead of a simulation.
 
+mod answer;
 mod control;
 mod departed;
+mod ended;
 mod faults;
 mod inbox;
 mod join;

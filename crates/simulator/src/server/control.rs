@@ -4,11 +4,12 @@ use std::time::Duration;
 
 use bus::Query;
 use protocol::messages::{
-    Awaited, Control, ControlAnswer, End, FieldError, Intervention, Phase, RobotStatus, Setup,
-    SetupAnswer, Status,
+    Awaited, Control, ControlAnswer, End, Intervention, Phase, RobotStatus, Setup, SetupAnswer,
+    Status,
 };
 use protocol::{Epoch, RobotName, decode, encode};
 
+use super::answer::{Refusal, refuse};
 use super::process::{Interrupt, Server, Stage};
 use crate::simulation::Simulation;
 use config::diagnostic::Source;
@@ -361,35 +362,6 @@ impl Server {
     }
 }
 
-/// Why something is not done.
-pub(super) struct Refusal {
-    explanation: String,
-    fields: Vec<FieldError>,
-}
-
-impl From<String> for Refusal {
-    fn from(explanation: String) -> Self {
-        Self {
-            explanation,
-            fields: Vec::new(),
-        }
-    }
-}
-
-impl From<Refusal> for ControlAnswer {
-    fn from(
-        Refusal {
-            explanation,
-            fields,
-        }: Refusal,
-    ) -> Self {
-        Self::Refused {
-            explanation,
-            fields,
-        }
-    }
-}
-
 /// Checks that an epoch is the one in progress, if it is named.
 fn check_epoch(epoch: Option<Epoch>, simulation: &Simulation) -> Result<(), Refusal> {
     let now = simulation.epoch();
@@ -447,9 +419,4 @@ pub(super) fn answer_setup(query: &Query, scenario: &Scenario) {
         }
         Err(error) => refuse(query, &error.to_string()),
     }
-}
-
-pub(super) fn refuse(query: &Query, explanation: &str) {
-    let answer = ControlAnswer::from(Refusal::from(explanation.to_owned()));
-    query.reply(query.key(), encode(&answer));
 }

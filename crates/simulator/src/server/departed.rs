@@ -4,14 +4,10 @@ use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use protocol::RobotName;
-use protocol::event::WaitedFor;
-use protocol::messages::Reason;
-
-use super::process::Server;
 
 /// A process that is refused because its name is taken asks again every 0.1 s. One that has asked within this time is a standby
 /// that takes the place as soon as it is free.
-const STANDBY: Duration = Duration::from_secs(1);
+pub(super) const STANDBY: Duration = Duration::from_secs(1);
 
 /// Robots whose processes have ended, and processes that stand by.
 #[derive(Debug, Default)]
@@ -29,7 +25,7 @@ impl Departed {
     }
 
     /// A process takes the place of this robot.
-    pub(super) fn is_here(&mut self, robot: &RobotName) {
+    pub(super) fn forget(&mut self, robot: &RobotName) {
         self.because.remove(robot);
         self.refused.remove(robot);
     }
@@ -39,8 +35,18 @@ impl Departed {
         self.refused.insert(robot.clone(), Instant::now());
     }
 
+    /// Whether no process has ended for good.
+    pub(super) fn is_empty(&self) -> bool {
+        self.because.is_empty()
+    }
+
+    /// How the process of a robot ended, if none follows.
+    pub(super) fn because(&self, robot: &RobotName) -> Option<&str> {
+        self.because.get(robot).map(String::as_str)
+    }
+
     /// How long a process may take that stands by for this robot; `None` if none has asked to join lately.
-    fn standby_left(&self, robot: &RobotName) -> Option<Duration> {
+    pub(super) fn standby_left(&self, robot: &RobotName) -> Option<Duration> {
         let left = STANDBY.checked_sub(self.refused.get(robot)?.elapsed())?;
         (!left.is_zero()).then_some(left)
     }
@@ -54,42 +60,4 @@ pub(super) enum Wait {
     Standby(Duration),
     /// It does, and would do so for ever.
     Endless,
-}
-
-impl Server {
-    /// Whether the clock waits for a robot whose process has ended for good.
-    pub(super) fn endless_wait(&self) -> Wait {
-        let mut wait = Wait::Sound;
-        if self.departed.because.is_empty() {
-            return wait;
-        }
-
-        for (robot, reason) in self.barrier.awaited() {
-            let is_gone = matches!(reason, Reason::Gone | Reason::NotJoined);
-            if !is_gone || !self.departed.because.contains_key(&robot) {
-                continue;
-            }
-            if self.barrier.is_reserved(&robot) {
-                wait = Wait::Standby(STANDBY);
-                continue;
-            }
-            match self.departed.standby_left(&robot) {
-                None => return Wait::Endless,
-                Some(left) => wait = Wait::Standby(left),
-            }
-        }
-        wait
-    }
-
-    /// The robots for which the clock waits now, and why.
-    pub(super) fn waited_for(&self) -> Vec<WaitedFor> {
-        let mut waited_for = Vec::new();
-        for (robot, reason) in self.barrier.awaited() {
-            let is_gone = matches!(reason, Reason::Gone | Reason::NotJoined);
-            let ended = self.departed.because.get(&robot).filter(|_| is_gone);
-            let because = ended.cloned().map_or(reason, Reason::Ended);
-            waited_for.push(WaitedFor { robot, because });
-        }
-        waited_for
-    }
 }

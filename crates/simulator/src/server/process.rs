@@ -20,7 +20,7 @@ use crate::summary::{Summary, Wall};
 use config::diagnostic::FileError;
 use scenario::Scenario;
 
-use super::control::refuse;
+use super::answer::refuse;
 use super::departed::{Departed, Wait};
 use super::inbox::{Events, Inbox, Work, inbox};
 use super::observers::Observers;
@@ -1104,7 +1104,7 @@ impl Server {
         };
 
         if is_present {
-            self.departed.is_here(&name);
+            self.departed.forget(&name);
         }
         self.barrier.token(&name, is_present, &mut self.outputs);
     }

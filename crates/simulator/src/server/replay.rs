@@ -21,7 +21,8 @@ use recording::{Recording, RecordingError};
 use config::diagnostic::Source;
 use scenario::Scenario;
 
-use super::control::{answer_setup, refuse};
+use super::answer::refuse;
+use super::control::answer_setup;
 use super::inbox::{Events, Inbox, Work, inbox};
 use super::observers::{FRAME_INTERVAL, Observers};
 use super::pace::Pace;
