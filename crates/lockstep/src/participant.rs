@@ -543,6 +543,12 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         self.standing == Standing::Left
     }
 
+    /// Whether it waits for an answer to its request to join: another process does not have its place, as far as it knows.
+    #[must_use]
+    pub fn is_unanswered(&self) -> bool {
+        self.admission.is_none() && !self.is_name_taken
+    }
+
     /// What it was admitted to.
     #[must_use]
     pub fn admission(&self) -> Option<Admission> {

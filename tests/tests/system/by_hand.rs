@@ -1,10 +1,12 @@
 //! Experiments by hand on real launches: what is done takes effect, is in the record, and is done again where the run is executed
 //! again.
 
+use std::process::{Command, Stdio};
+
 use nix::sys::signal::Signal;
 use serde_json::Value;
 use system_tests::processes::{Running, nobody_is_left, send};
-use system_tests::{Lab, assert_same, eventually};
+use system_tests::{Lab, assert_same, eventually, programs, root};
 
 const FILE: &str = "launch/hors_doeuvres.toml";
 
@@ -228,15 +230,35 @@ fn what_cannot_be_done_by_hand_is_refused_with_the_reason() {
     launch.finish();
     assert_eq!(of_kind(&lab, run, "changed", "set").len(), 1);
 
-    // Nobody could stop a process of these.
+    // No launcher could stop the processes of these.
     let alone = "by-hand-alone";
-    let mut quiet = lab.start(
-        alone,
-        &["launch", FILE, "--no-console", "--quiet", "--paused"],
-    );
+    let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let endpoint = format!("tcp/{}", free.local_addr().unwrap());
+    drop(free);
+    let start = |program: &str, args: &[&str]| {
+        let mut command = Command::new(programs().join(program));
+        command
+            .current_dir(root())
+            .args(args)
+            .args(["--run", alone]);
+        command
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null());
+        command.spawn().unwrap()
+    };
+    let out = lab.out().display().to_string();
+    let scenario = "configs/hors_doeuvres.toml";
+    let args = [scenario, "--paused", "--listen", &endpoint, "--out", &out];
+    let mut simulator = start("cars-sim", &args);
+    let robots = ["cars-butler", "cars-leguin"];
+    let robots = robots.map(|robot| start(robot, &["--connect", &endpoint]));
     lab.until_ready(alone);
     let (_, said) = lab.fails(&["ctl", "crash", "Leguin", "--run", alone]);
     assert!(said.contains("no launcher is connected"), "{said}");
     lab.ctl(alone, &["stop"]);
-    quiet.wait();
+    simulator.wait().unwrap();
+    for mut robot in robots {
+        robot.wait().unwrap();
+    }
 }

@@ -533,11 +533,7 @@ fn an_export_that_fails_names_the_reason_and_leaves_nothing_behind() {
         1,
         "cannot write /nowhere/trace.json",
     );
-    fails(
-        &["trace", "hall", "-o", "/dev/null"],
-        1,
-        "something else than a file is there",
-    );
+    lab.ok(&["trace", "hall", "-o", "/dev/null"]);
     let recording = lab.file("hall", "run.mcap");
     fails(
         &["trace", "hall", "-o", recording.to_str().unwrap()],

@@ -568,10 +568,11 @@ fn impossible_faults_are_refused_where_they_stand() {
         let (_, text) = lab.fails(&["launch", FILE, "--set", &set]);
         assert!(text.contains(reason), "{fault}: {text}");
     }
-    let fault = "fault=[{ robot = \"Leguin\", do = \"hang\", at = \"4 s\", for = \"1 s\" }]";
-    let (_, text) = lab.fails(&["run", FILE, "--set", fault]);
-    assert!(text.contains("cars launch"), "{text}");
     let goes_on = "robot.Leguin.on_late=continue";
+    let slow = "fault=[{ robot = \"Leguin\", do = \"slow\", at = \"4 s\", until = \"5 s\" }]";
+    let (_, text) = lab.fails(&["run", FILE, "--set", slow, "--set", goes_on]);
+    assert!(text.contains("cars launch"), "{text}");
+    let fault = "fault=[{ robot = \"Leguin\", do = \"hang\", at = \"4 s\", for = \"1 s\" }]";
     let (_, text) = lab.fails(&["launch", FILE, "--set", fault, "--set", goes_on]);
     assert!(text.contains("say `until`"), "{text}");
 }

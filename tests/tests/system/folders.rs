@@ -537,11 +537,11 @@ fn reserved_names_are_refused_everywhere_with_what_to_do() {
         "latest.toml",
         "[[robot]]\nname = \"Butler\"\nat = [\"25 ft\", \"25 ft\"]\n",
     );
-    let launch = lab.write("experiments.toml", "scenario = \"latest.toml\"\n");
-    let named = lab.write(
-        "named.toml",
-        "scenario = \"latest.toml\"\nrun = \"latest\"\n",
-    );
+    let butler = "[[process]]\nname = \"Butler\"\ncommand = [\"cars-butler\"]\n";
+    let text = format!("scenario = \"latest.toml\"\n{butler}");
+    let launch = lab.write("experiments.toml", &text);
+    let text = format!("scenario = \"latest.toml\"\nrun = \"latest\"\n{butler}");
+    let named = lab.write("named.toml", &text);
     let before = tree(lab.out());
     let path = |path: &Path| path.to_str().unwrap().to_owned();
     let [file, launch, named] = [&file, &launch, &named].map(|file| path(file));
@@ -962,8 +962,9 @@ fn a_new_robot_has_runs_of_its_own_name_and_no_reserved_one() {
             .arg(&runs)
             .output()
             .unwrap();
-        let first = said(&output);
-        let first = first.lines().next().unwrap_or_default();
+        // What is said about the run, before the lines of its log.
+        let notes = String::from_utf8_lossy(&output.stderr).into_owned();
+        let first = notes.lines().next().unwrap_or_default();
         assert!(
             runs.join(name).join("summary.json").exists(),
             "{}",

@@ -8,7 +8,7 @@ use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{
     Answer, Clock, Command, Control, ControlAnswer, FaultOrder, JoinAnswer, JoinRequest, LogRecord,
-    MAX_ENTRIES, MAX_TEXT_BYTES, MAX_WIDGETS, News, Panel, PublicState, Report, Waiting,
+    MAX_ENTRIES, MAX_LINE_BYTES, MAX_TEXT_BYTES, MAX_WIDGETS, News, Panel, PublicState, Report, Waiting,
     WorldFrame,
 };
 use protocol::name::MAX_NAME_LEN;
@@ -218,6 +218,7 @@ fn limits_times_and_version_are_those_of_the_code() {
     let expected = [
         format!("{MAX_MESSAGE_BYTES} bytes"),
         format!("{MAX_TEXT_BYTES} bytes"),
+        format!("{MAX_LINE_BYTES} bytes"),
         MAX_ENTRIES.to_string(),
         MAX_WIDGETS.to_string(),
         format!("{MAX_NAME_LEN} bytes"),

@@ -368,13 +368,12 @@ impl Inner {
         }
     }
 
-    /// Fires the timers that are due.
     /// Whether a robot that has not been admitted in time goes on trying: the simulator is there.
     fn extends(&mut self, name: &RobotName) -> bool {
         let participant = self.participants.get(name);
-        let is_admitted = participant.is_none_or(|robot| robot.admission().is_some());
+        let is_unanswered = participant.is_some_and(Participant::is_unanswered);
         let extensions = self.extensions.entry(name.clone()).or_default();
-        if is_admitted || !self.has_simulator || *extensions == EXTENSIONS {
+        if !is_unanswered || !self.has_simulator || *extensions == EXTENSIONS {
             return false;
         }
 
@@ -394,6 +393,7 @@ impl Inner {
         true
     }
 
+    /// Fires the timers that are due.
     fn fire(&mut self) {
         let now = Instant::now();
         while let Some((name, timer)) = self

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
 use protocol::random;
-use system_tests::{Lab, PATIENCE, is_within, root};
+use system_tests::{Lab, PATIENCE, is_within, programs, root};
 
 use super::{HALL, assert_same_results, cars, command, files_of_units, ok, rows};
 
@@ -412,42 +412,68 @@ fn two_experiment_files_of_one_name_do_not_share_a_folder_by_chance() {
         printed.contains("choose another folder with -o"),
         "{printed}"
     );
+    // Naming the folder does not give it to another experiment.
     let out = ["--out", "runs/experiments/twice"];
+    assert_eq!(play("other", "Is it another", &out).0, Some(1));
+    let out = ["--out", "runs/experiments/another"];
     assert_eq!(play("other", "Is it another", &out).0, Some(0));
 }
 
+/// A robot that exits in the middle of a run where its parameter `wings` is 2.
+const WINGS: &str = r#"
+while read -r line; do
+    case $line in
+        *'"type":"end"'*) exit 0 ;;
+        *'"wings":2'*) fails=yes ;;
+    esac
+    case $line in *'"tick":2'*) test -z "$fails" || { echo 'no wings' >&2; exit 3; } ;; esac
+    echo '{"type":"done"}'
+done
+"#;
+
 #[test]
 fn a_unit_that_fails_ends_nothing_and_is_played_again_on_request() {
-    let short = Short::new();
-    // Butler begins, and starts again at 2 s with a parameter that he does not have.
-    let arm = "name = \"yoked\"\nwhat = \"no such parameter\"\n\
-               set = ['change=[{ at = \"2 s\", set = [\"robot.Butler.params.wings=2\"] }]']";
-    let yoked =
-        "name = \"yoked\"\nwhat = \"emotions of the next seed\"\nyoked_to = \"plain\"\nset = []";
-    let text = Short::text();
-    assert!(text.contains(yoked));
-    fs::write(&short.file, text.replace(yoked, arm)).unwrap();
-    let folder = short.out("failing");
-    let file = short.file.to_str().unwrap();
-    let args = ["run", file, "-o", folder.to_str().unwrap()];
+    let lab = Lab::new();
+    let robot = lab.write("robot.sh", WINGS);
+    let program = programs().join("cars");
+    lab.write(
+        "walk.toml",
+        "[[robot]]\nname = 'Walker'\nat = ['25 ft', '25 ft']\nparams = { wings = 1 }\n",
+    );
+    lab.write(
+        "launch.toml",
+        &format!(
+            "scenario = 'walk.toml'\n[console]\nenabled = false\n[[process]]\nname = 'Walker'\n\
+             command = [{program:?}, 'exec', '--', 'sh', {robot:?}]\n"
+        ),
+    );
+    let file = lab.write(
+        "wings.toml",
+        "question = '?'\nscenario = 'launch.toml'\nduration = '2 s'\nseeds = 2\n[[arm]]\nname = 'good'\n\
+         [[arm]]\nname = 'bad'\nset = ['robot.Walker.params.wings=2']\n\
+         [[measure]]\nname = 'ticks'\nsummary = 'ticks'\n",
+    );
+    let folder = lab.out().join("failing");
+    let args = ["run", file.to_str().unwrap(), "--processes", "-o"];
+    let args = [&args[..], &[folder.to_str().unwrap()]].concat();
 
     for (more, expected) in [
-        (&[] as &[&str], "80 units: 0 are there, 80 to play"),
-        (&[], "80 units: 80 are there, 0 to play"),
-        (&["--retry-failed"], "80 units: 40 are there, 40 to play"),
+        (&[] as &[&str], "4 units: 0 are there, 4 to play"),
+        (&[], "4 units: 4 are there, 0 to play"),
+        (&["--retry-failed"], "4 units: 2 are there, 2 to play"),
     ] {
         let (code, printed) = cars(&[&args, more].concat());
         assert_eq!(code, 1, "{printed}");
         assert!(printed.contains(expected), "{printed}");
-        assert!(printed.contains("40 of 80 units failed"), "{printed}");
-        assert!(printed.contains("wings"), "{printed}");
+        assert!(printed.contains("2 of 4 units failed"), "{printed}");
+        assert!(printed.contains("no wings"), "{printed}");
     }
 
     for row in rows(&folder) {
-        let has_failed = row["arm"] == "yoked";
-        assert_eq!(row["failed"].contains("wings"), has_failed, "{row:?}");
+        let has_failed = row["arm"] == "bad";
+        assert_eq!(row["failed"].contains("no wings"), has_failed, "{row:?}");
         assert_eq!(row["digest"].is_empty(), has_failed, "{row:?}");
-        assert_eq!(row["served"].is_empty(), has_failed, "{row:?}");
+        assert_eq!(row["ticks"].is_empty(), has_failed, "{row:?}");
     }
 }
 
