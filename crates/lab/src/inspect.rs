@@ -183,6 +183,7 @@ fn inspect_log(
     let text = read(&path)?;
     let all: Vec<&str> = text.lines().collect();
     let mut lines = all.iter().enumerate();
+    let has_ended = events.is_some_and(|events| events.end.is_some());
     let is_cut = !text.is_empty() && !text.ends_with('\n');
     for files in epochs {
         let scenario = Scenario::load(&files.scenario, &Changes::default())?;
@@ -197,7 +198,6 @@ fn inspect_log(
                     continue;
                 };
                 let Some((number, line)) = lines.next() else {
-                    let has_ended = events.is_some_and(|events| events.end.is_some());
                     return if has_ended {
                         Err(damaged(&path, &"its end is missing"))
                     } else {
@@ -213,6 +213,7 @@ fn inspect_log(
         }
     }
     match lines.next() {
+        None if is_cut && has_ended => Err(damaged(&path, &"its end is missing")),
         Some((number, _)) if !is_cut => {
             let reason = format!("line {} follows the end of the record", number + 1);
             Err(damaged(&path, &reason))

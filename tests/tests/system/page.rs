@@ -8,8 +8,8 @@ use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{
     Answer, Clock, Command, Control, ControlAnswer, FaultOrder, JoinAnswer, JoinRequest, LogRecord,
-    MAX_ENTRIES, MAX_LINE_BYTES, MAX_TEXT_BYTES, MAX_WIDGETS, News, Panel, PublicState, Report, Waiting,
-    WorldFrame,
+    MAX_ENTRIES, MAX_LINE_BYTES, MAX_TEXT_BYTES, MAX_WIDGETS, News, Panel, PublicState, Report,
+    Waiting, WorldFrame,
 };
 use protocol::name::MAX_NAME_LEN;
 use protocol::random::{MAX_SEED, stream, unit};

@@ -89,7 +89,8 @@ fn times_in_report(html: &str) -> Times {
             let mut cells = Vec::new();
             for cell in row.children().filter(roxmltree::Node::is_element) {
                 let number = cell.children().find(|node| node.has_tag_name("data"));
-                let texts = cell.descendants().filter_map(|part| part.text());
+                let parts = cell.descendants().filter(roxmltree::Node::is_text);
+                let texts = parts.filter_map(|part| part.text());
                 let value = number.and_then(|number| number.attribute("value"));
                 cells.push(value.map_or_else(|| texts.collect(), str::to_owned));
             }

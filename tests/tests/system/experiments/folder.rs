@@ -469,12 +469,16 @@ fn a_unit_that_fails_ends_nothing_and_is_played_again_on_request() {
         assert!(printed.contains("no wings"), "{printed}");
     }
 
-    for row in rows(&folder) {
-        let has_failed = row["arm"] == "bad";
-        assert_eq!(row["failed"].contains("no wings"), has_failed, "{row:?}");
-        assert_eq!(row["digest"].is_empty(), has_failed, "{row:?}");
-        assert_eq!(row["ticks"].is_empty(), has_failed, "{row:?}");
+    let results = fs::read_to_string(folder.join("results.json")).unwrap();
+    let results: serde_json::Value = serde_json::from_str(&results).unwrap();
+    let failures = results["failures"].as_array().unwrap();
+    assert_eq!(failures.len(), 2, "{results}");
+    for failure in failures {
+        assert_eq!(failure["arm"], "bad");
+        assert!(failure["reason"].as_str().unwrap().contains("no wings"), "{failure}");
     }
+    let good = &results["estimates"][0];
+    assert_eq!((&good["arm"], &good["n"]), (&"good".into(), &2.into()), "{results}");
 }
 
 #[test]
