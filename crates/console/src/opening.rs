@@ -76,10 +76,11 @@ fn remove_leftovers(folder: &Path) {
         let name = entry.file_name();
         let name = name.to_str().unwrap_or_default();
         let is_own = name.starts_with(PREFIX) && name.ends_with(SUFFIX);
-        if is_own && is_leftover(&entry.path()) {
-            if let Err(error) = std::fs::remove_file(entry.path()) {
-                tracing::debug!("{}: {error}", entry.path().display());
-            }
+        if is_own
+            && is_leftover(&entry.path())
+            && let Err(error) = std::fs::remove_file(entry.path())
+        {
+            tracing::debug!("{}: {error}", entry.path().display());
         }
     }
 }

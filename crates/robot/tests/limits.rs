@@ -213,7 +213,7 @@ impl Robot for Librarian {
     fn tick(&mut self, cars: &mut Cars<'_>) -> Action {
         let mut action = Action::stay(cars);
         for book in 0..300 {
-            action = action.variable(&format!("book{book}"), "x".repeat(4000));
+            action = action.variable(format!("book{book}"), "x".repeat(4000));
         }
         action
     }

@@ -138,10 +138,9 @@ impl States {
             return;
         }
 
-        for since in [&mut robot.emotion, &mut robot.behavior] {
-            if let Some(since) = since {
-                since.begin = tick;
-            }
+        let states = [&mut robot.emotion, &mut robot.behavior];
+        for since in states.into_iter().flatten() {
+            since.begin = tick;
         }
     }
 }

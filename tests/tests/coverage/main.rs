@@ -4,7 +4,6 @@
 //!
 //!     cargo test --release -p system-tests --test coverage -- --ignored --nocapture
 
-#![expect(clippy::print_stdout, reason = "a test prints what it measures")]
 #![expect(
     clippy::unwrap_used,
     reason = "a test that cannot set up its subject fails"

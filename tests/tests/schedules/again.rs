@@ -51,8 +51,8 @@ impl Again<'_> {
     /// Ticks before, at and after that of the last thing that happened to a robot, and of a fault of the scenario.
     fn forked_at(&self) -> BTreeSet<Tick> {
         let mut at = BTreeSet::from([self.last_by_chance()]);
-        let happened = self.recorded.iter().filter(|entry| happens_to_robot(entry));
-        at.extend(happened.last().map(|entry| entry.tick));
+        let mut happened = self.recorded.iter().filter(|entry| happens_to_robot(entry));
+        at.extend(happened.next_back().map(|entry| entry.tick));
         for fault in &self.scenario.faults {
             at.insert(fault.at);
         }
@@ -69,11 +69,11 @@ impl Again<'_> {
     fn last_by_chance(&self) -> Tick {
         let operator = RobotName::operator();
         let is_planned = !self.scenario.faults.is_empty();
-        let by_chance = self.recorded.iter().filter(|entry| {
+        let mut by_chance = self.recorded.iter().filter(|entry| {
             let is_commanded = !entry.commands_of(&operator).is_empty();
             is_commanded || (!is_planned && happens_to_robot(entry))
         });
-        by_chance.last().map_or(0, |entry| entry.tick)
+        by_chance.next_back().map_or(0, |entry| entry.tick)
     }
 
     /// Forks the record after a tick, changing nothing. Returns whether it came to the end of the record; a robot that went on

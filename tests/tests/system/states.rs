@@ -206,7 +206,7 @@ fn all_readers_count_a_robot_that_is_lost_in_no_state() {
         "question = '?'\nscenario = {scenario:?}\nduration = '100 s'\nseeds = [1, 2]\n[[arm]]\nname = 'it'\n\
          set = ['''{FAULTS}''', 'on_late=continue']\n"
     );
-    for ((robot, kind, state), _) in &times {
+    for (robot, kind, state) in times.keys() {
         text += &format!(
             "[[measure]]\nname = '{robot} {kind} {state}'\nshare = {{ robot = '{robot}', {kind} = '{state}' }}\n"
         );
@@ -214,8 +214,12 @@ fn all_readers_count_a_robot_that_is_lost_in_no_state() {
     let file = lab.write("shares.toml", &text);
     let out = lab.out().join("shares");
     let args = ["experiment", "run", file.to_str().unwrap(), "--json", "-o"];
-    let all = lab.ok(&[&args[..], &[out.to_str().unwrap()]].concat());
-    let all: Value = serde_json::from_str(&all[all.find('{').unwrap()..]).unwrap();
+    let args = [&args[..], &[out.to_str().unwrap()]].concat();
+    let (code, printed) = lab.cars_without_out(&args);
+    assert_eq!(code, 0, "{printed}");
+    let json = &printed[printed.find('{').unwrap()..];
+    let mut json = serde_json::Deserializer::from_str(json).into_iter::<Value>();
+    let all = json.next().unwrap().unwrap();
     let measures = &all["runs"][0]["measures"];
     for ((robot, kind, state), time_s) in &times {
         let share = &measures[format!("{robot} {kind} {state}")]["value"];

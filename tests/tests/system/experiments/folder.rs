@@ -475,10 +475,17 @@ fn a_unit_that_fails_ends_nothing_and_is_played_again_on_request() {
     assert_eq!(failures.len(), 2, "{results}");
     for failure in failures {
         assert_eq!(failure["arm"], "bad");
-        assert!(failure["reason"].as_str().unwrap().contains("no wings"), "{failure}");
+        assert!(
+            failure["reason"].as_str().unwrap().contains("no wings"),
+            "{failure}"
+        );
     }
     let good = &results["estimates"][0];
-    assert_eq!((&good["arm"], &good["n"]), (&"good".into(), &2.into()), "{results}");
+    assert_eq!(
+        (&good["arm"], &good["mean"]["n"]),
+        (&"good".into(), &2.into()),
+        "{results}"
+    );
 }
 
 #[test]
