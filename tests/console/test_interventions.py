@@ -2,7 +2,7 @@
 
 from playwright.sync_api import expect
 
-from lab import FITS, eventually, until
+from lab import eventually
 
 
 def open_menu(page):
@@ -130,14 +130,18 @@ def test_a_robots_menu_opens_on_the_plan_and_by_a_key(launch, open_page, screens
         for width, height in ((1280, 720), (390, 844)):
             page = open_page(run.address, width=width, height=height, scheme=scheme)
             expect(page.get_by_test_id("tick")).not_to_have_text("–")
-            until(page, FITS)
             menu = page.get_by_test_id("experiment-menu")
-            at = page.evaluate(
-                "(() => { const at = window.carsConsole.frame().robots.find(r => r.name === 'Leguin').location;"
-                " return window.carsConsole.toClient(at.x, at.y); })()"
-            )
-            page.mouse.click(at["x"], at["y"], button="right")
-            expect(menu).to_be_visible()
+
+            # Until all of the page has arrived its parts still move, also between these two lines.
+            def click():
+                at = page.evaluate(
+                    "(() => { const at = window.carsConsole.frame().robots.find(r => r.name === 'Leguin').location;"
+                    " return window.carsConsole.toClient(at.x, at.y); })()"
+                )
+                page.mouse.click(at["x"], at["y"], button="right")
+                return menu.is_visible()
+
+            eventually("the menu", click)
             expect(page.get_by_test_id("experiment-robot")).to_have_value("Leguin")
             expect(page.get_by_test_id("from-Leguin")).to_have_attribute("aria-pressed", "true")
             page.get_by_test_id("to-Butler").click()

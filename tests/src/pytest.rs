@@ -2,6 +2,7 @@
 
 use std::cmp::Reverse;
 use std::fs::File;
+use std::io::Write;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -43,10 +44,14 @@ impl Choice {
 pub fn pytest(folder: &Path, choice: Choice, python: impl Fn() -> Command + Sync) {
     let lab = Lab::new();
     let files = files_of(folder, choice);
-    let failed = objections(&files, AT_A_TIME, |file| {
+    let pytest = || {
         let mut python = python();
         python.args(["-m", "pytest", "-m", choice.marks()]);
-        test(lab.out(), file, python)
+        python
+    };
+    let failed = objections(&files, AT_A_TIME, |file| {
+        let printed = test(lab.out(), file, pytest())?;
+        test_again(lab.out(), &printed, pytest).then_some(printed)
     });
     assert!(failed.is_empty(), "{}", failed.join("\n"));
 }
@@ -76,8 +81,40 @@ fn has_thorough_tests(file: &Path) -> bool {
         .contains("pytest.mark.thorough")
 }
 
-/// Tests one file, in a process group of its own, so that nothing that it starts outlives it. Returns what pytest printed and
-/// how it ended, if a test fails.
+/// In CI, runs the tests once more that have failed, and names those that pass then in the file of the variable `CARS_FLAKY`.
+/// Returns whether the failure stands.
+fn test_again(out: &Path, printed: &str, pytest: impl Fn() -> Command) -> bool {
+    let Some(flaky) = std::env::var_os("CARS_FLAKY") else {
+        return true;
+    };
+    let mut failed = Vec::new();
+    for line in printed.lines() {
+        let test = line.strip_prefix("FAILED ").or(line.strip_prefix("ERROR "));
+        failed.extend(test.and_then(|test| test.split(" - ").next()));
+    }
+    if failed.is_empty() {
+        return true;
+    }
+
+    let mut names = String::new();
+    for id in failed {
+        if test(out, Path::new(id), pytest()).is_some() {
+            return true;
+        }
+        names.push_str(id);
+        names.push('\n');
+    }
+    let mut file = File::options()
+        .create(true)
+        .append(true)
+        .open(flaky)
+        .unwrap();
+    file.write_all(names.as_bytes()).unwrap();
+    false
+}
+
+/// Tests one file, or one test of it, in a process group of its own, so that nothing that it starts outlives it. Returns what
+/// pytest printed and how it ended, if a test fails.
 fn test(out: &Path, file: &Path, mut python: Command) -> Option<String> {
     let name = file.file_stem().unwrap().to_string_lossy();
     let printed = out.join(format!("{name}.txt"));

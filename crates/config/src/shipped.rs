@@ -32,6 +32,8 @@ const FILES: &[(&str, &str)] = &texts![
     "configs/experiments/crowd.toml",
     "configs/experiments/deadlock.toml",
     "configs/experiments/partition.toml",
+    "configs/experiments/tune_thresholds.toml",
+    "configs/experiments/tune_timer.toml",
     "configs/hors_doeuvres.toml",
     "configs/links/cut_leguin.toml",
     "configs/museum.toml",

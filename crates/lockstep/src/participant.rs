@@ -180,8 +180,6 @@ pub struct Participant<N, S, C, R> {
     has_token: bool,
     /// Whether it has run a tick as the incarnation that it was admitted as, in the epoch that it was admitted to.
     is_seated: bool,
-    /// Whether its process has played an earlier incarnation in this epoch.
-    has_rejoined: bool,
     /// The newest clock that has not been run, of the epoch that it was admitted to.
     pending: Option<Clock>,
     /// The newest clock of a later epoch. Only a welcome to that epoch shows that it has begun.
@@ -230,7 +228,6 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
             is_name_taken: false,
             has_token,
             is_seated: false,
-            has_rejoined: false,
             pending: None,
             later: None,
             news: BTreeMap::new(),
@@ -272,7 +269,7 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
                 self.put(out);
             }
         } else {
-            self.start_over(before.is_some_and(|before| before.epoch == admission.epoch));
+            self.start_over();
             for (tick, state) in states {
                 self.states.add(admission.epoch, tick, state);
             }
@@ -590,9 +587,8 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         self.news.retain(|of, _| of.0 <= epoch);
     }
 
-    /// Forgets what it was. `has_rejoined` says whether it was another incarnation in the same epoch.
-    fn start_over(&mut self, has_rejoined: bool) {
-        self.has_rejoined = has_rejoined;
+    /// Forgets what it was.
+    fn start_over(&mut self) {
         self.is_seated = false;
         self.is_discarding |= self.running.take().is_some();
         self.asking = None;
@@ -630,20 +626,13 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         };
         self.news.retain(|of, _| *of > at);
         let joined = arrived.as_ref().and_then(|arrived| arrived.joined);
-        // If the predecessor has reported for tick 0, its successor joins in tick 1, however often tick 0 is repeated.
-        let has_predecessor = self.has_rejoined
-            || self
-                .states
-                .answer(StateQuery {
-                    tick: None,
-                    epoch: Some(clock.epoch),
-                })
-                .is_ok();
+        // A clock of tick 0 may be from before this incarnation: only the first one takes part in it without being named.
+        let is_first = admission.generation == 1;
         let is_named =
             joined == Some(admission.generation) || !self.rules.hold(Rule::WaitsToBeNamed);
         let begin = if self.is_seated {
             Begin::GoOn
-        } else if clock.tick == 0 && !has_predecessor {
+        } else if clock.tick == 0 && (is_first || is_named) {
             Begin::Init
         } else if is_named {
             Begin::TakeOver

@@ -97,8 +97,9 @@ pub struct Simulation {
     blocked: Vec<bool>,
     /// Moves that were refused because they were too fast, by robot.
     too_fast: BTreeMap<RobotName, u64>,
-    /// Generation of each robot's last participation in this epoch, and its incarnation, counted from 1 in the epoch. The
-    /// record has incarnations, because generations also count processes that never took part.
+    /// Generation that has reported last for each robot in this epoch, and its incarnation, counted from 1 in the epoch. The
+    /// record has incarnations, because generations also count processes that never reported: whether such a one asked to join
+    /// before or after the next one is wall clock.
     incarnations: BTreeMap<RobotName, (Generation, u32)>,
     /// Number of commands of each sender in this epoch.
     sent: BTreeMap<RobotName, Seq>,
@@ -654,8 +655,6 @@ impl Simulation {
 
     fn note_joined(&mut self, robot: RobotName, generation: Generation) {
         let incarnation = self.incarnation(&robot, generation, None);
-        self.incarnations
-            .insert(robot.clone(), (generation, incarnation));
         // What a predecessor did is of no consequence.
         if let Some(ticks) = self.late.get_mut(&robot) {
             *ticks = ticks.split_off(&self.now);
@@ -727,9 +726,9 @@ impl Simulation {
     }
 
     fn note_report(&mut self, robot: &RobotName, report: &Arc<Report>, sent: Vec<SentCommand>) {
+        let last = self.incarnations.get(robot).copied();
         self.incarnations
-            .entry(robot.clone())
-            .or_insert((report.generation, 1));
+            .insert(robot.clone(), follow(last, report.generation));
         let before = self.reports.insert(robot.clone(), report.clone());
         let emotion_before = before.as_ref().map(|report| report.emotion_state.clone());
         let behavior_before = before.as_ref().map(|report| report.behavior_state.clone());
