@@ -178,7 +178,15 @@ mod tests {
     #[test]
     fn names_are_those_of_one_folder() {
         let names: Vec<&str> = names(EXPERIMENTS).collect();
-        assert_eq!(names, ["affect", "crowd", "deadlock", "partition"]);
+        let experiments = [
+            "affect",
+            "crowd",
+            "deadlock",
+            "partition",
+            "tune_thresholds",
+            "tune_timer",
+        ];
+        assert_eq!(names, experiments);
         assert!(!super::names(SCENARIOS).any(|name| name.contains('/')));
     }
 }

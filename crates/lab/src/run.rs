@@ -175,7 +175,9 @@ fn go_on_with(
     }
 
     let end = local.simulation.end(End::Finished);
-    each(local, &end, Instant::now())
+    each(local, &end, Instant::now())?;
+    local.robots.report_left_out();
+    Ok(())
 }
 
 /// A simulation and its robots in this process, before tick 0.
@@ -206,12 +208,7 @@ impl Local {
         run: &RunName,
         robots: BTreeMap<RobotName, Box<dyn Robot>>,
     ) -> miette::Result<Self> {
-        let mut simulation = Simulation::new(scenario, epoch).into_diagnostic()?;
-        let seats = seats(&mut simulation, run, robots);
-        Ok(Self {
-            simulation,
-            robots: LocalHost::new(seats),
-        })
+        Self::seated(scenario, epoch, |simulation| seats(simulation, run, robots))
     }
 
     /// The same for an epoch that was recorded: the robots of then had no objection to what the scenario planned.
@@ -224,11 +221,22 @@ impl Local {
         run: &RunName,
         robots: BTreeMap<RobotName, Box<dyn Robot>>,
     ) -> miette::Result<Self> {
+        Self::seated(scenario, epoch, |simulation| {
+            let mut seats = seats(simulation, run, robots);
+            for (_, welcome) in &mut seats {
+                welcome.later_parameters.clear();
+            }
+            seats
+        })
+    }
+
+    fn seated(
+        scenario: Scenario,
+        epoch: Epoch,
+        seats: impl FnOnce(&mut Simulation) -> Vec<(Box<dyn Robot>, Welcome)>,
+    ) -> miette::Result<Self> {
         let mut simulation = Simulation::new(scenario, epoch).into_diagnostic()?;
-        let mut seats = seats(&mut simulation, run, robots);
-        for (_, welcome) in &mut seats {
-            welcome.later_parameters.clear();
-        }
+        let seats = seats(&mut simulation);
         Ok(Self {
             simulation,
             robots: LocalHost::new(seats),

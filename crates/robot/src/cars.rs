@@ -19,6 +19,8 @@ use crate::network::{Network, Undelivered};
 const MAX_LOG_LINES: usize = MAX_ENTRIES / 2;
 /// Most bytes that a robot may write to the log in a tick, all lines together.
 const MAX_LOG_BYTES: usize = 256 * 1024;
+/// Most warnings that the log has in a tick beside a robot's own lines.
+const MAX_WARNINGS: usize = 16;
 
 /// What was left out of the log because of its limits.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -201,6 +203,16 @@ impl<'a> Cars<'a> {
             self.log.push(line);
         } else {
             self.left_out.lines += 1;
+        }
+    }
+
+    /// Writes a warning about the robot to the log of the run, also where its own lines have used up their limit. For libraries that
+    /// run robots; they bound how many there are.
+    pub fn warn(&mut self, warning: &str) {
+        let mut line = format!("warning: {warning}");
+        cut(&mut line, MAX_TEXT_BYTES);
+        if self.log.len() < MAX_LOG_LINES + MAX_WARNINGS {
+            self.log.push(line);
         }
     }
 

@@ -349,7 +349,13 @@ impl Host {
             };
             working.work(Thread::Own);
             if let Some(outcome) = working.outcome.take() {
-                working.report_left_out();
+                for seat in working
+                    .members
+                    .values()
+                    .filter_map(|member| member.seat.as_ref())
+                {
+                    seat.report_left_out();
+                }
                 working.leave_bus();
                 return outcome;
             }
@@ -365,16 +371,6 @@ impl Host {
             && let Some((name, action)) = self.shared.next(&mut thread)
         {
             self.outcome = self.carry_out(&name, action).transpose();
-        }
-    }
-
-    /// Says what was left out of the log; the log itself has the first of it only.
-    fn report_left_out(&self) {
-        for (name, member) in &self.members {
-            let seat = member.seat.as_ref();
-            if let Some(left_out) = seat.and_then(Seat::left_out) {
-                tracing::warn!("{name}: {left_out}");
-            }
         }
     }
 

@@ -233,6 +233,13 @@ impl LocalHost {
         panels
     }
 
+    /// Warns of what was left out of the log in this epoch, as a robot's own process does at its end.
+    pub fn report_left_out(&self) {
+        for seat in &self.seats {
+            seat.report_left_out();
+        }
+    }
+
     fn index(&self, name: &RobotName) -> Option<usize> {
         self.names.iter().position(|own| own == name)
     }

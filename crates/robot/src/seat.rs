@@ -79,10 +79,11 @@ impl Seat {
         self.left_out = LeftOut::default();
     }
 
-    /// What was left out of the log in this epoch, in words; `None` if nothing was.
-    #[must_use]
-    pub fn left_out(&self) -> Option<String> {
-        self.left_out.warning()
+    /// Warns of what was left out of the log in this epoch; the log itself has the first of it only.
+    pub(crate) fn report_left_out(&self) {
+        if let Some(warning) = self.left_out.warning() {
+            tracing::warn!("{}: {warning}", self.welcome.name);
+        }
     }
 
     /// What the robot chooses to display.
@@ -212,7 +213,7 @@ impl Seat {
         }
         // Once an epoch, so that the warnings have a bound themselves.
         if left_out_before == LeftOut::default()
-            && let Some(warning) = self.left_out()
+            && let Some(warning) = self.left_out.warning()
         {
             log.push(format!("warning: {warning}"));
         }

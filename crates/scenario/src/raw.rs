@@ -405,13 +405,15 @@ fn robots(
     Ok(robots)
 }
 
-/// The specification of a robot. Its own parameters replace those of the file that it names.
+/// The specification of a robot. Its own parameters replace those of the file that it names, key by key, also within tables.
 fn spec(robot: Robot, source: &Source, folder: Option<&Path>) -> Result<RobotSpec, FileError> {
     let mut parameters = Parameters::new();
     if let Some(file) = &robot.params_from {
         parameters.extend(to_parameters(&named_parameters(file, source, folder)?));
     }
-    parameters.extend(to_parameters(&robot.params));
+    for (name, value) in to_parameters(&robot.params) {
+        replace(parameters.entry(name).or_default(), value);
+    }
 
     let class = robot.class;
     Ok(RobotSpec {
@@ -419,6 +421,18 @@ fn spec(robot: Robot, source: &Source, folder: Option<&Path>) -> Result<RobotSpe
         at: point(robot.at),
         parameters,
     })
+}
+
+/// Replaces a parameter. Of a table only the keys that the other table has.
+fn replace(parameter: &mut serde_json::Value, by: serde_json::Value) {
+    match (parameter, by) {
+        (serde_json::Value::Object(table), serde_json::Value::Object(by)) => {
+            for (key, value) in by {
+                replace(table.entry(key).or_insert(serde_json::Value::Null), value);
+            }
+        }
+        (parameter, by) => *parameter = by,
+    }
 }
 
 /// The parameters of a file that a robot names. In a text from outside they are those of the files that come with the programs.

@@ -388,6 +388,23 @@ fn an_untrusted_scenario_names_no_files_in_changes_either() {
     );
 }
 
+#[test]
+fn own_parameters_replace_single_keys_of_tables_of_the_file() {
+    let text = "[[robot]]\nname = \"A\"\nat = [\"5 m\", \"5 m\"]\nparams_from = \"robots/butler.toml\"\n\
+                params = { dynamics = { th_frustrated = 0.9, label_cuts = [0.5] } }\n";
+    let source = Source {
+        name: "loaded".into(),
+        text: text.to_owned(),
+    };
+    let scenario = Scenario::parse_alone(&source).unwrap();
+
+    let robot = scenario.robots.values().next().unwrap();
+    let dynamics = &robot.parameters["dynamics"];
+    assert_eq!(dynamics["th_frustrated"], 0.9);
+    assert_eq!(dynamics["th_concerned"], 0.45);
+    assert_eq!(dynamics["label_cuts"], serde_json::json!([0.5]));
+}
+
 /// A scenario with robot A and these expectations.
 fn expecting(entries: &str) -> Result<Scenario, FileError> {
     parse(&format!(

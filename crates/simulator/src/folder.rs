@@ -6,6 +6,7 @@
 use std::ffi::OsStr;
 use std::fs::File;
 use std::io::{ErrorKind, Write};
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 use config::FileError;
@@ -639,7 +640,8 @@ pub struct RunLock {
     _file: File,
 }
 
-/// Checks that no entry of a folder is a link: what is written to one would be written elsewhere. There may be no such folder.
+/// Checks that no entry of a folder is a link, symbolic or hard: what is written to one would be written elsewhere, too. There may be
+/// no such folder.
 ///
 /// # Errors
 /// [`FileError`] if the folder is a link, or has one.
@@ -655,8 +657,14 @@ pub fn check_no_links(folder: &Path) -> Result<(), FileError> {
     };
     for entry in entries {
         let entry = entry.map_err(|error| FileError::unreadable(folder, &error))?;
-        if entry.path().is_symlink() {
-            return Err(is_link(&entry.path()));
+        let path = entry.path();
+        let found = path.symlink_metadata();
+        let found = found.map_err(|error| FileError::unreadable(&path, &error))?;
+        if found.is_symlink() {
+            return Err(is_link(&path));
+        }
+        if found.is_file() && found.nlink() > 1 {
+            return Err(has_hard_links(&path));
         }
     }
     Ok(())
@@ -668,6 +676,14 @@ fn is_link(path: &Path) -> FileError {
         "{place} is a link, and nothing is written through one"
     ))
     .with_help("put what it leads to in its place, or choose another folder")
+}
+
+fn has_hard_links(path: &Path) -> FileError {
+    let place = path.display();
+    FileError::new(format!(
+        "{place} has a second name elsewhere (a hard link), and what is written to it would change that, too"
+    ))
+    .with_help("copy the folder without links, as `cp -r` does, and take the copy")
 }
 
 fn with_ending(path: &Path, ending: &str) -> PathBuf {

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use lab::experiment::{Arm, Experiment};
 use protocol::Event;
-use protocol::messages::Parameters;
+use serde_json::Value;
 use system_tests::hall::scenario;
 
 use crate::experiment::{Change, FT_M, HALL, SEEDS, mean, walled_in, watch};
@@ -234,8 +234,16 @@ fn changes_of(arm: &Arm) -> Vec<String> {
     changes.collect()
 }
 
-/// The parameters of all robots of a team, but for the one that names what decides.
-fn abilities(arm: &Arm) -> Vec<Parameters> {
+/// Constants of what decides, which are tuned for each team (docs/experiments.md, "Constants").
+const TUNED: [&str; 4] = [
+    "/dynamics/th_concerned",
+    "/dynamics/th_frustrated",
+    "/hurry_after_s",
+    "/intercept_after_s",
+];
+
+/// The parameters of all robots of a team, but for the one that names what decides, and its constants.
+fn abilities(arm: &Arm) -> Vec<Value> {
     let changes = changes_of(arm);
     let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
     let scenario = scenario(HALL, 1, &changes);
@@ -247,6 +255,16 @@ fn abilities(arm: &Arm) -> Vec<Parameters> {
             parameters.remove("policy").is_some(),
             "an arm names the policy"
         );
+        let mut parameters = serde_json::to_value(&parameters).unwrap();
+        for path in TUNED {
+            let (parent, name) = path.rsplit_once('/').unwrap();
+            if let Some(parent) = parameters
+                .pointer_mut(parent)
+                .and_then(Value::as_object_mut)
+            {
+                parent.remove(name);
+            }
+        }
         abilities.push(parameters);
     }
     abilities

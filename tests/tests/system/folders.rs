@@ -79,9 +79,10 @@ enum Obstacle {
     LinkedEvents,
     LinkedLogs,
     LinkedDraft,
+    HardLinks,
 }
 
-const OBSTACLES: [Obstacle; 14] = [
+const OBSTACLES: [Obstacle; 15] = [
     Obstacle::Nothing,
     Obstacle::FinishedRun,
     Obstacle::KilledRun,
@@ -96,6 +97,7 @@ const OBSTACLES: [Obstacle; 14] = [
     Obstacle::LinkedEvents,
     Obstacle::LinkedLogs,
     Obstacle::LinkedDraft,
+    Obstacle::HardLinks,
 ];
 
 impl Obstacle {
@@ -146,6 +148,18 @@ impl Obstacle {
             Self::LinkedDraft => {
                 make_killed(&precious, &at);
                 symlink(precious.join("cars.log"), at.join("events.jsonl.draft")).unwrap();
+            }
+            // As `cp -al` copies a folder.
+            Self::HardLinks => {
+                let original = lab.out().join("killed");
+                make_killed(&precious, &original);
+                for (path, entry) in tree(&original) {
+                    let link = at.join(path.strip_prefix(&original).unwrap());
+                    std::fs::create_dir_all(link.parent().unwrap()).unwrap();
+                    if matches!(entry, Entry::File(_)) {
+                        std::fs::hard_link(path, link).unwrap();
+                    }
+                }
             }
         }
         None
@@ -242,7 +256,7 @@ fn said(output: &Output) -> String {
     streams.map(|text| String::from_utf8_lossy(text)).concat()
 }
 
-/// A command that makes a run's folder, and whether it takes the next free name.
+/// A command that makes a run's folder, and whether it takes the next free name; or one that writes at a path, or reads what is there.
 struct Making {
     name: &'static str,
     program: &'static str,
@@ -250,7 +264,7 @@ struct Making {
     numbers: bool,
 }
 
-const MAKING: [Making; 9] = [
+const MAKING: [Making; 17] = [
     Making {
         name: "run",
         program: "cars",
@@ -377,11 +391,101 @@ const MAKING: [Making; 9] = [
         ],
         numbers: false,
     },
+    Making {
+        name: "replay",
+        program: "cars",
+        args: &["replay", "AT", "--speed", "max", "--listen", "ENDPOINT"],
+        numbers: false,
+    },
+    Making {
+        name: "verify",
+        program: "cars",
+        args: &["verify", "AT"],
+        numbers: false,
+    },
+    Making {
+        name: "verify --processes",
+        program: "cars",
+        args: &["verify", "AT", "--processes"],
+        numbers: false,
+    },
+    Making {
+        name: "hunt",
+        program: "cars",
+        args: &[
+            "hunt",
+            HALL,
+            "--plans",
+            "20",
+            "--set",
+            "robot.Butler.params.policy=neither",
+            "-o",
+            "AT",
+        ],
+        numbers: false,
+    },
+    Making {
+        name: "experiment run",
+        program: "cars",
+        args: &[
+            "experiment",
+            "run",
+            "deadlock",
+            "--seeds",
+            "1",
+            "--duration",
+            "2 s",
+            "-o",
+            "AT",
+        ],
+        numbers: false,
+    },
+    Making {
+        name: "new robot",
+        program: "cars",
+        args: &["new", "robot", TAKEN, "--lang", "python", "--out", "RUNS"],
+        numbers: false,
+    },
+    Making {
+        name: "report",
+        program: "cars",
+        args: &["report", "PRECIOUS", "-o", "AT"],
+        numbers: false,
+    },
+    Making {
+        name: "conform",
+        program: "cars",
+        args: &[
+            "conform",
+            "--rule",
+            "news.wait",
+            "--scenario",
+            HALL,
+            "--name",
+            "Butler",
+            "--",
+            "ROBOT",
+        ],
+        numbers: false,
+    },
+];
+
+/// Those of them that make no run.
+const OTHERS: [&str; 8] = [
+    "replay",
+    "verify",
+    "verify --processes",
+    "hunt",
+    "experiment run",
+    "new robot",
+    "report",
+    "conform",
 ];
 
 impl Making {
     fn play(&self, place: &Place) -> Output {
-        let limit_s = if self.name == "simulator" { "1" } else { "60" };
+        let is_endless = matches!(self.name, "simulator" | "replay");
+        let limit_s = if is_endless { "1" } else { "60" };
         let mut command = Command::new("timeout");
         command
             .args(["--signal=TERM", limit_s])
@@ -393,10 +497,17 @@ impl Making {
             match *arg {
                 "EXPERIMENT" => command.arg(place.out().join("experiments/study")),
                 "ENDPOINT" => command.arg(format!("tcp/127.0.0.1:{}", free_port())),
+                "AT" => command.arg(place.out().join(TAKEN)),
+                "RUNS" => command.arg(place.out()),
+                "PRECIOUS" => command.arg(place.out().join(PRECIOUS)),
+                "ROBOT" => command.arg(programs().join("cars-butler")),
                 arg => command.arg(arg),
             };
         }
-        command.arg("--out").arg(place.out()).output().unwrap()
+        if !OTHERS.contains(&self.name) {
+            command.arg("--out").arg(place.out());
+        }
+        command.output().unwrap()
     }
 
     /// Whether the command may change what stands there.
@@ -405,7 +516,9 @@ impl Making {
             "resume" => obstacle == Obstacle::KilledRun,
             name => {
                 let is_over = matches!(obstacle, Obstacle::FinishedRun | Obstacle::KilledRun);
-                name.ends_with("--replace") && is_over
+                // A report is a file, and replaces a file.
+                let is_report = name == "report" && obstacle == Obstacle::File;
+                is_report || name.ends_with("--replace") && is_over
             }
         }
     }
@@ -455,6 +568,9 @@ fn no_command_changes_what_it_did_not_make() {
             let taken = place.out().join(TAKEN);
             let changed = making.may_change(obstacle).then_some(&*taken);
             assert_kept(&before, &place, changed, &what);
+            if OTHERS.contains(&making.name) {
+                continue;
+            }
 
             // A run that finds no free name says what to do; any other one is recorded.
             let is_made = match obstacle {

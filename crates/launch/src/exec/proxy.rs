@@ -116,7 +116,7 @@ impl Proxy {
     /// Explains the first unknown fields of a type of lines in the log of the run.
     fn remark(&self, cars: &mut Cars<'_>, unknown: &UnknownFields) {
         if self.remarks.add(unknown.kind) {
-            cars.log(format!("warning: {unknown}"));
+            cars.warn(&unknown.to_string());
         }
     }
 

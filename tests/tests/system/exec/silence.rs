@@ -24,6 +24,13 @@ const IN_THE_LOG: &[(&str, &str, &str)] = &[
         r#"i=0; while [ $i -lt 600 ]; do i=$((i + 1)); say '{"type":"log","text":"again"}'; done"#,
         "warning: 88 lines of the log were dropped: the limits are 4096 bytes a line, and 512 lines and 262144 bytes a tick",
     ),
+    (
+        "full",
+        r#"i=0; while [ $i -lt 512 ]; do i=$((i + 1)); say '{"type":"log","text":"again"}'; done
+           say '{"type":"done","propsal":{"x":1,"y":2}}'; continue"#,
+        "warning: unknown field `propsal` of a line `done` ignored; its fields are proposal, speed_mps, direction_rad, \
+         emotion_state, behavior_state, state_variables",
+    ),
 ];
 
 #[test]
@@ -39,7 +46,7 @@ fn what_has_no_effect_is_told_once_in_terminal_and_log_and_counted() {
         assert_eq!(log.matches(expected).count(), 1, "{name}: {log}");
         assert_eq!(launch.printed().matches(expected).count(), 1, "{name}");
         let count = match *name {
-            "typo" => "Leguin: 7 of its lines `done` had unknown fields",
+            "typo" | "full" => "Leguin: 7 of its lines `done` had unknown fields",
             "fast" => "6 of its moves were refused because they were too fast",
             _ => "Leguin: 616 lines of the log were dropped",
         };
