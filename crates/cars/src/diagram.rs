@@ -10,7 +10,7 @@ use lab::moment::Moment;
 use protocol::Epoch;
 use simulator::recorder::LATEST;
 
-use crate::output::{self, check_not_record};
+use crate::output;
 
 /// `cars diagram`.
 #[derive(Debug, Args)]
@@ -61,9 +61,6 @@ pub(crate) fn diagram(args: &DiagramArgs) -> miette::Result<ExitCode> {
     };
 
     let drawn = draw(&files, window, options)?;
-    if let Some(output) = &args.output {
-        check_not_record(output, &files)?;
-    }
     output::write(args.output.as_deref(), &drawn.svg)?;
     // The picture may be on its way to another program, so the notes go to the standard error.
     for note in drawn.notes {

@@ -4,9 +4,10 @@ use std::fs::File;
 use std::io::{BufWriter, ErrorKind, Stdout, Write};
 use std::path::Path;
 
+use lab::experiment::is_of_experiment;
 use lab::export::draft::{Draft, unwritable};
 use miette::miette;
-use simulator::EpochFiles;
+use simulator::RunFolder;
 
 /// Paths of the standard output.
 const STANDARD: [&str; 3] = ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"];
@@ -45,7 +46,22 @@ impl Output {
             let file = file.map_err(|error| unwritable(path, &error))?;
             return Ok(Self::Stream(BufWriter::new(file)));
         }
-        Ok(Self::File(Draft::follow(path)?))
+        let draft = Draft::follow(path)?;
+        let target = draft.path();
+        let folder = target
+            .parent()
+            .and_then(|parent| parent.canonicalize().ok());
+        let full = folder
+            .zip(target.file_name())
+            .map(|(folder, name)| folder.join(name));
+        if full.is_some_and(|full| RunFolder::is_of_run(&full) || is_of_experiment(&full)) {
+            return Err(miette!(
+                help = "choose another --output",
+                "{} is part of the record of a run or an experiment",
+                target.display()
+            ));
+        }
+        Ok(Self::File(draft))
     }
 
     /// Completes it. Returns whether everything was written: a reader may have seen enough.
@@ -101,24 +117,4 @@ pub(crate) fn cannot_write(path: Option<&Path>, error: &std::io::Error) -> miett
         Some(path) => unwritable(path, error).into(),
         None => miette!("cannot write to the standard output: {error}"),
     }
-}
-
-/// Checks that a file to be written is no part of the record of a run.
-///
-/// # Errors
-/// If it is.
-pub(crate) fn check_not_record(output: &Path, record: &EpochFiles) -> miette::Result<()> {
-    let Ok(path) = output.canonicalize() else {
-        return Ok(()); // There is no such file yet.
-    };
-
-    for source in [&record.events, &record.recording, &record.scenario] {
-        if source.canonicalize().is_ok_and(|source| source == path) {
-            return Err(miette!(
-                "{} is the record of the run; choose another --output",
-                output.display()
-            ));
-        }
-    }
-    Ok(())
 }

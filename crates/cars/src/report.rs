@@ -11,7 +11,7 @@ use miette::miette;
 use simulator::RunFolder;
 use simulator::recorder::LATEST;
 
-use crate::output::{self, check_not_record};
+use crate::output;
 
 /// `cars report`.
 #[derive(Debug, Args)]
@@ -42,13 +42,6 @@ pub(crate) fn report(args: &ReportArgs) -> miette::Result<ExitCode> {
         }
     };
 
-    if let Some(output) = &args.output {
-        for folder in &folders {
-            for files in folder.epochs() {
-                check_not_record(output, &files)?;
-            }
-        }
-    }
     output::write(args.output.as_deref(), &html)?;
     Ok(ExitCode::SUCCESS)
 }

@@ -10,7 +10,7 @@ use lab::trace::{Trace, TraceError};
 use protocol::{Epoch, Tick};
 use simulator::recorder::LATEST;
 
-use crate::output::{Output, cannot_write, check_not_record};
+use crate::output::{Output, cannot_write};
 
 /// `cars trace`.
 #[derive(Debug, Args)]
@@ -42,9 +42,6 @@ pub(crate) fn trace(args: &TraceArgs) -> miette::Result<ExitCode> {
     let trace = Trace::open(&files, args.from, args.to)?;
 
     let path = args.output.as_deref();
-    if let Some(path) = path {
-        check_not_record(path, &files)?;
-    }
     let mut output = Output::create(path)?;
     let notes = match trace.write(&mut output) {
         // The reader has closed its end of the pipe, as `head` does.

@@ -207,8 +207,9 @@ function actions(view, faults) {
   const load = async (/** @type {Event} */ event) => {
     const input = /** @type {HTMLInputElement} */ (event.target);
     const file = input.files?.[0];
-    if (file) await view.load(file);
+    // At once: while the file is loaded the user may have chosen the next one.
     input.value = "";
+    if (file) await view.load(file);
   };
 
   return html`

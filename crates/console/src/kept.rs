@@ -1,7 +1,7 @@
 //! What a console leaves for the one that is started after it, in a file that only its owner can read.
 
 use std::fs::{self, OpenOptions};
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::net::SocketAddr;
 use std::os::unix::fs::{OpenOptionsExt, PermissionsExt};
 use std::path::Path;
@@ -49,6 +49,24 @@ impl Kept {
         is_hex(&self.token) && path.is_some_and(is_hex)
     }
 
+    /// Checks that a file which is not what a console has left for this one may be replaced: it has to be empty, or to be what a console
+    /// leaves and others could read.
+    pub(crate) fn check_replaceable(file: &Path) -> Result<(), String> {
+        let bytes = match fs::read(file) {
+            Ok(bytes) => bytes,
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
+            Err(error) => return Err(format!("cannot read {}: {error}", file.display())),
+        };
+        let is_kept = serde_json::from_slice::<Self>(&bytes).is_ok_and(|kept| kept.is_sound());
+        if bytes.is_empty() || is_kept {
+            return Ok(());
+        }
+        Err(format!(
+            "{} is there, and is not what a console keeps: name another file by --keep",
+            file.display()
+        ))
+    }
+
     /// Leaves it for the console after this one.
     pub(crate) fn write(&self, file: &Path) -> std::io::Result<()> {
         let text = serde_json::to_vec(self)?;
@@ -81,6 +99,12 @@ mod tests {
         fs::set_permissions(&file, fs::Permissions::from_mode(0o644)).unwrap();
         assert_eq!(Kept::read(&file), None);
         assert_eq!(Kept::read(&folder.path().join("none")), None);
+        assert_eq!(Kept::check_replaceable(&file), Ok(()));
+        assert_eq!(Kept::check_replaceable(&folder.path().join("none")), Ok(()));
+
+        fs::write(&file, "{\"tick\":0}\n").unwrap();
+        let refused = Kept::check_replaceable(&file).unwrap_err();
+        assert!(refused.contains("is not what a console keeps"), "{refused}");
     }
 
     #[test]

@@ -179,6 +179,9 @@ fn build_runtime() -> Result<Runtime, String> {
 /// Serves until the process receives SIGTERM or SIGINT, or until a run that has failed is not looked at any more.
 async fn serve(mode: Mode, past: Option<Past>, how: Serving) -> Result<Next, String> {
     let kept = how.keep.as_deref().and_then(Kept::read);
+    if let Some(file) = how.keep.as_deref().filter(|_| kept.is_none()) {
+        Kept::check_replaceable(file)?;
+    }
     let listener = match &kept {
         Some(kept) => listen_again(kept.address, how.bind).await?,
         None => listen(how.bind).await?,

@@ -26,14 +26,15 @@ pub use observe::Measure;
 
 pub use condition::{Condition, ConditionError, Conditions, Factor, Value};
 pub use contrast::{Contrast, Difference, SHOWN_P, least_p_holm};
+pub use engine::is_of_experiment;
 pub use estimate::{Cell, Estimated, Excluded};
 pub use file::{Arm, Experiment, MAX_UNITS, is_experiment_file};
-pub use outcome::{Measured, Outcome};
+pub use outcome::{Failure, Measured, Outcome};
 pub use plan::{Key, LaunchText, PLAN, Plan, Program, Request, Robots, Unit};
 pub use presentation::{Example, Presentation, Shown};
 pub use processes::{Launcher, write_launch};
 pub use provenance::{Machine, Provenance};
-pub use results::{Failure, Judged, Results};
+pub use results::{Judged, Results};
 pub use setting::Setting;
 pub use store::Store;
 pub use unit::{Played, Result};

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use config::{Changes, FileError};
 use miette::{IntoDiagnostic, WrapErr, miette};
+use protocol::Event;
 use protocol::event::log_line;
 use protocol::messages::LogRecord;
 use recording::Recording;
@@ -40,9 +41,12 @@ pub struct Inspection {
 /// If it is not the folder of a run. Damage is part of what is returned.
 pub fn inspect(folder: &RunFolder) -> Result<Inspection, FileError> {
     let mut inspection = Inspection::default();
+    // Reading a pipe would wait for ever.
+    check_files(folder.path())?;
+    check_files(&folder.file(LOGS))?;
     let epochs = recorded_epochs(folder)?;
     let mut end = None;
-    for files in &epochs {
+    for (index, files) in epochs.iter().enumerate() {
         end = None;
         match seal::check(&files.events) {
             Ok(checked) => {
@@ -51,11 +55,12 @@ pub fn inspect(folder: &RunFolder) -> Result<Inspection, FileError> {
             }
             Err(error) => inspection.damages.push(error.into()),
         }
-        inspection.note(inspect_recording(files, end.as_ref()));
+        let is_over = index + 1 < epochs.len() || has_ended(end.as_ref());
+        inspection.note(inspect_recording(files, end.as_ref(), is_over));
     }
 
     let are_events_good = inspection.epochs.len() == epochs.len();
-    inspection.note(inspect_summary(folder, end.as_ref()));
+    inspection.note(inspect_summary(folder, epochs.last(), end.as_ref()));
     inspection.note(inspect_launched(folder));
     if are_events_good {
         inspection.note(inspect_log(folder, &epochs, end.as_ref()));
@@ -72,11 +77,14 @@ impl Inspection {
 }
 
 /// Reads the scenario and the whole recording of an epoch, and compares them with each other and with the events.
-fn inspect_recording(files: &EpochFiles, events: Option<&Checked>) -> miette::Result<()> {
+fn inspect_recording(
+    files: &EpochFiles,
+    events: Option<&Checked>,
+    is_over: bool,
+) -> miette::Result<()> {
     let scenario = Scenario::load(&files.scenario, &Changes::default())?;
     if !files.recording.exists() {
-        let has_ended = events.is_some_and(|events| events.end.is_some());
-        if scenario.record.frames && has_ended {
+        if scenario.record.frames && is_over {
             let place = files.recording.display();
             return Err(miette!("the run was recorded, and {place} is not there"));
         }
@@ -85,6 +93,10 @@ fn inspect_recording(files: &EpochFiles, events: Option<&Checked>) -> miette::Re
 
     let recording = Recording::open(&files.recording).into_diagnostic()?;
     recording.check().into_diagnostic()?;
+    if !has_begun(files)? {
+        // It ended while robots were awaited: it has no tick.
+        return Ok(());
+    }
     for from in (0..recording.len()).step_by(PART as usize) {
         recording.read(from, from + PART).into_diagnostic()?;
     }
@@ -131,10 +143,58 @@ fn compare_events(
     Ok(())
 }
 
+/// Whether an epoch has a first tick.
+fn has_begun(files: &EpochFiles) -> miette::Result<bool> {
+    let first = Record::of_events(&files.events)?.next_entry()?;
+    let mut events = first.iter().flat_map(|entry| &entry.events);
+    Ok(events.any(|event| matches!(event, Event::Init { .. })))
+}
+
+fn has_ended(events: Option<&Checked>) -> bool {
+    events.is_some_and(|events| events.end.is_some())
+}
+
+/// The digest with which a run has ended.
+fn digest_of(files: &EpochFiles) -> miette::Result<Option<String>> {
+    let mut record = Record::of_events(&files.events)?;
+    let mut found = None;
+    while let Some(entry) = record.next_entry()? {
+        if let Some(Event::End { digest, .. }) = entry.events.last() {
+            found = Some(digest.clone());
+        }
+    }
+    Ok(found)
+}
+
+/// Checks that nothing in a folder is a pipe, a socket or a device. There may be no such folder.
+fn check_files(folder: &Path) -> Result<(), FileError> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten();
+    for entry in entries.flatten() {
+        let path = entry.path();
+        if path
+            .metadata()
+            .is_ok_and(|found| !found.is_file() && !found.is_dir())
+        {
+            return Err(FileError::new(format!("{} is not a file", path.display())));
+        }
+    }
+    Ok(())
+}
+
 /// Compares the summary with its seal, and with the end of the run. What it counts is compared by [`crate::verify`].
-fn inspect_summary(folder: &RunFolder, events: Option<&Checked>) -> miette::Result<()> {
+fn inspect_summary(
+    folder: &RunFolder,
+    last: Option<&EpochFiles>,
+    events: Option<&Checked>,
+) -> miette::Result<()> {
     let path = folder.file(SUMMARY);
     if !path.exists() {
+        if has_ended(events) {
+            return Err(miette!(
+                "the run has ended, and {} is not there",
+                path.display()
+            ));
+        }
         return Ok(());
     }
 
@@ -152,6 +212,13 @@ fn inspect_summary(folder: &RunFolder, events: Option<&Checked>) -> miette::Resu
             summary.ticks,
             events.tick
         )),
+        Some(events) if events.end.is_some() => {
+            let digest = last.map(digest_of).transpose()?.flatten();
+            if digest.is_none_or(|digest| digest == summary.digest) {
+                return Ok(());
+            }
+            Err(miette!("{} is that of another run", path.display()))
+        }
         _ => Ok(()),
     }
 }
@@ -177,13 +244,25 @@ fn inspect_log(
 ) -> miette::Result<()> {
     let path = folder.log();
     if !path.exists() {
+        let last = epochs
+            .last()
+            .map(|files| Scenario::load(&files.scenario, &Changes::default()));
+        let is_logged = last
+            .transpose()?
+            .is_some_and(|scenario| scenario.record.log);
+        if is_logged && has_ended(events) {
+            return Err(miette!(
+                "the run was logged, and {} is not there",
+                path.display()
+            ));
+        }
         return Ok(());
     }
 
     let text = read(&path)?;
     let all: Vec<&str> = text.lines().collect();
     let mut lines = all.iter().enumerate();
-    let has_ended = events.is_some_and(|events| events.end.is_some());
+    let has_ended = has_ended(events);
     let is_cut = !text.is_empty() && !text.ends_with('\n');
     for files in epochs {
         let scenario = Scenario::load(&files.scenario, &Changes::default())?;

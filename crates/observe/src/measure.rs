@@ -435,6 +435,31 @@ pub fn check_name(name: &str) -> Result<(), MeasureError> {
     Err(MeasureError::Name)
 }
 
+/// The word that the path of a number in the summary of a robot ends with.
+fn word_of(path: &str) -> Option<Word> {
+    let parts: Vec<&str> = path.splitn(4, '.').collect();
+    let ["robots", robot, table, word] = parts[..] else {
+        return None;
+    };
+    let kind = match table {
+        "emotions_s" => words::Kind::Emotion,
+        "behaviors_s" | "entered" => words::Kind::Behavior,
+        "sent" => words::Kind::Command,
+        _ => return None,
+    };
+
+    let is_any = robot == "*";
+    (word != "*").then(|| Word {
+        kind,
+        robots: if is_any {
+            Vec::new()
+        } else {
+            vec![robot.to_owned()]
+        },
+        word: word.to_owned(),
+    })
+}
+
 impl TryFrom<RawShare> for Share {
     type Error = MeasureError;
 
@@ -555,7 +580,8 @@ impl Measure {
                 return named;
             }
             Kind::Share(share) => share,
-            Kind::Summary(_) | Kind::Variable(_) | Kind::Stalled(_) => return Vec::new(),
+            Kind::Summary(path) => return word_of(path).into_iter().collect(),
+            Kind::Variable(_) | Kind::Stalled(_) => return Vec::new(),
         };
 
         let (kind, states) = match &share.states {
@@ -571,6 +597,19 @@ impl Measure {
             });
         }
         named
+    }
+
+    /// The expectations whose verdicts it counts or waits for.
+    #[must_use]
+    pub fn expectations(&self) -> Vec<&str> {
+        let patterns = match &self.kind {
+            Kind::Count(count) => vec![&count.pattern],
+            Kind::Time(time) => time.after.iter().chain([&time.to]).collect(),
+            Kind::Between(between) => vec![&between.begin, &between.end],
+            Kind::Summary(_) | Kind::Share(_) | Kind::Variable(_) | Kind::Stalled(_) => Vec::new(),
+        };
+        let named = patterns.into_iter().flat_map(Pattern::expectations);
+        named.collect()
     }
 
     /// The state variables that it needs: robots and names.

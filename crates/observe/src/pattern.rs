@@ -74,6 +74,8 @@ pub enum PatternError {
 enum Domain {
     Robot,
     Words(Vec<String>),
+    /// One of these words, or a table.
+    WordsOrTable(Vec<String>),
     Text,
     Number,
     Truth,
@@ -128,19 +130,22 @@ fn domain(schema: &Value, field: &Value) -> Domain {
     }
 }
 
-/// The words of an enumeration; anything else if it has values that are not words.
+/// The words of an enumeration, whose other values are tables.
 fn words(definition: &Value) -> Domain {
     let mut words = Vec::new();
+    let mut has_tables = false;
     for variant in definition["oneOf"].as_array().into_iter().flatten() {
         match variant["const"].as_str() {
             Some(word) => words.push(word.to_owned()),
-            None => return Domain::Other,
+            None => has_tables = true,
         }
     }
-    if words.is_empty() {
-        return Domain::Other;
+
+    match (words.is_empty(), has_tables) {
+        (true, _) => Domain::Other,
+        (false, true) => Domain::WordsOrTable(words),
+        (false, false) => Domain::Words(words),
     }
-    Domain::Words(words)
 }
 
 fn all_kinds() -> String {
@@ -155,6 +160,9 @@ impl Domain {
                 .as_str()
                 .is_some_and(|name| RobotName::new(name).is_ok()),
             Self::Words(words) => words.iter().any(|word| value == word),
+            Self::WordsOrTable(words) => {
+                value.is_object() || words.iter().any(|word| value == word)
+            }
             Self::Text => value.is_string(),
             Self::Number => value.is_number(),
             Self::Truth => value.is_boolean(),
@@ -167,6 +175,9 @@ impl Domain {
         match self {
             Self::Robot => ": it is the name of a robot".to_owned(),
             Self::Words(words) => format!(": it is one of {}", words.join(", ")),
+            Self::WordsOrTable(words) => {
+                format!(": it is one of {}, or a table", words.join(", "))
+            }
             Self::Text => ": it is a text".to_owned(),
             Self::Number => ": it is a number".to_owned(),
             Self::Truth => ": it is true or false".to_owned(),
@@ -308,6 +319,14 @@ impl Pattern {
             }
         }
         named
+    }
+
+    /// The expectations that it names.
+    pub(crate) fn expectations(&self) -> impl Iterator<Item = &str> {
+        let is_about_them = self.kind == "judged";
+        let wanted = self.fields.get("expectation");
+        let wanted = wanted.filter(|_| is_about_them).into_iter();
+        wanted.flat_map(|wanted| wanted.0.iter().filter_map(Value::as_str))
     }
 
     /// The robots that the pattern names. An event of a run can match only if its roster has them.

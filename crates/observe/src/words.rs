@@ -237,6 +237,10 @@ mod tests {
             measure("count = { event = 'behavior', to = 'SERVE', from = 'REST' }"),
             measure("count = { event = 'command_sent', command = ['refill', 'reifll'] }"),
             measure("time = { to = { event = 'emotion', robot = '*', to = 'HAPPY' } }"),
+            measure("summary = 'robots.A.emotions_s.HAPYP'"),
+            measure("summary = 'robots.*.sent.reffil'"),
+            measure("summary = 'robots.*.entered.*'"),
+            measure("summary = 'robots.B.entered.SERVE'"),
         ];
         let expectations = [
             expectation("never = { robot = 'B', behavior = 'SREVE' }"),
@@ -249,11 +253,13 @@ mod tests {
             after_a_run(&measures, &expectations),
             [
                 "the emotion \"HAPY\" of A: HAPPY",
+                "the emotion \"HAPYP\" of A: HAPPY",
                 "the emotion \"SAD\" of A",
                 "the emotion \"HAPPY\" of B",
                 "the behavior \"REST\"",
                 "the behavior \"SERVES\" of B: SERVE",
                 "the behavior \"SREVE\" of B: SERVE",
+                "the command \"reffil\": refill",
                 "the command \"reifll\": refill",
             ]
         );

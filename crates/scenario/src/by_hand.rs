@@ -351,7 +351,9 @@ impl Scenario {
     }
 }
 
-fn kind_in_words(kind: FaultKind) -> &'static str {
+/// What a fault does to a robot, as the end of a sentence about it.
+#[must_use]
+pub fn kind_in_words(kind: FaultKind) -> &'static str {
     match kind {
         FaultKind::Crash => "is killed",
         FaultKind::Hang => "is stopped",

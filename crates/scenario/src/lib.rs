@@ -23,6 +23,7 @@ use observe::Expectation;
 use protocol::RobotName;
 pub use protocol::messages::OnLate;
 
+pub use by_hand::kind_in_words;
 pub use change::{Change, Parent};
 pub use checked::{DEFAULT_SEED, MAX_GUESTS, Record, RobotSpec, Scenario, SyncPoint};
 pub use checked::{to_wire, to_world};

@@ -243,9 +243,7 @@ impl RunFolder {
     fn take_over(&self) -> Result<RunLock, FileError> {
         let place = self.path.display();
         let is_folder = self.path.symlink_metadata().is_ok_and(|at| at.is_dir());
-        // A robot's folder has a scenario.toml, too.
-        let has_record = self.file(LOCK).exists() || self.file(EVENTS).exists();
-        if !is_folder || !has_record || !self.file(SCENARIO).exists() {
+        if !is_folder || !self.has_record() {
             let error = FileError::new(format!("{place} is there and is not the folder of a run"));
             return Err(error.with_help("choose another --run or --out, or move it away"));
         }
@@ -312,7 +310,32 @@ impl RunFolder {
     /// # Errors
     /// [`FileError`] if a file cannot be removed.
     pub fn clear(&self) -> Result<(), FileError> {
-        // The scenario has the name of the log, and makes the folder that of a run: it goes last.
+        for file in self.files() {
+            remove_if_there(&file).map_err(|error| self.failed("clear", &error))?;
+        }
+        Ok(())
+    }
+
+    /// Whether a file, whose path has no links, is one that a run has made in its folder.
+    #[must_use]
+    pub fn is_of_run(file: &Path) -> bool {
+        // Those of processes are one folder deeper.
+        file.ancestors().skip(1).take(2).any(|folder| {
+            let folder = Self::at(folder.to_owned());
+            let is_lock = file == folder.file(LOCK);
+            folder.has_record() && (is_lock || folder.files().iter().any(|own| own == file))
+        })
+    }
+
+    /// Whether it is the folder of a run. A robot's folder has a scenario, too.
+    fn has_record(&self) -> bool {
+        let has_events = self.file(LOCK).exists() || self.file(EVENTS).exists();
+        has_events && self.file(SCENARIO).exists()
+    }
+
+    /// All files that runs make, whether they are there or not. The scenario has the name of the log, and makes the folder that of a
+    /// run: it is the last.
+    fn files(&self) -> Vec<PathBuf> {
         let mut files = self.superseded();
         for name in [EVENTS, RECORDING, SUMMARY, ENDPOINT, OPERATOR_CONFIG] {
             files.push(self.file(name));
@@ -326,11 +349,7 @@ impl RunFolder {
         }
         files.extend(self.logs_of_processes());
         files.push(self.file(SCENARIO));
-
-        for file in files {
-            remove_if_there(&file).map_err(|error| self.failed("clear", &error))?;
-        }
-        Ok(())
+        files
     }
 
     /// Removes the record of a run that has failed, and the folder unless there is something else in it.

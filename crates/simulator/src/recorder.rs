@@ -148,7 +148,10 @@ impl Recorder {
 
         let record = &scenario.record;
         let path = folder.file(&record.log_name);
-        let log = record.log.then(|| Lines::append(path));
+        let log = record.log.then(|| match epoch {
+            1 => Lines::create(path),
+            _ => Lines::append(path),
+        });
         Self::open(folder, run, simulation, log.transpose()?, "")
     }
 

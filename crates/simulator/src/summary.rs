@@ -94,6 +94,14 @@ pub struct RobotSummary {
     pub state_variables: StateVariables,
 }
 
+/// The keys of a part of a summary in its file.
+fn keys_of(part: &impl Serialize) -> Vec<String> {
+    match serde_json::to_value(part) {
+        Ok(serde_json::Value::Object(table)) => table.into_iter().map(|(key, _)| key).collect(),
+        _ => Vec::new(),
+    }
+}
+
 /// Wall-clock times and counts.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Wall {
@@ -119,7 +127,40 @@ pub struct HeldUp {
     pub longest_s: f64,
 }
 
+/// Keys of a summary that are numbers, or have numbers below them.
+const WITH_NUMBERS: [&str; 8] = [
+    "expectations",
+    "guests",
+    "network",
+    "robots",
+    "seed",
+    "ticks",
+    "time_s",
+    "wall",
+];
+
 impl Summary {
+    /// Checks that the path of a number, whose parts are joined by `.`, can be one of a summary.
+    ///
+    /// # Errors
+    /// What there is instead.
+    pub fn check_path(path: &str) -> Result<(), String> {
+        let parts: Vec<&str> = path.split('.').collect();
+        let (part, known) = match parts[..] {
+            ["robots", _, part, ..] => (part, keys_of(&RobotSummary::default())),
+            ["network", part, ..] => (part, keys_of(&NetworkSummary::default())),
+            [part, ..] => (part, WITH_NUMBERS.map(str::to_owned).to_vec()),
+            [] => return Ok(()),
+        };
+        if known.iter().any(|key| key == part) {
+            return Ok(());
+        }
+        Err(format!(
+            "a summary has no number `{path}`: in the place of `{part}` there is one of {}",
+            known.join(", ")
+        ))
+    }
+
     /// The empty summary of an epoch.
     #[must_use]
     pub fn begin(run: &RunName, simulation: &Simulation) -> Self {

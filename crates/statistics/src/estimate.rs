@@ -6,6 +6,9 @@ use crate::digits::{decimals, decimals_alone, fixed, signed};
 use crate::distribution::student_975;
 use crate::sample::mean;
 
+/// Most decimals beyond those that an interval supports.
+const MAX_FURTHER_DECIMALS: usize = 3;
+
 /// Fewest values of the interval of a mean.
 pub const MIN_VALUES: usize = 3;
 
@@ -99,13 +102,21 @@ impl Estimate {
         self
     }
 
-    /// Decimals that its interval supports, or that its value has.
+    /// Decimals that its interval supports, or that its value has. An end that is not zero is not shown as zero: on which side of zero
+    /// it is decides.
     #[must_use]
     pub fn decimals(&self) -> usize {
-        match self.bounds() {
-            Some((low, high)) => decimals((high - low) / 2.0),
-            None => decimals_alone(self.value),
-        }
+        let Some((low, high)) = self.bounds() else {
+            return decimals_alone(self.value);
+        };
+
+        let supported = decimals((high - low) / 2.0);
+        let hides_a_sign = |decimals: usize| {
+            let is_hidden = |end: f64| end != 0.0 && signed(end, decimals) == fixed(0.0, decimals);
+            is_hidden(low) || is_hidden(high)
+        };
+        let needed = (supported..=supported + MAX_FURTHER_DECIMALS).find(|one| !hides_a_sign(*one));
+        needed.unwrap_or(supported)
     }
 
     /// The estimate of a difference, with signs.
@@ -262,6 +273,24 @@ mod tests {
         assert_eq!(Estimate::mean(&[0.0; 5]).to_string(), "0 in every run");
         assert_eq!(Estimate::difference(&[1.0; 5]).signed(), "+1 in every pair");
         assert_eq!(Estimate::mean(&[1.7e308; 4]).to_string(), "not finite");
+    }
+
+    #[test]
+    fn an_end_that_is_not_zero_is_not_shown_as_zero() {
+        let text = |low: f64, high: f64| {
+            let interval = Interval::Ends { low, high };
+            let value = (low + high) / 2.0;
+            Estimate {
+                value,
+                n: 9,
+                interval,
+            }
+            .signed()
+        };
+        assert_eq!(text(-25.19, -0.218), "-12.7 [-25.2, -0.2]");
+        assert_eq!(text(-0.04, 25.0), "+12.48 [-0.04, +25.00]");
+        assert_eq!(text(0.0, 25.0), "+12 [0, +25]");
+        assert_eq!(text(-25.0, 1e-17), "-12 [-25, 0]");
     }
 
     #[test]

@@ -268,7 +268,7 @@ fn what_cannot_be_drawn_is_refused_by_name() {
     refused(&lab, &["--from", "20", "--to", "10"], "the window is empty");
     refused(&lab, &["--from", "soon"], "neither a tick");
     refused(&lab, &["--epoch", "7"], "has no epoch 7, the last one is 1");
-    refused(&lab, &["-o", events], "is the record of the run");
+    refused(&lab, &["-o", events], "is part of the record of a run");
 }
 
 fn refused(lab: &Lab, args: &[&str], reason: &str) {

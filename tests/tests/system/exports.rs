@@ -538,7 +538,7 @@ fn an_export_that_fails_names_the_reason_and_leaves_nothing_behind() {
     fails(
         &["trace", "hall", "-o", recording.to_str().unwrap()],
         1,
-        "is the record of the run",
+        "is part of the record",
     );
     let file = lab.write("a-file", "kept");
     fails(

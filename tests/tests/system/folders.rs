@@ -880,6 +880,145 @@ fn no_command_panics_where_a_path_is_not_utf8() {
 }
 
 #[test]
+fn no_output_replaces_a_part_of_a_record() {
+    let master = master();
+    let place = Place::of(&master);
+    let other = place.out().join("other");
+    copy(&place.out().join(PRECIOUS), &other);
+    let study = place.out().join("experiments/study");
+    let link = place.lab.out().join("link");
+    symlink(other.join("events.jsonl"), &link).unwrap();
+
+    let mut targets = vec![link];
+    for folder in [&other, &other.join("logs"), &study, &study.join("units")] {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            targets.extend(path.is_file().then_some(path));
+        }
+    }
+    assert!(targets.len() > 12, "{targets:?}");
+
+    let before = tree(place.lab.out());
+    for command in ["report", "diagram", "trace", "emotionml"] {
+        for target in &targets {
+            for run in [PRECIOUS, "other"] {
+                let output = program("cars")
+                    .args([command, run, "-o"])
+                    .arg(target)
+                    .arg("--out")
+                    .arg(place.out())
+                    .output()
+                    .unwrap();
+                let what = format!("{command} {run} {}", target.display());
+                let printed = in_one_line(&said(&output));
+                assert!(!output.status.success(), "{what}: {printed}");
+                assert!(
+                    printed.contains("choose another --output"),
+                    "{what}: {printed}"
+                );
+            }
+        }
+    }
+    assert!(tree(place.lab.out()) == before, "something has changed");
+
+    // Beside the record there is room.
+    let beside = other.join("report.html");
+    let output = program("cars")
+        .arg("report")
+        .arg(&other)
+        .arg("-o")
+        .arg(&beside)
+        .output()
+        .unwrap();
+    assert!(output.status.success() && beside.exists(), "{}", said(&output));
+}
+
+#[test]
+fn what_is_missing_or_of_another_run_is_named_and_a_pipe_is_not_waited_for() {
+    let lab = Lab::new();
+    for (run, seed) in [("one", "1"), ("two", "2")] {
+        lab.ok(&[
+            "run",
+            HALL,
+            "--duration",
+            "4 s",
+            "-q",
+            "--run",
+            run,
+            "--seed",
+            seed,
+        ]);
+    }
+    let whole = lab.out().join("one");
+    let check = |folder: &Path| lab.cars_without_out(&["check", folder.to_str().unwrap()]);
+    assert_eq!(check(&whole).0, 0);
+
+    let summary = lab.out().join("two/summary.json");
+    for (name, expected) in [
+        ("summary.json", "the run has ended, and"),
+        ("cars.log", "the run was logged, and"),
+        ("run.mcap", "the run was recorded, and"),
+    ] {
+        let folder = lab.out().join(format!("without-{name}"));
+        copy(&whole, &folder);
+        std::fs::remove_file(folder.join(name)).unwrap();
+        let (code, printed) = check(&folder);
+        assert_eq!(code, 1, "{name}: {printed}");
+        assert!(
+            in_one_line(&printed).contains(expected),
+            "{name}: {printed}"
+        );
+
+        nix::unistd::mkfifo(&folder.join(name), nix::sys::stat::Mode::S_IRUSR).unwrap();
+        let (code, printed) = check(&folder);
+        assert_eq!(code, 1, "{name}: {printed}");
+        assert!(
+            in_one_line(&printed).contains("is not a file"),
+            "{name}: {printed}"
+        );
+    }
+
+    let other = lab.out().join("other-summary");
+    copy(&whole, &other);
+    std::fs::copy(summary, other.join("summary.json")).unwrap();
+    let (code, printed) = check(&other);
+    assert_eq!(code, 1, "{printed}");
+    assert!(
+        in_one_line(&printed).contains("is that of another run"),
+        "{printed}"
+    );
+}
+
+#[test]
+fn a_run_that_ended_before_tick_0_is_whole() {
+    let lab = Lab::new();
+    let endpoint = format!("tcp/127.0.0.1:{}", free_port());
+    let mut simulator = program("cars-sim")
+        .args([
+            "configs/hors_doeuvres.toml",
+            "--run",
+            "early",
+            "--listen",
+            &endpoint,
+            "--out",
+        ])
+        .arg(lab.out())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let folder = lab.out().join("early");
+    eventually("the record", || {
+        folder.join("run.mcap").exists().then_some(())
+    });
+    let pid = nix::unistd::Pid::from_raw(i32::try_from(simulator.id()).unwrap());
+    nix::sys::signal::kill(pid, nix::sys::signal::Signal::SIGTERM).unwrap();
+    simulator.wait().unwrap();
+
+    let (code, printed) = lab.cars_without_out(&["check", folder.to_str().unwrap()]);
+    assert_eq!(code, 0, "{printed}");
+}
+
+#[test]
 fn a_file_that_cannot_be_written_to_its_end_is_as_it_was() {
     let lab = Lab::new();
     lab.ok(&["run", HALL, "--duration", "60 s", "-q", "--run", "one"]);

@@ -289,7 +289,7 @@ fn what_is_missing_is_named() {
 
     let output = lab.out().join("bare/events.jsonl");
     let (_, text) = lab.fails(&["report", "bare", "-o", output.to_str().unwrap()]);
-    assert!(text.contains("is the record of the run"), "{text}");
+    assert!(text.contains("is part of the record"), "{text}");
     let (_, text) = lab.fails(&["report", "nothing"]);
     assert!(text.contains("there is no run nothing"), "{text}");
     let empty = lab.out().join("empty");

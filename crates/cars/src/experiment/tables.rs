@@ -14,13 +14,12 @@ use tabled::settings::{Alignment, Style};
 /// # Errors
 /// If the standard output cannot be written.
 pub(super) fn print_json(results: &Results) -> miette::Result<()> {
-    let experiment = &results.plan.experiment;
     let all = serde_json::json!({
         "compared": results.plan.compared(),
         "runs": results.outcomes,
         "failures": results.failures,
-        "estimates": experiment.estimate(&results.outcomes),
-        "contrasts": experiment.contrast(&results.outcomes),
+        "estimates": results.estimates(),
+        "contrasts": results.contrasts(),
     });
     let all = serde_json::to_string_pretty(&all).into_diagnostic()?;
     terminal::data(format_args!("{all}\n"))?;
@@ -34,10 +33,10 @@ pub(super) fn print_json(results: &Results) -> miette::Result<()> {
 pub(super) fn print(results: &Results) -> miette::Result<()> {
     let experiment = &results.plan.experiment;
     let compared = results.plan.compared();
-    let table = render(experiment, &experiment.estimate(&results.outcomes));
+    let table = render(experiment, &results.estimates());
     terminal::print(format_args!("{compared}\n{table}\n"))?;
 
-    let contrasts = experiment.contrast(&results.outcomes);
+    let contrasts = results.contrasts();
     if let Some(contrast) = contrasts.first() {
         let baseline = &contrast.baseline;
         terminal::print(format_args!(

@@ -8,9 +8,9 @@ use statistics::{
     Estimate, Interval, MIN_VALUES, PairedTimes, SignFlip, TimeTo, dominance, holm, least_p,
 };
 
-use super::estimate::{Excluded, by_seed, conditions_of, time_of};
+use super::estimate::{Excluded, by_seed, conditions_of, failed, time_of};
 use super::file::Experiment;
-use super::outcome::Outcome;
+use super::outcome::{Failure, Outcome};
 
 /// Largest p value, after Holm's correction, of a difference that is stated.
 pub const SHOWN_P: f64 = 0.05;
@@ -139,7 +139,7 @@ impl Experiment {
     /// Differences of every arm to the baseline in every measure under each condition, in the order of the file; none without
     /// a baseline, or where one of the arms was not run.
     #[must_use]
-    pub fn contrast(&self, outcomes: &[Outcome]) -> Vec<Contrast> {
+    pub fn contrast(&self, outcomes: &[Outcome], failures: &[Failure]) -> Vec<Contrast> {
         let Some(baseline) = &self.baseline else {
             return Vec::new();
         };
@@ -151,11 +151,15 @@ impl Experiment {
             }
 
             let mut family = Vec::new();
-            for condition in conditions_of(outcomes) {
+            for condition in conditions_of(outcomes, failures) {
                 let of_baseline = by_seed(outcomes, measure, condition, baseline);
+                let failed_of_baseline = failed(failures, condition, baseline);
                 for arm in &self.arms {
                     let of_arm = by_seed(outcomes, measure, condition, &arm.name);
-                    if arm.name == *baseline || of_arm.is_empty() || of_baseline.is_empty() {
+                    let failed_of_arm = failed(failures, condition, &arm.name);
+                    let is_played = of_arm.len() + failed_of_arm > 0;
+                    let is_baseline_played = of_baseline.len() + failed_of_baseline > 0;
+                    if arm.name == *baseline || !is_played || !is_baseline_played {
                         continue;
                     }
                     let (n, difference) = compare(measure, &of_arm, &of_baseline);
@@ -165,8 +169,11 @@ impl Experiment {
                         arm: arm.name.clone(),
                         baseline: baseline.clone(),
                         n,
-                        excluded: Excluded::of(of_arm.values().copied()),
-                        excluded_baseline: Excluded::of(of_baseline.values().copied()),
+                        excluded: Excluded::of(of_arm.values().copied(), failed_of_arm),
+                        excluded_baseline: Excluded::of(
+                            of_baseline.values().copied(),
+                            failed_of_baseline,
+                        ),
                         difference,
                         p_holm: None,
                         comparisons: 0,
@@ -298,7 +305,7 @@ mod tests {
     fn numbers_are_compared_in_pairs_and_corrected_in_families() {
         let experiment = Experiment::find(Path::new("deadlock")).unwrap();
         let better = BTreeMap::from([("rules", 2.0), ("timer", -1.0)]);
-        let contrasts = experiment.contrast(&outcomes(&experiment, &better));
+        let contrasts = experiment.contrast(&outcomes(&experiment, &better), &[]);
 
         // Each of the four other arms under each condition, in two measures.
         let compared = experiment
@@ -344,7 +351,7 @@ mod tests {
     fn times_are_compared_in_pairs() {
         let experiment = Experiment::find(Path::new("deadlock")).unwrap();
         let outcomes = outcomes(&experiment, &BTreeMap::new());
-        let contrasts = experiment.contrast(&outcomes);
+        let contrasts = experiment.contrast(&outcomes, &[]);
         let rules = find(&contrasts, "deadlock", "rules");
         let Difference::Time {
             share,
@@ -366,7 +373,7 @@ mod tests {
         let (low, high) = share.bounds().unwrap();
         assert!(low > 0.0 && high < 0.9, "{share:?}");
 
-        let cells = experiment.estimate(&outcomes);
+        let cells = experiment.estimate(&outcomes, &[]);
         assert_eq!(cells.len(), 5 * 2 * experiment.measures.len());
         let mut cells = cells.iter();
         let cell = cells.find(|cell| cell.measure == "deadlock" && cell.arm == "rules");
@@ -383,7 +390,7 @@ mod tests {
         let experiment = Experiment::find(Path::new("deadlock")).unwrap();
         let mut outcomes = outcomes(&experiment, &BTreeMap::new());
         outcomes.retain(|run| run.arm != "timer" && (run.arm != "rules" || run.seed < 3));
-        let contrasts = experiment.contrast(&outcomes);
+        let contrasts = experiment.contrast(&outcomes, &[]);
         assert!(contrasts.iter().all(|contrast| contrast.arm != "timer"));
 
         let rules = find(&contrasts, "served", "rules");
@@ -421,13 +428,13 @@ mod tests {
         }
         let outcomes = measured(&experiment, &arm, &baseline);
 
-        let contrasts = experiment.contrast(&outcomes);
+        let contrasts = experiment.contrast(&outcomes, &[]);
         let rules = find(&contrasts, "deadlock", "rules");
         assert_eq!((rules.n, rules.excluded.not_at_risk), (3, 0));
         assert_eq!(rules.excluded_baseline.not_at_risk, 5);
         assert_eq!(rules.difference.p(), Some(1.0));
 
-        let cells = experiment.estimate(&outcomes);
+        let cells = experiment.estimate(&outcomes, &[]);
         let mut cells = cells.iter();
         let cell = cells.find(|cell| cell.measure == "deadlock" && cell.arm == "emotions");
         let cell = cell.unwrap();
@@ -454,7 +461,7 @@ mod tests {
         baseline[2] = missing;
         let outcomes = measured(&experiment, &arm, &baseline);
 
-        let contrasts = experiment.contrast(&outcomes);
+        let contrasts = experiment.contrast(&outcomes, &[]);
         let rules = find(&contrasts, "served", "rules");
         assert_eq!((rules.n, rules.excluded.is_none()), (5, true));
         let excluded = rules.excluded_baseline.to_string();
@@ -465,13 +472,45 @@ mod tests {
         };
         assert_eq!(mean.value, 6.0);
 
+        // One failed: it is beside the numbers of its arm, and an arm all of whose runs failed has a row.
+        let failure = |unit: usize, arm: &str| Failure {
+            unit,
+            condition: outcomes[0].condition.clone(),
+            arm: arm.to_owned(),
+            seed: 9,
+            reason: "it fell".to_owned(),
+        };
+        let failures = [failure(1_000, "rules"), failure(1_001, "timer")];
+        let played: Vec<Outcome> = outcomes
+            .iter()
+            .filter(|one| one.arm != "timer")
+            .cloned()
+            .collect();
+        let contrasts = experiment.contrast(&played, &failures);
+        let rules = find(&contrasts, "served", "rules");
+        assert_eq!(
+            (rules.n, rules.excluded.to_string().as_str()),
+            (5, "1 failed")
+        );
+        let timer = find(&contrasts, "served", "timer");
+        assert_eq!(
+            (timer.n, timer.excluded.to_string().as_str()),
+            (0, "1 failed")
+        );
+        let cells = experiment.estimate(&played, &failures);
+        let mut cells = cells.iter();
+        let cell = cells
+            .find(|cell| cell.measure == "served" && cell.arm == "timer")
+            .unwrap();
+        assert_eq!((cell.estimate.n(), cell.excluded.failed), (0, 1));
+
         // Nobody has it.
         let none = measured(&experiment, &arm, &[const { Measured::NoPair }; 8]);
-        let contrasts = experiment.contrast(&none);
+        let contrasts = experiment.contrast(&none, &[]);
         let rules = find(&contrasts, "served", "rules");
         assert_eq!((&rules.difference, rules.n), (&Difference::NoPair, 0));
         assert_eq!((rules.p_holm, rules.comparisons), (None, 0));
-        let cells = experiment.estimate(&none);
+        let cells = experiment.estimate(&none, &[]);
         let cell = cells.iter().find(|cell| cell.arm == "emotions").unwrap();
         let json = serde_json::to_value(cell).unwrap();
         assert_eq!(json["mean"]["value"], serde_json::Value::Null);
@@ -483,7 +522,7 @@ mod tests {
     fn the_least_p_value_depends_on_pairs_and_comparisons() {
         let experiment = Experiment::find(Path::new("deadlock")).unwrap();
         let better = BTreeMap::from([("rules", 2.0)]);
-        let contrasts = experiment.contrast(&outcomes(&experiment, &better));
+        let contrasts = experiment.contrast(&outcomes(&experiment, &better), &[]);
         let served: Vec<&Contrast> = contrasts
             .iter()
             .filter(|one| one.measure == "served")
@@ -500,7 +539,7 @@ mod tests {
         let arm = [80.0, 80.0, 80.0, 0.0, 0.0, 0.0, 0.0, 0.0].map(at);
         let outcomes = measured(&experiment, &arm[..], &[0.0; 8].map(at));
         let outcomes: Vec<Outcome> = outcomes.into_iter().filter(|run| run.seed < 5).collect();
-        let contrasts = experiment.contrast(&outcomes);
+        let contrasts = experiment.contrast(&outcomes, &[]);
         let Difference::Time {
             restricted_mean_s,
             until_s,
@@ -518,7 +557,7 @@ mod tests {
         let experiment = Experiment::find(Path::new("deadlock")).unwrap();
         let value = |value| Measured::Value { value };
         let outcomes = measured(&experiment, &[1.7e308; 8].map(value), &[0.0; 8].map(value));
-        let contrasts = experiment.contrast(&outcomes);
+        let contrasts = experiment.contrast(&outcomes, &[]);
         let rules = find(&contrasts, "served", "rules");
         assert_eq!(rules.difference, Difference::NotFinite);
         assert_eq!((rules.p_holm, rules.comparisons), (None, 0));
@@ -528,7 +567,7 @@ mod tests {
     fn the_json_of_a_contrast_is_flat() {
         let experiment = Experiment::find(Path::new("deadlock")).unwrap();
         let better = BTreeMap::from([("rules", 2.0)]);
-        let contrasts = experiment.contrast(&outcomes(&experiment, &better));
+        let contrasts = experiment.contrast(&outcomes(&experiment, &better), &[]);
         let json = serde_json::to_value(find(&contrasts, "served", "rules")).unwrap();
         assert_eq!(json["kind"], "number");
         assert_eq!(json["baseline"], "emotions");

@@ -13,8 +13,10 @@ use miette::miette;
 use simulator::folder::check_no_links;
 use xxhash_rust::xxh3::xxh3_64;
 
-use super::plan::{Plan, Robots, Unit};
+use super::plan::{FILE, PLAN, Plan, Robots, UNITS, Unit};
 use super::processes::Launcher;
+use super::provenance::PROVENANCE;
+use super::results::RESULTS;
 use super::store::Store;
 use super::unit::{self, Played};
 use crate::export::draft::unwritable;
@@ -281,4 +283,28 @@ impl Shared<'_> {
             current.error.get_or_insert(error);
         }
     }
+}
+
+/// Whether a file, whose path has no links, is one that an experiment has made in its folder.
+#[must_use]
+pub fn is_of_experiment(file: &Path) -> bool {
+    let Some(folder) = file.parent() else {
+        return false;
+    };
+    let is_unit = folder.file_name().is_some_and(|name| name == UNITS)
+        && folder.with_file_name(PLAN).exists();
+    let is_named = file.file_name().is_some_and(|name| {
+        let own = [
+            PLAN,
+            FILE,
+            LOCK,
+            PROVENANCE,
+            RESULTS,
+            "runs.csv",
+            "runs.parquet",
+        ];
+        own.iter().any(|own| name == *own)
+    });
+
+    is_unit || (is_named && folder.join(PLAN).exists())
 }

@@ -7,7 +7,7 @@ use serde::Serialize;
 use statistics::{Estimate, Survival, TimeTo, quantile};
 
 use super::file::Experiment;
-use super::outcome::Outcome;
+use super::outcome::{Failure, Outcome};
 
 /// One measure of the runs of an arm under a condition.
 #[derive(Debug, Clone, Serialize)]
@@ -46,7 +46,7 @@ pub enum Estimated {
     },
 }
 
-/// How many runs were played and have no number, by the reason.
+/// How many runs have no number, by the reason.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct Excluded {
     /// What the time begins with never happened.
@@ -57,11 +57,16 @@ pub struct Excluded {
     pub unfinished: usize,
     /// The run has no such number.
     pub missing: usize,
+    /// The run could not be played to its end.
+    pub failed: usize,
 }
 
 impl Excluded {
-    pub(super) fn of<'a>(measured: impl Iterator<Item = &'a Measured>) -> Self {
-        let mut excluded = Self::default();
+    pub(super) fn of<'a>(measured: impl Iterator<Item = &'a Measured>, failed: usize) -> Self {
+        let mut excluded = Self {
+            failed,
+            ..Self::default()
+        };
         for one in measured {
             match one {
                 Measured::Value { .. } | Measured::Reached { .. } | Measured::NotReached { .. } => {
@@ -90,6 +95,7 @@ impl std::fmt::Display for Excluded {
             (self.no_pair, "no pair"),
             (self.unfinished, "unfinished"),
             (self.missing, "missing"),
+            (self.failed, "failed"),
         ] {
             if count > 0 {
                 parts.push(format!("{count} {what}"));
@@ -133,13 +139,14 @@ impl Estimated {
 impl Experiment {
     /// Estimates of every measure over the seeds, for each arm under each condition that was run, in the order of the file.
     #[must_use]
-    pub fn estimate(&self, outcomes: &[Outcome]) -> Vec<Cell> {
+    pub fn estimate(&self, outcomes: &[Outcome], failures: &[Failure]) -> Vec<Cell> {
         let mut cells = Vec::new();
         for measure in &self.measures {
-            for condition in conditions_of(outcomes) {
+            for condition in conditions_of(outcomes, failures) {
                 for arm in &self.arms {
                     let measured = by_seed(outcomes, measure, condition, &arm.name);
-                    if measured.is_empty() {
+                    let failed = failed(failures, condition, &arm.name);
+                    if measured.is_empty() && failed == 0 {
                         continue;
                     }
                     let measured: Vec<&Measured> = measured.into_values().collect();
@@ -148,7 +155,7 @@ impl Experiment {
                         condition: condition.to_owned(),
                         arm: arm.name.clone(),
                         estimate: Estimated::of(measure, &measured),
-                        excluded: Excluded::of(measured.iter().copied()),
+                        excluded: Excluded::of(measured.iter().copied(), failed),
                     });
                 }
             }
@@ -158,15 +165,27 @@ impl Experiment {
     }
 }
 
-/// The conditions of the outcomes, each once, in their order.
-pub(super) fn conditions_of(outcomes: &[Outcome]) -> Vec<&str> {
-    let mut conditions: Vec<&str> = Vec::new();
+/// The conditions of the units, each once, in the order of the units.
+pub(super) fn conditions_of<'a>(outcomes: &'a [Outcome], failures: &'a [Failure]) -> Vec<&'a str> {
+    let mut units = BTreeMap::new();
     for outcome in outcomes {
-        if conditions.last() != Some(&outcome.condition.as_str()) {
-            conditions.push(&outcome.condition);
-        }
+        units.insert(outcome.unit, outcome.condition.as_str());
     }
+    for failure in failures {
+        units.insert(failure.unit, failure.condition.as_str());
+    }
+
+    let mut conditions: Vec<&str> = units.into_values().collect();
+    conditions.dedup();
     conditions
+}
+
+/// Number of runs of an arm under a condition that could not be played to their end.
+pub(super) fn failed(failures: &[Failure], condition: &str, arm: &str) -> usize {
+    failures
+        .iter()
+        .filter(|failure| failure.condition == condition && failure.arm == arm)
+        .count()
 }
 
 /// What was measured in the runs of an arm under a condition, by seed.

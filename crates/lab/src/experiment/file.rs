@@ -7,11 +7,13 @@ use std::path::{Path, PathBuf};
 use config::units::Time;
 use config::{FileError, Source, shipped};
 use observe::expect::check_all;
+use observe::measure::Kind;
 use observe::measure::check_name;
 use observe::{Expectation, Measure};
 use protocol::RobotName;
 use scenario::Scenario;
 use serde::Deserialize;
+use simulator::Summary;
 use toml::Spanned;
 
 use super::condition::{
@@ -47,7 +49,7 @@ const RESERVED: [&str; 10] = [
     "yoked_to_seed",
 ];
 /// How the columns end that a measure has beside its number.
-const OF_MEASURE: [&str; 2] = ["_censored", "_state"];
+const OF_MEASURE: [&str; 1] = ["_state"];
 
 /// An experiment, checked.
 #[derive(Debug, Clone)]
@@ -235,6 +237,8 @@ impl Experiment {
     /// with the name of another one.
     pub fn complete(&self, mut scenario: Scenario) -> Result<Scenario, FileError> {
         self.check_robots(&scenario)?;
+        self.check_expectations(&scenario)?;
+        self.check_summaries()?;
 
         let own = scenario.expectations.len();
         scenario.expectations.extend_from_slice(&self.expectations);
@@ -290,6 +294,37 @@ impl Experiment {
             }
         }
 
+        Ok(())
+    }
+
+    /// Checks that verdicts are measured of expectations that there are.
+    fn check_expectations(&self, scenario: &Scenario) -> Result<(), FileError> {
+        let all = scenario.expectations.iter().chain(&self.expectations);
+        let known: Vec<&str> = all.map(|expectation| expectation.name.as_str()).collect();
+        for measure in &self.measures {
+            for name in measure.expectations() {
+                if !known.contains(&name) {
+                    let reason = format!(
+                        "there is no expectation \"{name}\"; there are {}",
+                        known.join(", ")
+                    );
+                    return Err(FileError::at(&self.source, Some(measure.span()), &reason));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks that the numbers of the summary that are measured can be there.
+    fn check_summaries(&self) -> Result<(), FileError> {
+        for measure in &self.measures {
+            let Kind::Summary(path) = &measure.kind else {
+                continue;
+            };
+            if let Err(reason) = Summary::check_path(path) {
+                return Err(FileError::at(&self.source, Some(measure.span()), &reason));
+            }
+        }
         Ok(())
     }
 

@@ -33,6 +33,21 @@ pub struct Outcome {
     pub verdicts: BTreeMap<String, String>,
 }
 
+/// A unit that could not be played to its end.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Failure {
+    /// Number of the unit in the plan, from 0.
+    pub unit: usize,
+    /// Name of the condition.
+    pub condition: String,
+    /// Name of the arm.
+    pub arm: String,
+    /// Seed of the run.
+    pub seed: u64,
+    /// The reason.
+    pub reason: String,
+}
+
 impl Outcome {
     /// The outcome of a unit.
     pub(super) fn of(unit: &Unit<'_>, played: &Played) -> Self {

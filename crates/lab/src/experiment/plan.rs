@@ -25,7 +25,7 @@ use crate::shell;
 /// The plan in the folder of an experiment.
 pub const PLAN: &str = "plan.json";
 /// The experiment file as it was planned, for people.
-const FILE: &str = "experiment.toml";
+pub(super) const FILE: &str = "experiment.toml";
 /// Folder of the files with the units that have been played.
 pub(super) const UNITS: &str = "units";
 /// How the name of a file with units ends.

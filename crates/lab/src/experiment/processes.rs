@@ -7,6 +7,7 @@ use config::FileError;
 use miette::{IntoDiagnostic, miette};
 use observe::Observation;
 use protocol::Event;
+use protocol::messages::End;
 use recording::{Recording, Ticks};
 use scenario::Scenario;
 use simulator::RunFolder;
@@ -54,11 +55,12 @@ pub(super) fn follow(
         .stdin(Stdio::null());
     let output = command.output().into_diagnostic()?;
     let run = RunFolder::at(folder.path().join(RUN));
-    // Verdicts are exit statuses, too, and say nothing against the launch.
-    let summary = read_summary(&run)?;
+    // A launch that failed says why, and its record, which may be damaged, does not. Verdicts are exit statuses, too, and say
+    // nothing against it.
+    let summary = read_summary(&run).ok().flatten();
     let summary = summary.filter(|summary| {
-        let is_judged = summary.end.is_some() && summary.verdict().exit_status() != 0;
-        output.status.success() || is_judged
+        let is_judged = summary.verdict().exit_status() != 0;
+        summary.end == Some(End::Finished) && (output.status.success() || is_judged)
     });
     let Some(summary) = summary else {
         return Err(failed(&output, folder.path()));

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::plan::{Program, write};
 
 /// The provenance in the folder of an experiment.
-const PROVENANCE: &str = "provenance.json";
+pub(super) const PROVENANCE: &str = "provenance.json";
 
 /// Which command wrote results, and where.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

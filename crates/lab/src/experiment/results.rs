@@ -7,11 +7,11 @@ use std::path::Path;
 use config::FileError;
 use miette::IntoDiagnostic;
 use protocol::messages::Verdict;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::contrast::Contrast;
 use super::estimate::Cell;
-use super::outcome::Outcome;
+use super::outcome::{Failure, Outcome};
 use super::plan::Plan;
 use super::store::Store;
 use super::unheard::Unheard;
@@ -21,22 +21,7 @@ use crate::export::sheet::{Column, Format, Sheet, Type, Value};
 /// Name of the tables with a row for each unit.
 const RUNS: &str = "runs";
 /// The estimates.
-const RESULTS: &str = "results.json";
-
-/// A unit that could not be played to its end.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Failure {
-    /// Number of the unit in the plan, from 0.
-    pub unit: usize,
-    /// Name of the condition.
-    pub condition: String,
-    /// Name of the arm.
-    pub arm: String,
-    /// Seed of the run.
-    pub seed: u64,
-    /// The reason.
-    pub reason: String,
-}
+pub(super) const RESULTS: &str = "results.json";
 
 /// The results of an experiment, in the order of its units.
 #[derive(Debug)]
@@ -154,6 +139,20 @@ impl Results {
         }
     }
 
+    /// Estimates of every measure, for each arm under each condition.
+    #[must_use]
+    pub fn estimates(&self) -> Vec<Cell> {
+        let experiment = &self.plan.experiment;
+        experiment.estimate(&self.outcomes, &self.failures)
+    }
+
+    /// Differences of every arm to the baseline.
+    #[must_use]
+    pub fn contrasts(&self) -> Vec<Contrast> {
+        let experiment = &self.plan.experiment;
+        experiment.contrast(&self.outcomes, &self.failures)
+    }
+
     /// How the runs have met each expectation of the experiment file, in its order. What the scenario expects is in the tables
     /// only: an experiment may be about how often that fails.
     #[must_use]
@@ -203,8 +202,8 @@ impl Results {
             missing: self.missing.len(),
             failures: &self.failures,
             never_occurred: &self.never_occurred,
-            estimates: self.plan.experiment.estimate(&self.outcomes),
-            contrasts: self.plan.experiment.contrast(&self.outcomes),
+            estimates: self.estimates(),
+            contrasts: self.contrasts(),
         };
         let text = serde_json::to_string_pretty(&written).into_diagnostic()?;
         writeln!(draft, "{text}").map_err(|error| unwritable(&path, &error))?;

@@ -234,13 +234,16 @@ fn with_zero(contrasts: &[&Contrast]) -> String {
             Difference::NoPair | Difference::NotFinite => continue,
         };
 
+        let Some((low, high)) = difference.bounds() else {
+            continue;
+        };
         all += 1;
-        let bounds = difference.bounds();
-        let bounds = bounds.unwrap_or((difference.value, difference.value));
-        count += usize::from(bounds.0 <= 0.0 && bounds.1 >= 0.0);
+        count += usize::from(low <= 0.0 && high >= 0.0);
     }
 
-    if count == all {
+    if all == 0 {
+        String::new()
+    } else if count == all {
         ", and every interval includes zero".to_owned()
     } else {
         format!(", and {count} of {all} intervals include zero")

@@ -52,7 +52,7 @@ impl<'a> Study<'a> {
         }
 
         let mut estimates = BTreeMap::new();
-        for cell in experiment.estimate(&results.outcomes) {
+        for cell in results.estimates() {
             let place = [
                 cell.measure.clone(),
                 cell.condition.clone(),
@@ -69,7 +69,7 @@ impl<'a> Study<'a> {
             arms: &experiment.arms[..experiment.arms.len().min(MOST_ARMS)],
             factors: factors.collect(),
             estimates,
-            contrasts: experiment.contrast(&results.outcomes),
+            contrasts: results.contrasts(),
             cells,
         }
     }

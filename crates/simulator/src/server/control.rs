@@ -13,7 +13,7 @@ use super::answer::{Refusal, refuse};
 use super::process::{Interrupt, Server, Stage};
 use crate::simulation::Simulation;
 use config::diagnostic::Source;
-use scenario::{OnLate, Scenario};
+use scenario::{OnLate, Scenario, kind_in_words};
 
 /// Why a run in progress does not go to another tick.
 const NOT_SOUGHT: &str = "a run in progress cannot be sought: its ticks take place once, in order; `cars replay RUN` shows a \
@@ -240,6 +240,13 @@ impl Server {
         {
             let order = self.recover_now(robot, kind, simulation);
             return order.map_err(|error| error.to_string());
+        }
+        if let Intervention::Fault { robot, .. } = what
+            && self.barrier.awaited().iter().any(|(name, _)| name == robot)
+            && let Some(kind) = simulation.held_by_wall_clock(robot)
+        {
+            let kind = kind_in_words(kind);
+            return Err(format!("{robot} {kind} already: let it go on first"));
         }
         simulation.intervene(what)
     }

@@ -419,12 +419,13 @@ fn two_experiment_files_of_one_name_do_not_share_a_folder_by_chance() {
     assert_eq!(play("other", "Is it another", &out).0, Some(0));
 }
 
-/// A robot that exits in the middle of a run where its parameter `wings` is 2.
+/// A robot that exits in the middle of a run where its parameter `wings` is 2, and in tick 0 where it is 3.
 const WINGS: &str = r#"
 while read -r line; do
     case $line in
         *'"type":"end"'*) exit 0 ;;
         *'"wings":2'*) fails=yes ;;
+        *'"wings":3'*) echo 'it fell' >&2; exit 4 ;;
     esac
     case $line in *'"tick":2'*) test -z "$fails" || { echo 'no wings' >&2; exit 3; } ;; esac
     echo '{"type":"done"}'
@@ -438,7 +439,9 @@ fn a_unit_that_fails_ends_nothing_and_is_played_again_on_request() {
     let program = programs().join("cars");
     lab.write(
         "walk.toml",
-        "[[robot]]\nname = 'Walker'\nat = ['25 ft', '25 ft']\nparams = { wings = 1 }\n",
+        "[[robot]]\nname = 'Walker'\nat = ['25 ft', '25 ft']\nparams = { wings = 1 }\n\
+         [[expect]]\nname = 'it flies'\neventually = { event = 'emotion', robot = 'Walker', to = 'HAPPY' }\n\
+         within = '100 s'\n",
     );
     lab.write(
         "launch.toml",
@@ -451,6 +454,7 @@ fn a_unit_that_fails_ends_nothing_and_is_played_again_on_request() {
         "wings.toml",
         "question = '?'\nscenario = 'launch.toml'\nduration = '2 s'\nseeds = 2\n[[arm]]\nname = 'good'\n\
          [[arm]]\nname = 'bad'\nset = ['robot.Walker.params.wings=2']\n\
+         [[arm]]\nname = 'falls'\nset = ['robot.Walker.params.wings=3']\n\
          [[measure]]\nname = 'ticks'\nsummary = 'ticks'\n",
     );
     let folder = lab.out().join("failing");
@@ -458,27 +462,34 @@ fn a_unit_that_fails_ends_nothing_and_is_played_again_on_request() {
     let args = [&args[..], &[folder.to_str().unwrap()]].concat();
 
     for (more, expected) in [
-        (&[] as &[&str], "4 units: 0 are there, 4 to play"),
-        (&[], "4 units: 4 are there, 0 to play"),
-        (&["--retry-failed"], "4 units: 2 are there, 2 to play"),
+        (&[] as &[&str], "6 units: 0 are there, 6 to play"),
+        (&[], "6 units: 6 are there, 0 to play"),
+        (&["--retry-failed"], "6 units: 2 are there, 4 to play"),
     ] {
         let (code, printed) = cars(&[&args, more].concat());
         assert_eq!(code, 1, "{printed}");
         assert!(printed.contains(expected), "{printed}");
-        assert!(printed.contains("2 of 4 units failed"), "{printed}");
+        assert!(printed.contains("4 of 6 units failed"), "{printed}");
         assert!(printed.contains("no wings"), "{printed}");
+        assert!(printed.contains("it fell"), "{printed}");
     }
 
     let results = fs::read_to_string(folder.join("results.json")).unwrap();
     let results: serde_json::Value = serde_json::from_str(&results).unwrap();
     let failures = results["failures"].as_array().unwrap();
-    assert_eq!(failures.len(), 2, "{results}");
+    assert_eq!(failures.len(), 4, "{results}");
     for failure in failures {
-        assert_eq!(failure["arm"], "bad");
-        assert!(
-            failure["reason"].as_str().unwrap().contains("no wings"),
-            "{failure}"
-        );
+        let reason = failure["reason"].as_str().unwrap();
+        let expected = match failure["arm"].as_str() {
+            Some("bad") => "no wings",
+            _ => "it fell",
+        };
+        assert!(reason.contains(expected), "{failure}");
+        assert!(!reason.contains("damaged"), "{failure}");
+    }
+    for (index, failed) in [(0, 0), (1, 2), (2, 2)] {
+        let excluded = &results["estimates"][index]["excluded"];
+        assert_eq!(excluded["failed"], failed, "{results}");
     }
     let good = &results["estimates"][0];
     assert_eq!(

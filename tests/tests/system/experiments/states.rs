@@ -26,7 +26,7 @@ fn what_is_not_a_number_has_a_state() {
          end = { event = 'behavior', robot = 'Butler', to = 'FLY' }\nas = 'mean'\n\
          [[measure]]\nname = 'count'\n[measure.between]\nbegin = { event = 'command_dropped' }\n\
          end = { event = 'behavior', robot = 'Butler', to = 'FLY' }\nas = 'count'\n\
-         [[measure]]\nname = 'gone'\nsummary = 'robots.Butler.nothing'\n\
+         [[measure]]\nname = 'gone'\nsummary = 'robots.Butler.state_variables.nothing'\n\
          [[measure]]\nname = 'never sent'\nsummary = 'robots.Butler.sent.fly'\n",
     );
     let out = lab.out().join("states");
@@ -51,6 +51,7 @@ fn a_word_that_never_occurs_is_named() {
     let file = experiment(
         &lab,
         "[[measure]]\nname = 'calm'\nshare = { robot = 'Butler', emotion = ['HAPY', 'HAPPY'] }\n\
+         [[measure]]\nname = 'rage'\nsummary = 'robots.Butler.emotions_s.FRUSTRATD'\n\
          [[measure]]\nname = 'calls'\ncount = { event = 'command_sent', command = 'reffil' }\n\
          [[measure]]\nname = 'serves'\ncount = { event = 'behavior', robot = 'Butler', to = 'SERVE' }\n",
     );

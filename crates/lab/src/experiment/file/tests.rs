@@ -130,7 +130,7 @@ fn seeds_are_a_count_a_list_or_a_range() {
 /// A file with one mistake: what of [`GOOD`] is replaced, by what, what the line of the error contains, and its reason.
 type Wrong<'a> = (&'a str, &'a str, &'a str, &'a str);
 
-const WRONG: [Wrong<'_>; 66] = [
+const WRONG: [Wrong<'_>; 67] = [
     (
         "robot.Butler.params.policy=emotion",
         "seed=7",
@@ -443,6 +443,12 @@ const WRONG: [Wrong<'_>; 66] = [
         "`eventually` needs a time",
     ),
     (
+        "event = \"behavior\", robot = \"Butler\", to = \"EXCHANGE\"",
+        "event = \"blocked\", by = \"gest\"",
+        "count",
+        "is never \"gest\": it is one of edge, obstacle, guest, too_fast, or a table",
+    ),
+    (
         "count = {",
         "summary = \"ticks\"\ncount = {",
         "[[measure]]",
@@ -559,6 +565,32 @@ fn robots_that_the_scenario_does_not_have_are_shown() {
         let expected =
             format!("line {line}: the scenario has no robot \"Buttler\"; it has Butler, Leguin");
         assert_eq!(error.in_words(), expected);
+    }
+
+    let count = "event = \"behavior\", robot = \"Butler\"";
+    let verdict = "event = \"judged\", expectation = \"exchnge\"";
+    for (from, to, reason) in [
+        (
+            count,
+            verdict,
+            "there is no expectation \"exchnge\"; there are ",
+        ),
+        (
+            "variable = {",
+            "summary = \"robots.*.emotion_s.HAPPY\" #",
+            "a summary has no number `robots.*.emotion_s.HAPPY`: in the place of `emotion_s` there is one of ",
+        ),
+    ] {
+        let text = GOOD.replacen(from, to, 1).replacen(
+            ", to = \"EXCHANGE\" }",
+            " }",
+            usize::from(from == count),
+        );
+        let error = parse(&text)
+            .unwrap()
+            .complete(scenario.clone())
+            .unwrap_err();
+        assert!(error.in_words().contains(reason), "{}", error.in_words());
     }
 
     let text = GOOD.replace(
@@ -679,7 +711,6 @@ fn no_name_is_that_of_another_column() {
         ("arm", &[factor, measure, expectation]),
         ("guests", &[measure, expectation]),
         ("served", &[factor, measure, expectation]),
-        ("served_censored", &[factor, measure, expectation]),
         ("served_state", &[factor, measure, expectation]),
         ("exchanges", &[factor, expectation]),
     ] {
