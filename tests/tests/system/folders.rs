@@ -930,7 +930,11 @@ fn no_output_replaces_a_part_of_a_record() {
         .arg(&beside)
         .output()
         .unwrap();
-    assert!(output.status.success() && beside.exists(), "{}", said(&output));
+    assert!(
+        output.status.success() && beside.exists(),
+        "{}",
+        said(&output)
+    );
 }
 
 #[test]
