@@ -27,9 +27,9 @@ use std::time::{Duration, Instant};
 
 use processes::Running;
 use protocol::messages::End;
+use record::Summary;
 use recording::{RecordedTick, Recording};
 use serde_json::Value;
-use simulator::Summary;
 
 /// Longest wait of a test.
 pub const PATIENCE: Duration = Duration::from_secs(90);

@@ -12,9 +12,9 @@ use lab::run::Local;
 use launch::{LaunchFile, default_run_name, scenario_file};
 use miette::{IntoDiagnostic, WrapErr, miette};
 use protocol::RunName;
+use record::RunFolder;
+use record::seal::Checked;
 use scenario::{Scenario, roster};
-use simulator::RunFolder;
-use simulator::seal::Checked;
 use terminal::OutputError;
 
 use crate::experiment::equal_arms;

@@ -13,9 +13,9 @@ use protocol::messages::{
 };
 use protocol::time::seconds;
 use protocol::{Message, RobotName, RunName, Tick, decode, encode};
+use record::RunFolder;
+use record::names::{ENDPOINT, LATEST, OPERATOR_CONFIG};
 use scenario::Scenario;
-use simulator::RunFolder;
-use simulator::recorder::{ENDPOINT, LATEST, OPERATOR_CONFIG};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::mpsc::sync_channel;

@@ -8,7 +8,7 @@ use lab::diagram::{Options, Window, draw};
 use lab::folder::{find, recorded_epoch, recorded_epochs};
 use lab::moment::Moment;
 use protocol::Epoch;
-use simulator::recorder::LATEST;
+use record::names::LATEST;
 
 use crate::output;
 

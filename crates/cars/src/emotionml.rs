@@ -9,7 +9,7 @@ use lab::emotionml::{Export, ExportError, View};
 use lab::folder::find;
 use miette::miette;
 use protocol::RobotName;
-use simulator::recorder::LATEST;
+use record::names::LATEST;
 
 use crate::output::{Output, cannot_write};
 

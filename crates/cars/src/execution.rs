@@ -8,7 +8,7 @@ use config::{Override, Speed, seed};
 use launch::RunOptions;
 use protocol::RunName;
 use protocol::random::MAX_SEED;
-use simulator::IfTaken;
+use record::IfTaken;
 
 /// Options of one execution.
 #[derive(Debug, Clone, Args)]

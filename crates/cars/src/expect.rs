@@ -10,9 +10,9 @@ use lab::judge::judge;
 use lab::table::verdicts;
 use protocol::Epoch;
 use protocol::messages::Verdict;
+use record::names::LATEST;
 use scenario::Scenario;
 use scenario::expectations;
-use simulator::recorder::LATEST;
 
 /// `cars expect`.
 #[derive(Debug, Args)]

@@ -13,9 +13,9 @@ use lab::moment::Moment;
 use launch::RunOptions;
 use miette::miette;
 use protocol::{Epoch, RunName};
+use record::NewRun;
 use scenario::Scenario;
 use scenario::files::LATEST;
-use simulator::NewRun;
 
 use crate::execution::if_taken;
 use crate::table;

@@ -11,7 +11,7 @@ use launch::{Launch, LaunchOptions, Outcome, Planned, ProcessLink, What, code_of
 use miette::miette;
 use protocol::RobotName;
 use protocol::messages::Verdict;
-use simulator::RunFolder;
+use record::RunFolder;
 use terminal::OutputError;
 
 use crate::execution::ExecutionArgs;

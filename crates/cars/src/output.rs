@@ -7,7 +7,7 @@ use std::path::Path;
 use lab::experiment::is_of_experiment;
 use lab::export::draft::{Draft, unwritable};
 use miette::miette;
-use simulator::RunFolder;
+use record::RunFolder;
 
 /// Paths of the standard output.
 const STANDARD: [&str; 3] = ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"];

@@ -10,10 +10,11 @@ use config::Speed;
 use lab::folder::{find, recorded_epoch, recording};
 use miette::IntoDiagnostic;
 use protocol::{Epoch, RunName};
+use record::RunLock;
+use record::names::ENDPOINT;
+use record::{EpochFiles, RunFolder};
 use recording::Recording;
-use simulator::recorder::{ENDPOINT, RunLock};
 use simulator::server::{Replay, ReplayOptions};
-use simulator::{EpochFiles, RunFolder};
 use terminal::OutputError;
 
 /// `cars replay`.

@@ -8,8 +8,8 @@ use config::FileError;
 use lab::folder::recorded_epoch;
 use lab::replayed::Replayed;
 use miette::IntoDiagnostic;
+use record::RunFolder;
 use robot::{Host, Robot, RobotArgs, RobotName};
-use simulator::RunFolder;
 
 /// `cars replay-robot`.
 #[derive(Debug, Args)]

@@ -8,8 +8,8 @@ use lab::experiment::PLAN;
 use lab::folder::find;
 use lab::report::{of_experiment, of_runs};
 use miette::miette;
-use simulator::RunFolder;
-use simulator::recorder::LATEST;
+use record::RunFolder;
+use record::names::LATEST;
 
 use crate::output;
 

@@ -10,7 +10,7 @@ use lab::experiment::Plan;
 use lab::experiment::submit::{Kubernetes, Parallel, Slurm, Tasks};
 use lab::export::draft::unwritable;
 use miette::{IntoDiagnostic, WrapErr, miette};
-use simulator::folder::check_no_links;
+use record::folder::check_no_links;
 
 use crate::output;
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use lab::table::{HEAD, heading, held_up, rows, verdicts};
-use simulator::Summary;
+use record::Summary;
 use tabled::builder::Builder;
 use tabled::settings::Style;
 use terminal::OutputError;

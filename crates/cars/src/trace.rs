@@ -8,7 +8,7 @@ use clap::Args;
 use lab::folder::{find, recorded_epoch};
 use lab::trace::{Trace, TraceError};
 use protocol::{Epoch, Tick};
-use simulator::recorder::LATEST;
+use record::names::LATEST;
 
 use crate::output::{Output, cannot_write};
 

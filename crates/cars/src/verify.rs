@@ -14,9 +14,9 @@ use lab::verify::{Verification, verify as verify_epoch};
 use launch::{Launch, LaunchOptions, RunOptions};
 use miette::{IntoDiagnostic, miette};
 use protocol::{Event, RobotName};
-use simulator::difference::Difference;
-use simulator::record::Record;
-use simulator::{EpochFiles, IfTaken, RunFolder};
+use record::Record;
+use record::difference::Difference;
+use record::{EpochFiles, IfTaken, RunFolder};
 use terminal::OutputError;
 
 /// How long a process may take to exit before it is killed, seconds.

@@ -7,9 +7,9 @@ use diagram::{Diagram, State};
 use miette::miette;
 use protocol::messages::Awaited;
 use protocol::{Event, Tick};
+use record::EpochFiles;
+use record::{Entry, Record};
 use recording::{Recording, RecordingError};
-use simulator::EpochFiles;
-use simulator::record::{Entry, Record};
 
 pub use diagram::Options;
 

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use config::FileError;
 use protocol::{Event, Tick};
+use record::EpochFiles;
+use record::difference::{Difference, between};
+use record::{Entry, Record};
 use serde::Serialize;
-use simulator::EpochFiles;
-use simulator::difference::{Difference, between};
-use simulator::record::{Entry, Record};
 
 /// What came of a comparison.
 #[derive(Debug, Default, Serialize)]

@@ -19,7 +19,7 @@ use std::path::Path;
 
 use miette::miette;
 use protocol::RobotName;
-use simulator::RunFolder;
+use record::RunFolder;
 
 use document::Document;
 use episode::Episodes;

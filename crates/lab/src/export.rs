@@ -10,7 +10,7 @@ mod tables;
 use std::path::{Path, PathBuf};
 
 use config::FileError;
-use simulator::EpochFiles;
+use record::EpochFiles;
 
 use sheet::Format;
 

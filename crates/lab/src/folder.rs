@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use config::FileError;
 use miette::{IntoDiagnostic, WrapErr, miette};
 use protocol::{Epoch, RunName};
+use record::names::{LATEST, SUMMARY};
+use record::{EpochFiles, RunFolder, Summary};
 use recording::Recording;
-use simulator::recorder::{LATEST, SUMMARY};
-use simulator::{EpochFiles, RunFolder, Summary};
 
 /// Finds the folder of a run by the name of the run under `out`, or by the path of the folder.
 ///

@@ -5,11 +5,12 @@ use std::time::Instant;
 use config::{Changes, FileError, Override, Source};
 use miette::{IntoDiagnostic, miette};
 use protocol::{Event, RunName, Tick};
+use record::difference::between;
+use record::{Entry, Record};
+use record::{EpochFiles, RunFolder, Summary};
 use scenario::Parent;
 use scenario::Scenario;
-use simulator::difference::between;
-use simulator::record::{Entry, Record};
-use simulator::{EpochFiles, Recorder, RunFolder, Summary};
+use simulator::Recorder;
 
 use crate::reexecution::{Reexecution, cannot_go_on};
 use crate::run::{check_faults, check_parameters, go_on, observed};

@@ -7,11 +7,11 @@ use miette::miette;
 use observe::{Expectation, Observation, Watches};
 use protocol::messages::End;
 use protocol::{Event, Tick};
+use record::EpochFiles;
+use record::summary::Judged;
+use record::{Entry, Record};
 use recording::{Recording, Ticks};
 use scenario::Scenario;
-use simulator::EpochFiles;
-use simulator::record::{Entry, Record};
-use simulator::summary::Judged;
 
 use crate::states::LastStates;
 

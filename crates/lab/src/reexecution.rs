@@ -11,12 +11,12 @@ use lockstep::{Bulletin, Exchange, Outcome};
 use miette::{IntoDiagnostic, miette};
 use protocol::messages::{CommandText, FaultKind, News, Report};
 use protocol::{Epoch, Event, RobotName, RunName, Tick};
+use record::Entry;
+use record::difference::{Difference, between};
 use recording::Frame;
 use robot::{Action, BadParameters, Cars, LocalHost, Robot, RobotError};
 use scenario::Scenario;
 use simulator::TickRecord;
-use simulator::difference::{Difference, between};
-use simulator::record::Entry;
 
 use crate::replayed::action;
 use crate::run::{Local, go_on};

@@ -5,9 +5,9 @@ use std::path::Path;
 use config::FileError;
 use protocol::messages::Report;
 use protocol::{RobotName, Tick};
+use record::EpochFiles;
+use record::{Entry, Record};
 use robot::{Action, BadParameters, Cars, Robot};
-use simulator::EpochFiles;
-use simulator::record::{Entry, Record};
 
 /// A robot that repeats, tick by tick, what a robot of a recorded run reported, sent and logged. It perceives nothing. Where the
 /// record has nothing of it, and after the end of the record, it stays where it is and publishes what it published last.

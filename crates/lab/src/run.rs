@@ -7,12 +7,13 @@ use std::time::{Duration, Instant};
 use miette::{IntoDiagnostic, miette};
 use protocol::messages::{End, FaultKind, OnLate};
 use protocol::{Epoch, Event, RobotName, RunName, Tick};
+use record::{RunFolder, Summary};
 use recording::panel_ticks;
 use robot::{LocalHost, Robot, Welcome};
 use scenario::FaultEnd;
 use scenario::Scenario;
 use simulator::recorder::Observed;
-use simulator::{Recorder, RunFolder, Simulation, Summary, TickRecord};
+use simulator::{Recorder, Simulation, TickRecord};
 
 /// Longest sleep of a run that is not as fast as possible, before it looks whether it is to go on.
 const NAP: Duration = Duration::from_millis(50);

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use protocol::messages::{End, Verdict};
 use protocol::time::seconds;
-use simulator::Summary;
-use simulator::summary::{Judged, RobotSummary};
+use record::Summary;
+use record::summary::{Judged, RobotSummary};
 
 /// Width of a full bar, characters.
 const BAR: usize = 10;

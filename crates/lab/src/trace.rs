@@ -10,10 +10,10 @@ use config::FileError;
 use protocol::messages::Awaited;
 use protocol::time::time_s;
 use protocol::{RobotName, Tick};
+use record::EpochFiles;
 use recording::{RecordedTick, Recording, RecordingError};
 use serde::Serialize;
 use serde_json::{Value, json};
-use simulator::EpochFiles;
 
 use crate::folder::recording;
 

@@ -6,15 +6,15 @@ use std::path::PathBuf;
 use config::{Changes, FileError};
 use miette::{IntoDiagnostic, WrapErr, miette};
 use protocol::{RobotName, RunName, Tick};
+use record::Record;
+use record::difference::{Difference, between, between_headers, between_summaries, in_recording};
+use record::names::{EVENTS, SUMMARY};
+use record::{EpochFiles, Summary, seal};
 use recording::Recording;
 use scenario::Scenario;
 use serde_json::Value;
-use simulator::difference::{
-    Difference, between, between_headers, between_summaries, in_recording,
-};
-use simulator::record::Record;
-use simulator::recorder::{self, EVENTS, SUMMARY};
-use simulator::{EpochFiles, Simulation, Summary, seal};
+use simulator::Simulation;
+use simulator::recorder;
 
 use crate::reexecution::Reexecution;
 
@@ -61,7 +61,7 @@ pub fn verify(files: &EpochFiles) -> miette::Result<Verification> {
     }
 
     let run = recorded_run(&record);
-    let mut summary = Summary::begin(&run, &again.local.simulation);
+    let mut summary = again.local.simulation.begin_summary(&run);
     let mut next = record.next_entry()?;
     if next.is_none() {
         let events = files.events.display();
@@ -71,7 +71,7 @@ pub fn verify(files: &EpochFiles) -> miette::Result<Verification> {
         let executed = again.play(&recorded)?;
         let simulation = &again.local.simulation;
         for event in executed.record.events.iter() {
-            summary.count(simulation, executed.record.tick, event);
+            simulation.count(&mut summary, executed.record.tick, event);
         }
         let executed = executed.into_entry();
         verification.difference =
@@ -97,7 +97,7 @@ pub fn verify(files: &EpochFiles) -> miette::Result<Verification> {
         }
         check_end(files, &record, &verification, has_recording)?;
         if verification.has_end && is_last(files) {
-            summary.finish(&again.local.simulation);
+            again.local.simulation.finish_summary(&mut summary);
             check_run(files, &record)?;
             verification.difference = summary_difference(files, &record, &summary)?;
         }

@@ -6,7 +6,7 @@ use std::path::{Component, Path, PathBuf};
 use bus::runtime::{ONE_THREAD, RUNTIME_VARIABLE};
 use config::FileError;
 use protocol::RunName;
-use simulator::IfTaken;
+use record::IfTaken;
 
 use super::file::{CONSOLE, LaunchFile, Process, SIMULATOR};
 use super::plan::{name_args, with_own_args};

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 
 use config::{FileError, Source};
 use protocol::RobotName;
+use record::RunFolder;
+use record::names::LAUNCHED;
+use record::seal;
 use scenario::Scenario;
 use serde::{Deserialize, Serialize};
-use simulator::RunFolder;
-use simulator::recorder::LAUNCHED;
-use simulator::seal;
 
 use super::file::LaunchFile;
 

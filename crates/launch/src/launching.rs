@@ -10,9 +10,9 @@ use config::units::Time;
 use config::{Changes, FileError, Source, Speed};
 use miette::{IntoDiagnostic, WrapErr, miette};
 use protocol::{RobotName, RunName};
+use record::names::{LOGS, SCENARIO};
+use record::{IfTaken, RunFolder, RunLock};
 use scenario::{Scenario, roster};
-use simulator::recorder::{LOGS, SCENARIO};
-use simulator::{IfTaken, RunFolder, RunLock};
 
 use super::compose;
 use super::endpoint;

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use config::units::Time;
 use config::{Changes, FileError, Override, Speed};
 use protocol::RunName;
+use record::{IfTaken, NewRun, RunFolder};
 use scenario::Scenario;
-use simulator::{IfTaken, NewRun, RunFolder};
 
 use super::file::{LaunchFile, is_launch_file};
 

@@ -7,9 +7,9 @@ use std::time::Duration;
 use bus::endpoint::connectable;
 use config::FileError;
 use protocol::{RobotName, RunName};
-use simulator::RunFolder;
-use simulator::folder::CONSOLE_KEPT;
-use simulator::recorder::{LOGS, SCENARIO};
+use record::RunFolder;
+use record::folder::CONSOLE_KEPT;
+use record::names::{LOGS, SCENARIO};
 
 use super::child::{self, AtExit};
 use super::failure::FAILED;

@@ -9,7 +9,7 @@ use lab::folder::{recorded_epoch, recorded_epochs};
 use lab::moment::Moment;
 use lab::report::{page_of_experiment, page_of_runs};
 use pyo3::prelude::*;
-use simulator::RunFolder;
+use record::RunFolder;
 
 use crate::error::{plain, reported};
 

@@ -14,8 +14,8 @@ use lab::run::{check_faults, execute_with};
 use launch::{RunOptions, scenario_file};
 use miette::{IntoDiagnostic, miette};
 use pyo3::prelude::*;
+use record::{IfTaken, RunFolder};
 use scenario::Scenario;
-use simulator::{IfTaken, RunFolder};
 
 use crate::error::{argument, plain, read, reported};
 use crate::interrupt::Watch;

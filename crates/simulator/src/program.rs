@@ -3,9 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use crate::recorder::{ENDPOINT, OPERATOR_CONFIG};
 use crate::server::{Event, Options, Past, REPEAT_AFTER, Server, Stay};
-use crate::{IfTaken, RunFolder, RunLock, Summary};
 use bus::endpoint::connectable;
 use bus::{Bus, DEFAULT_ENDPOINT, Role, check_exposure, check_run};
 use clap::{Command, CommandFactory, Parser, ValueEnum};
@@ -14,6 +12,8 @@ use config::{Speed, shipped};
 use miette::IntoDiagnostic;
 use protocol::RunName;
 use protocol::messages::End;
+use record::names::{ENDPOINT, OPERATOR_CONFIG};
+use record::{IfTaken, RunFolder, RunLock, Summary};
 use scenario::{Changes, Override, Scenario};
 
 /// Exit status where another process has the address at which the simulator is to listen.

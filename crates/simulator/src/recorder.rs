@@ -16,14 +16,14 @@ use protocol::{Line, PROTOCOL_VERSION, RobotName, RunName};
 use recording::content::Missed;
 use recording::{Frame, Header, PlacedRobot, TickView, Wall, WriteError, Writer};
 
-use crate::folder::DRAFT;
-use crate::record::Record;
-use crate::seal::Seal;
 use crate::simulation::{Simulation, TickRecord};
-use crate::summary::Summary;
+use record::Record;
+use record::folder::DRAFT;
+use record::seal::Seal;
+use record::summary::Summary;
 use scenario::SyncPoint;
 
-pub use crate::folder::{RunFolder, RunLock};
+pub use record::folder::{RunFolder, RunLock};
 pub use scenario::files::{
     ENDPOINT, EVENTS, LATEST, LAUNCHED, LOCK, LOG, LOGS, OPERATOR_CONFIG, RECORDING, SCENARIO,
     SUMMARY,
@@ -221,7 +221,7 @@ impl Recorder {
             observed: None,
             sync: record.sync,
             synced_at: Instant::now(),
-            summary: Summary::begin(run, simulation),
+            summary: simulation.begin_summary(run),
             drafts: Vec::new(),
         })
     }
@@ -281,7 +281,7 @@ impl Recorder {
         let mut lines = Vec::new();
         let tick_s = simulation.scenario().tick_s;
         for event in record.events.iter() {
-            self.summary.count(simulation, record.tick, event);
+            simulation.count(&mut self.summary, record.tick, event);
             lines.extend(event.log_record(simulation.epoch(), record.tick, tick_s));
         }
         let mut wall = Wall::default();
@@ -429,7 +429,7 @@ impl Recorder {
     /// # Errors
     /// [`FileError`] if it cannot be written.
     pub fn finish(&mut self, simulation: &Simulation) -> Result<Summary, FileError> {
-        self.summary.finish(simulation);
+        simulation.finish_summary(&mut self.summary);
         if !self.drafts.is_empty() {
             // The run was ended before it was resumed: its record is as it was.
             return Ok(self.summary.clone());

@@ -11,10 +11,13 @@ use std::time::{Duration, Instant};
 use lockstep::{Bulletin, Exchange, Outcome};
 use protocol::messages::{CommandText, End, News, Report};
 use protocol::{RunName, Tick};
+use record::RunFolder;
+use record::RunLock;
+use record::names::{EVENTS, RECORDING};
 use scenario::Scenario;
 use scenario::diagnostic::Source;
-use simulator::recorder::{EVENTS, Observed, RECORDING, RunLock};
-use simulator::{Recorder, RunFolder, Simulation};
+use simulator::recorder::Observed;
+use simulator::{Recorder, Simulation};
 
 /// Robots that miss every tick.
 struct Absent;

@@ -4,9 +4,9 @@
 use std::collections::BTreeSet;
 
 use protocol::{Epoch, RobotName, Tick};
+use record::Entry;
 use scenario::Scenario;
 use simulator::Event;
-use simulator::record::Entry;
 
 /// The record of an epoch.
 pub(crate) struct Again<'a> {

@@ -6,9 +6,9 @@ use std::collections::BTreeMap;
 use lab::run::Local;
 use protocol::messages::FaultKind;
 use protocol::{RobotName, RunName, Tick};
+use record::Entry;
 use scenario::{Fault, FaultEnd, OnLate, Scenario};
 use simulator::TickRecord;
-use simulator::record::Entry;
 
 use crate::again::Again;
 use crate::hall::{TICKS, halls};

@@ -11,7 +11,7 @@ use protocol::messages::{
     Report, Waiting,
 };
 use protocol::{Epoch, Generation, RobotName, RunName, Tick, encode};
-use simulator::record::Entry;
+use record::Entry;
 use simulator::{Event as Recorded, Simulation, TickRecord};
 
 use crate::again::Again;

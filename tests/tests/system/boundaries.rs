@@ -33,8 +33,20 @@ const ALLOWED: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "record",
+        &[
+            "scenario",
+            "config",
+            "lockstep",
+            "protocol",
+            "recording",
+            "timeline",
+        ],
+    ),
+    (
         "simulator",
         &[
+            "record",
             "scenario",
             "world",
             "bus",
@@ -44,7 +56,6 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "protocol",
             "recording",
             "terminal",
-            "timeline",
         ],
     ),
     (
@@ -56,6 +67,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         "launch",
         &[
             "scenario",
+            "record",
             "simulator",
             "robot",
             "bus",
@@ -68,6 +80,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         "lab",
         &[
             "scenario",
+            "record",
             "simulator",
             "robot",
             "robots",
@@ -89,6 +102,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "launch",
             "lab",
             "scenario",
+            "record",
             "simulator",
             "console",
             "robot",
@@ -104,17 +118,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
     (
         "python-module",
         &[
-            "lab",
-            "launch",
-            "scenario",
-            "simulator",
-            "robots",
-            "robot",
-            "bus",
-            "config",
-            "protocol",
-            "report",
-            "terminal",
+            "lab", "launch", "scenario", "record", "robots", "robot", "bus", "config", "protocol",
+            "report", "terminal",
         ],
     ),
     ("stabby", &[]),
@@ -124,6 +129,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         "system-tests",
         &[
             "scenario",
+            "record",
             "simulator",
             "robot",
             "robots",

@@ -6,8 +6,8 @@ use std::process::Command;
 use launch::Certificates;
 use miette::{IntoDiagnostic, WrapErr};
 use protocol::RobotName;
+use record::names::SUMMARY;
 use serde::Deserialize;
-use simulator::recorder::SUMMARY;
 
 use super::programs::{Processes, Programs, free_endpoint};
 use super::workload::Workload;

@@ -10,8 +10,8 @@ use lab::scratch::Scratch;
 use launch::RunOptions;
 use miette::{IntoDiagnostic, miette};
 use protocol::RunName;
+use record::{IfTaken, RunFolder, Summary};
 use scenario::Scenario;
-use simulator::{IfTaken, RunFolder, Summary};
 
 use super::launcher::launcher;
 use crate::execution::if_taken;

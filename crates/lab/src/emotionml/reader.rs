@@ -9,10 +9,10 @@ use config::Changes;
 use miette::{IntoDiagnostic, miette};
 use protocol::messages::{Parameters, Report};
 use protocol::{Epoch, Event, Line, RobotName, RunName, Tick};
+use record::RunFolder;
+use record::names::{EVENTS, RECORDING, SCENARIO};
 use recording::{Recording, Ticks};
 use scenario::Scenario;
-use simulator::RunFolder;
-use simulator::recorder::{EVENTS, RECORDING, SCENARIO};
 use timeline::States;
 
 use super::episode::{Presence, RobotState};

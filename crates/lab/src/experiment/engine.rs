@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use config::FileError;
 use miette::miette;
-use simulator::folder::check_no_links;
+use record::folder::check_no_links;
 use xxhash_rust::xxh3::xxh3_64;
 
 use super::plan::{FILE, PLAN, Plan, Robots, UNITS, Unit};

@@ -11,9 +11,9 @@ use observe::measure::Kind;
 use observe::measure::check_name;
 use observe::{Expectation, Measure};
 use protocol::RobotName;
+use record::Summary;
 use scenario::Scenario;
 use serde::Deserialize;
-use simulator::Summary;
 use toml::Spanned;
 
 use super::condition::{

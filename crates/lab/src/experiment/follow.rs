@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use miette::IntoDiagnostic;
 use observe::Observation;
-use simulator::Summary;
+use record::Summary;
 
 /// Follows a run tick by tick.
 pub(super) trait Follow {

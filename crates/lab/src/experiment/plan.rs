@@ -9,9 +9,9 @@ use std::sync::OnceLock;
 
 use config::{Changes, FileError, Override, Source};
 use miette::{IntoDiagnostic, WrapErr, miette};
+use record::folder::check_no_links;
 use scenario::Scenario;
 use serde::{Deserialize, Serialize};
-use simulator::folder::check_no_links;
 use xxhash_rust::xxh3::Xxh3;
 
 use super::case::Case;

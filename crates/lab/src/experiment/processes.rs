@@ -8,10 +8,10 @@ use miette::{IntoDiagnostic, miette};
 use observe::Observation;
 use protocol::Event;
 use protocol::messages::End;
+use record::RunFolder;
+use record::names::RECORDING;
 use recording::{Recording, Ticks};
 use scenario::Scenario;
-use simulator::RunFolder;
-use simulator::recorder::RECORDING;
 use toml::{Table, Value};
 
 use super::follow::{Ended, Follow};

@@ -10,7 +10,6 @@ use observe::{Measured, Observation, Probe};
 use protocol::{RobotName, RunName};
 use scenario::Scenario;
 use serde::{Deserialize, Serialize};
-use simulator::Summary;
 
 use super::follow::{Ended, Follow};
 use super::plan::{Plan, Robots, Unit};
@@ -233,9 +232,9 @@ fn follow_in_process(scenario: Scenario, follower: &mut impl Follow) -> miette::
     let run = RunName::new(RUN).into_diagnostic()?;
     let mut summary = None;
     let simulation = play(scenario, &run, |simulation, record| {
-        let summary = summary.get_or_insert_with(|| Summary::begin(&run, simulation));
+        let summary = summary.get_or_insert_with(|| simulation.begin_summary(&run));
         for event in record.events.iter() {
-            summary.count(simulation, record.tick, event);
+            simulation.count(summary, record.tick, event);
         }
         follower.observe(&Observation {
             tick: record.tick,
@@ -247,7 +246,7 @@ fn follow_in_process(scenario: Scenario, follower: &mut impl Follow) -> miette::
     })?;
 
     let mut summary = summary.ok_or_else(|| miette!("the run has not begun"))?;
-    summary.finish(&simulation);
+    simulation.finish_summary(&mut summary);
     Ended::of(&summary)
 }
 

@@ -11,8 +11,8 @@ use std::path::Path;
 use config::FileError;
 use protocol::plain::escape_line;
 use protocol::{Event, RobotName, Seq, Tick};
-use simulator::EpochFiles;
-use simulator::record::{Entry, Record};
+use record::EpochFiles;
+use record::{Entry, Record};
 
 use super::draft::{Draft, unwritable};
 

@@ -7,11 +7,11 @@ use protocol::event::Blocker;
 use protocol::messages::{Report, Variable};
 use protocol::time::time_s;
 use protocol::{Epoch, Event, RobotName, Seq, Tick};
+use record::EpochFiles;
+use record::names::EVENTS as EVENTS_FILE;
+use record::{Entry, Record};
 use recording::{PlacedRobot, RecordedTick, Recording, RecordingError, Ticks};
 use serde::Serialize;
-use simulator::EpochFiles;
-use simulator::record::{Entry, Record};
-use simulator::recorder::EVENTS as EVENTS_FILE;
 
 use super::draft::Draft;
 use super::sheet::{Column, Format, Sheet, Type, Value};

@@ -1,8 +1,8 @@
 //! The course of a run: its states over time and its space-time diagram.
 
 use protocol::Tick;
+use record::EpochFiles;
 use report::{BandRow, Bands, Panel, State};
-use simulator::EpochFiles;
 
 use super::facts::{RobotFacts, RunFacts, States};
 use crate::diagram::{Options, Window, draw};

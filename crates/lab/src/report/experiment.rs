@@ -5,8 +5,8 @@ use std::path::Path;
 use miette::{IntoDiagnostic, miette};
 use observe::{Measure, Measured};
 use protocol::RunName;
+use record::{EpochFiles, RunFolder};
 use report::{Cell, Column, Figure, Page, Part, State, Table};
-use simulator::{EpochFiles, RunFolder};
 
 use super::answer::{lead, sentences};
 use super::course::{diagram_lines, run_panel};

@@ -7,10 +7,10 @@ use config::FileError;
 use protocol::messages::{End, Verdict};
 use protocol::time::time_s;
 use protocol::{Event, RobotName, Tick};
+use record::EpochFiles;
+use record::{Entry, Record};
 use recording::{Recording, RecordingError};
 use report::{Band, Floor};
-use simulator::EpochFiles;
-use simulator::record::{Entry, Record};
 use timeline::{Kind, Stay};
 
 /// Parts of the floor along its longer side.

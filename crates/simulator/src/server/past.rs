@@ -9,10 +9,10 @@ use config::FileError;
 use lockstep::Attendance;
 use protocol::{Epoch, RobotName, Tick};
 
-use crate::difference::{Difference, between};
-use crate::files::EpochFiles;
-use crate::record::{Entry, Record};
 use crate::simulation::TickRecord;
+use record::EpochFiles;
+use record::difference::{Difference, between};
+use record::{Entry, Record};
 
 /// What is left of the record of a run that is resumed.
 pub struct Past {

@@ -13,11 +13,12 @@ use protocol::messages::{
 };
 use protocol::{Generation, Malformed, RobotName, RunName, Tick, decode, encode};
 
-use crate::difference::Difference;
-use crate::recorder::{Observed, Recorder, RunFolder};
+use crate::recorder::{Observed, Recorder};
 use crate::simulation::{Simulation, TickRecord};
-use crate::summary::{Summary, Wall};
 use config::diagnostic::FileError;
+use record::RunFolder;
+use record::difference::Difference;
+use record::summary::{Summary, Wall};
 use scenario::Scenario;
 
 use super::answer::refuse;

@@ -23,13 +23,13 @@ const MAX_LINE: u64 = 1024 * 1024;
 
 /// Digest of all lines of a file so far.
 #[derive(Clone, Default)]
-pub(crate) struct Seal {
+pub struct Seal {
     hash: Xxh3,
 }
 
 impl Seal {
     /// Adds a line, which has no line break at its end.
-    pub(crate) fn add(&mut self, line: &[u8]) {
+    pub fn add(&mut self, line: &[u8]) {
         self.hash.update(line);
         self.hash.update(b"\n");
     }
@@ -43,7 +43,7 @@ impl Seal {
     }
 
     /// Seals a line, which is a JSON object.
-    pub(crate) fn seal(&self, line: &str) -> String {
+    pub fn seal(&self, line: &str) -> String {
         let body = line.strip_suffix('}').unwrap_or(line);
         format!("{body},\"seal\":\"{}\"}}", self.of(body.as_bytes()))
     }

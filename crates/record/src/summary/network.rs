@@ -7,8 +7,6 @@ use protocol::time::{between_s, time_s};
 use protocol::{Event, RobotName, Tick};
 use serde::{Deserialize, Serialize};
 
-use crate::simulation::Simulation;
-
 /// Metrics of the network of a run.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct NetworkSummary {
@@ -59,8 +57,14 @@ pub struct CutSummary {
 
 impl NetworkSummary {
     /// Counts an event.
-    pub(super) fn count(&mut self, simulation: &Simulation, tick: Tick, event: &Event) {
-        let now_s = simulation.time_s(tick);
+    pub(super) fn count(
+        &mut self,
+        tick_s: f64,
+        unreachable: &BTreeMap<RobotName, Vec<RobotName>>,
+        tick: Tick,
+        event: &Event,
+    ) {
+        let now_s = time_s(tick, tick_s);
 
         match event {
             Event::CommandSent { from, to, .. } => self.link(from, to).sent += 1,
@@ -78,7 +82,7 @@ impl NetworkSummary {
                     cut.until_s = Some(now_s);
                 }
             }
-            Event::Tick { .. } => self.count_staleness(simulation),
+            Event::Tick { .. } => self.count_staleness(tick_s, unreachable),
             _ => {}
         }
     }
@@ -124,10 +128,9 @@ impl NetworkSummary {
     }
 
     /// Counts for each pair of robots the ticks since the last one in which a query was possible.
-    fn count_staleness(&mut self, simulation: &Simulation) {
-        let tick_s = simulation.scenario().tick_s;
+    fn count_staleness(&mut self, tick_s: f64, unreachable: &BTreeMap<RobotName, Vec<RobotName>>) {
         let mut aged = BTreeSet::new();
-        for (asker, targets) in simulation.unreachable() {
+        for (asker, targets) in unreachable {
             for target in targets {
                 let link = self.link(asker, target);
                 link.unreachable_ticks += 1;

@@ -9,7 +9,7 @@ use protocol::messages::{CommandText, Report};
 use protocol::{Event, Line, RobotName, Tick};
 use recording::{Frame, Recording, RecordingError, Ticks};
 
-use crate::files::EpochFiles;
+use crate::folder::EpochFiles;
 use crate::seal::RawLines;
 
 /// The record of an epoch.

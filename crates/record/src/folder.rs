@@ -18,11 +18,23 @@ use scenario::files::{
     SCENARIO, SUMMARY, check_log_name,
 };
 
-use crate::files::EpochFiles;
 use crate::seal;
 
+/// The files of the record of one epoch.
+#[derive(Debug, Clone)]
+pub struct EpochFiles {
+    /// The epoch.
+    pub epoch: Epoch,
+    /// Its scenario, complete.
+    pub scenario: PathBuf,
+    /// Its events.
+    pub events: PathBuf,
+    /// Its recording.
+    pub recording: PathBuf,
+}
+
 /// With this their names end while a run that is resumed is executed again.
-pub(crate) const DRAFT: &str = ".draft";
+pub const DRAFT: &str = ".draft";
 /// With this the name of a file ends while it is written.
 const NEW: &str = ".new";
 /// Files that every epoch has.
@@ -390,7 +402,7 @@ impl RunFolder {
     }
 
     /// Writes [`SCENARIO`], once for each epoch.
-    pub(crate) fn write_scenario(&self, scenario: &Scenario) -> Result<(), FileError> {
+    pub fn write_scenario(&self, scenario: &Scenario) -> Result<(), FileError> {
         self.write(SCENARIO, &scenario.to_toml()?)
     }
 
@@ -515,7 +527,7 @@ impl RunFolder {
     }
 
     /// Renames the files of the epoch before this one, so that their names contain its number.
-    pub(crate) fn supersede(&self, epoch: Epoch) -> Result<(), FileError> {
+    pub fn supersede(&self, epoch: Epoch) -> Result<(), FileError> {
         let before = epoch.saturating_sub(1);
         for name in PER_EPOCH {
             let file = self.file(name);

@@ -8,7 +8,7 @@ use recording::Header;
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::record::Entry;
+use crate::read::Entry;
 use crate::summary::Summary;
 
 /// Fields of a report that count epochs and processes, which the record does not compare.

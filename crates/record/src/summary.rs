@@ -9,13 +9,13 @@ use protocol::event::WaitedFor;
 use protocol::messages::{End, StateVariables, Verdict};
 use protocol::time::time_s;
 use protocol::{Event, RobotName, RunName, Tick};
+use scenario::Scenario;
 use serde::{Deserialize, Serialize};
 use timeline::{Kind, States, Stay};
 
 pub use network::{CutSummary, LinkSummary, NetworkSummary};
 
 use crate::seal;
-use crate::simulation::Simulation;
 
 /// `summary.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -163,19 +163,19 @@ impl Summary {
 
     /// The empty summary of an epoch.
     #[must_use]
-    pub fn begin(run: &RunName, simulation: &Simulation) -> Self {
-        let names = simulation.names().iter().cloned();
+    pub fn begin(run: &RunName, scenario: &Scenario) -> Self {
+        let names = scenario.robots.keys().cloned();
         let robots = names.map(|name| (name, RobotSummary::default()));
 
         Self {
             run: run.clone(),
-            seed: simulation.scenario().seed,
+            seed: scenario.seed,
             version: env!("CARGO_PKG_VERSION").to_owned(),
             end: None,
             waited_for: Vec::new(),
             ticks: 0,
             time_s: 0.0,
-            guests: simulation.scenario().guests.count,
+            guests: scenario.guests.count,
             digest: String::new(),
             robots: robots.collect(),
             network: NetworkSummary::default(),
@@ -187,10 +187,15 @@ impl Summary {
         }
     }
 
-    /// Counts an event of a tick.
-    pub fn count(&mut self, simulation: &Simulation, tick: Tick, event: &Event) {
-        let tick_s = simulation.scenario().tick_s;
-        self.network.count(simulation, tick, event);
+    /// Counts an event of a tick of this duration, in seconds, in which robots could not query these others.
+    pub fn count(
+        &mut self,
+        tick_s: f64,
+        unreachable: &BTreeMap<RobotName, Vec<RobotName>>,
+        tick: Tick,
+        event: &Event,
+    ) {
+        self.network.count(tick_s, unreachable, tick, event);
         for stay in self.states.apply(tick, event) {
             self.add(stay, tick_s);
         }
@@ -269,7 +274,7 @@ impl Summary {
     ///
     /// # Errors
     /// If it cannot be JSON.
-    pub(crate) fn seal(&mut self) -> Result<String, serde_json::Error> {
+    pub fn seal(&mut self) -> Result<String, serde_json::Error> {
         self.wall.seal = None;
         let content = serde_json::to_value(&*self)?;
         self.wall.seal = Some(seal::of_json(&content));
@@ -287,20 +292,23 @@ impl Summary {
         Some(is_right && text.strip_suffix('\n') == Some(laid_out.as_str()))
     }
 
-    /// Completes the summary at the end of the epoch.
-    pub fn finish(&mut self, simulation: &Simulation) {
-        let ticks = simulation.tick();
-        let tick_s = simulation.scenario().tick_s;
+    /// Completes the summary at the end of the epoch, after so many ticks of this duration, in seconds.
+    pub fn finish(
+        &mut self,
+        ticks: Tick,
+        tick_s: f64,
+        digest: String,
+        state_variables: impl Fn(&RobotName) -> Option<StateVariables>,
+    ) {
         self.ticks = ticks;
-        self.time_s = simulation.time_s(ticks);
-        self.digest = simulation.digest();
+        self.time_s = time_s(ticks, tick_s);
+        self.digest = digest;
 
         for stay in std::mem::take(&mut self.states).lasting(ticks) {
             self.add(stay, tick_s);
         }
         for (name, robot) in &mut self.robots {
-            let state_variables = simulation.state_variables(name).cloned();
-            robot.state_variables = state_variables.unwrap_or_default();
+            robot.state_variables = state_variables(name).unwrap_or_default();
         }
 
         let elapsed = self.begun.map(|begun| begun.elapsed());
