@@ -655,7 +655,7 @@ fn copy_folder(from: &Path, to: &Path) {
 
 #[test]
 fn the_compose_files_are_valid() {
-    let file = root().join("docker/compose.yml");
+    let file = root().join("docker-compose.yml");
     let tools: [&[&str]; 3] = [
         &[
             "docker-compose",
@@ -697,7 +697,7 @@ fn the_compose_files_are_valid() {
     }
 
     lacks_tool(
-        "docker/compose.yml",
+        "docker-compose.yml",
         "nothing to check it with (Debian: apt install docker-compose; or pip install check-jsonschema)",
     );
 }
