@@ -9,7 +9,7 @@ const SLEEP: Duration = Duration::from_millis(10);
 /// A thread that sleeps so much longer has found a stall.
 const LEAST: Duration = Duration::from_millis(50);
 
-/// Watches for stalls until it is dropped: times in which a thread of this process was not run.
+/// Monitors for stalls until it is dropped: times in which a thread of this process was not run.
 pub struct Stalls {
     found: Arc<Mutex<Vec<(Instant, Instant)>>>,
     _ends_thread: Sender<()>,

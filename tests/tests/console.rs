@@ -589,7 +589,7 @@ const RATE_WINDOW: Duration = Duration::from_millis(600);
 
 /// The design demands a change of less than 5 %. That cannot be measured on a machine under other load, so the limit of
 /// the test is far below.
-const LEAST_RATIO: f64 = 0.75;
+const MIN_RATIO: f64 = 0.75;
 
 #[test]
 #[ignore = "thorough: with `-- --include-ignored`"]
@@ -613,8 +613,8 @@ fn a_console_hardly_slows_a_run() {
         "a console with a browser and a stalled one: {watched:.3} of the rate without a console"
     );
 
-    assert!(unwatched > LEAST_RATIO, "{unwatched:.3}");
-    assert!(watched > LEAST_RATIO, "{watched:.3}");
+    assert!(unwatched > MIN_RATIO, "{unwatched:.3}");
+    assert!(watched > MIN_RATIO, "{watched:.3}");
 }
 
 /// A program to set as `BROWSER`, which stays until the end of the run.

@@ -24,7 +24,7 @@ use crate::named;
 /// Time for which a hunt draws plans if neither a time nor a number of plans is given, seconds.
 const DEFAULT_S: f64 = 60.0;
 /// Most texts of the commands of a link with one fate that are printed.
-const MOST_TEXTS: usize = 5;
+const MAX_TEXTS: usize = 5;
 /// Set by Ctrl-C: the hunt ends with what it has found.
 static STOP: AtomicBool = AtomicBool::new(false);
 
@@ -273,7 +273,7 @@ fn frequent_texts(coverage: &Coverage) -> BTreeMap<(&Link, &Fate), Vec<&str>> {
     let mut frequent = BTreeMap::new();
     for (message, mut texts) in all {
         texts.sort_by_key(|(plans, _)| std::cmp::Reverse(*plans));
-        texts.truncate(MOST_TEXTS);
+        texts.truncate(MAX_TEXTS);
         frequent.insert(message, texts.into_iter().map(|(_, text)| text).collect());
     }
     frequent

@@ -39,11 +39,69 @@ use std::process::ExitCode;
 use clap::{CommandFactory, Parser, Subcommand};
 use miette::IntoDiagnostic;
 
+/// The help of `cars`, with the subcommands by what they are for.
+const HELP: &str = "\
+{about-with-newline}
+{usage-heading} {usage}
+
+Run:
+  launch       Start the processes of a launch file and run them to the end
+  run          Run a scenario in this process
+  experiment   Play a scenario many times: arms, conditions, seeds; on clusters, too
+  hunt         Draw faults until an expectation fails, and shrink them
+
+Look:
+  report       Write a report about runs or an experiment as one HTML file
+  diagram      Draw who commanded whom, what was lost, what the robots felt
+  replay       Show a recorded run to consoles as if it were in progress
+  log          Show the log of a run, also of one in progress
+  export       Write tables as CSV or Parquet, a log for ShiViz
+  trace        Write where the wall-clock time of a run went
+  emotionml    Write the robots' emotions as EmotionML 1.0
+
+Compare:
+  check        Check files of every kind, and all that a run has left
+  verify       Execute a recorded run again, and compare it tick by tick
+  diff         Compare two recorded runs
+  expect       Judge a recorded run by expectations
+  fork         Execute a recorded run up to a tick, and go on with changes
+
+Control a run in progress:
+  ctl          Start, pause, step, stop, set, cut, crash, and more
+  query        Query a robot
+  command      Send a robot a command
+
+Robots of your own:
+  new          Make a skeleton of a robot
+  exec         Run any program as a robot, over its standard input and output
+  conform      Check a robot against the rules of the protocol
+  init         Write the files that come with the programs, to edit them
+
+Network:
+  net          Faults of real links: cut, delay, bandwidth
+  router       Forward between a simulator and robots on other machines
+  secure       Make certificates and access control for a roster
+
+Other:
+  bench        Measure ticks per second of the lock-step and of the hall
+  completions  Print shell completions
+  man          Write manual pages
+  help         Print the help of a subcommand
+
+Options:
+{options}
+";
+
 /// The Cooperative Affective Robot Simulator.
 ///
 /// `cars launch hors_doeuvres` plays the experiment of the paper as separate processes.
 #[derive(Debug, Parser)]
-#[command(name = "cars", version, propagate_version = true)]
+#[command(
+    name = "cars",
+    version,
+    propagate_version = true,
+    help_template = HELP
+)]
 struct Cli {
     #[command(subcommand)]
     subcommand: Subcommands,
@@ -201,4 +259,23 @@ fn print_completions(shell: clap_complete::Shell) -> miette::Result<ExitCode> {
 
     terminal::data(String::from_utf8_lossy(&script))?;
     Ok(ExitCode::SUCCESS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_help_lists_every_subcommand_once() {
+        let command = Cli::command();
+        let visible = command.get_subcommands().filter(|one| !one.is_hide_set());
+        for subcommand in visible {
+            let name = subcommand.get_name();
+            let lines = HELP
+                .lines()
+                .filter(|line| line.split_whitespace().next() == Some(name));
+            let listed = lines.filter(|line| line.starts_with("  ")).count();
+            assert_eq!(listed, 1, "{name}");
+        }
+    }
 }

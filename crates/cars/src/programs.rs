@@ -1,4 +1,4 @@
-//! The programs beside `cars`. Each is a small one of its own (`door.rs`), which goes on as this one under its name.
+//! The programs beside `cars`. Each is a small one of its own (`exec_as.rs`), which goes on as this one under its name.
 
 use std::path::Path;
 use std::process::ExitCode;

@@ -9,52 +9,52 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// How a language is told to flush. Each is known by a part of the interpreter's name, or by the ending of the file.
-struct Remedy {
+struct Hint {
     interpreters: &'static [&'static str],
     endings: &'static [&'static str],
-    remedy: &'static str,
+    hint: &'static str,
 }
 
-const REMEDIES: [Remedy; 8] = [
-    Remedy {
+const REMEDIES: [Hint; 8] = [
+    Hint {
         interpreters: &["python"],
         endings: &["py"],
-        remedy: "in Python with print(…, flush=True), or sys.stdout.flush() after each line",
+        hint: "in Python with print(…, flush=True), or sys.stdout.flush() after each line",
     },
-    Remedy {
+    Hint {
         interpreters: &["perl"],
         endings: &["pl"],
-        remedy: "in Perl with $| = 1; at its beginning",
+        hint: "in Perl with $| = 1; at its beginning",
     },
-    Remedy {
+    Hint {
         interpreters: &["ruby"],
         endings: &["rb"],
-        remedy: "in Ruby with $stdout.sync = true at its beginning",
+        hint: "in Ruby with $stdout.sync = true at its beginning",
     },
-    Remedy {
+    Hint {
         interpreters: &["lua"],
         endings: &["lua"],
-        remedy: "in Lua with io.stdout:setvbuf(\"line\") at its beginning",
+        hint: "in Lua with io.stdout:setvbuf(\"line\") at its beginning",
     },
-    Remedy {
+    Hint {
         interpreters: &["awk"],
         endings: &["awk"],
-        remedy: "in awk with fflush() after each print",
+        hint: "in awk with fflush() after each print",
     },
-    Remedy {
+    Hint {
         interpreters: &["java"],
         endings: &["jar", "java"],
-        remedy: "in Java with System.out.flush() after each line",
+        hint: "in Java with System.out.flush() after each line",
     },
-    Remedy {
+    Hint {
         interpreters: &["julia"],
         endings: &["jl"],
-        remedy: "in Julia with flush(stdout) after each line",
+        hint: "in Julia with flush(stdout) after each line",
     },
-    Remedy {
+    Hint {
         interpreters: &["bash", "sh", "dash", "zsh"],
         endings: &["sh"],
-        remedy: "in a shell with unbuffered commands in its pipelines: sed -u, grep --line-buffered, stdbuf -oL",
+        hint: "in a shell with unbuffered commands in its pipelines: sed -u, grep --line-buffered, stdbuf -oL",
     },
 ];
 
@@ -64,16 +64,16 @@ const COMPILED: &str = "in C with fflush(stdout) after each line, or setvbuf(std
 /// Longest first line of a script that is looked at, bytes.
 const MAX_FIRST_LINE: u64 = 256;
 
-/// Why nothing arrives from a program, as far as can be known from outside, with the remedy of its language. `command` is
+/// Why nothing arrives from a program, as far as can be known from outside, with the hint of its language. `command` is
 /// the program with its arguments.
 #[must_use]
 pub fn unflushed(command: &[OsString]) -> String {
-    let remedy = remedy(command).unwrap_or(
+    let hint = hint(command).unwrap_or(
         "flush it after each line (C: fflush(stdout); Python: print(…, flush=True); Perl: $| = 1)",
     );
     format!(
         "its program has not flushed its standard output, or has written no whole line to it: what it writes to a pipe is \
-         kept back until a buffer is full, unless it is flushed after each line, {remedy}"
+         kept back until a buffer is full, unless it is flushed after each line, {hint}"
     )
 }
 
@@ -86,7 +86,7 @@ pub(crate) fn program_of(command: &Command) -> Option<Vec<OsString>> {
     Some(arguments.map(OsStr::to_owned).collect())
 }
 
-fn remedy(command: &[OsString]) -> Option<&'static str> {
+fn hint(command: &[OsString]) -> Option<&'static str> {
     let program = PathBuf::from(command.first()?);
     let first_line = first_line(&program).unwrap_or_default();
     if first_line.starts_with(b"\x7fELF") {
@@ -99,27 +99,24 @@ fn remedy(command: &[OsString]) -> Option<&'static str> {
     script.or_else(|| by_ending(program.extension()?.to_str()?))
 }
 
-/// The remedy of an interpreter, from its path or from the first line of a script.
+/// The hint of an interpreter, from its path or from the first line of a script.
 fn by_interpreter(line: &str) -> Option<&'static str> {
     let words = line.split(['/', ' ', '\n']);
     let names: Vec<&str> = words
         .map(|word| word.trim_end_matches(|c: char| c.is_ascii_digit() || c == '.'))
         .collect();
 
-    let found = REMEDIES.iter().find(|remedy| {
-        remedy
-            .interpreters
+    let found = REMEDIES.iter().find(|hint| {
+        hint.interpreters
             .iter()
             .any(|interpreter| names.contains(interpreter))
     });
-    found.map(|remedy| remedy.remedy)
+    found.map(|hint| hint.hint)
 }
 
 fn by_ending(ending: &str) -> Option<&'static str> {
-    let found = REMEDIES
-        .iter()
-        .find(|remedy| remedy.endings.contains(&ending));
-    found.map(|remedy| remedy.remedy)
+    let found = REMEDIES.iter().find(|hint| hint.endings.contains(&ending));
+    found.map(|hint| hint.hint)
 }
 
 /// The first line of a program, which is looked for as the system does.
@@ -153,7 +150,7 @@ mod tests {
     #[test]
     fn the_remedy_is_that_of_the_language() {
         let folder = tempfile::tempdir().unwrap();
-        for (name, first_line, remedy) in [
+        for (name, first_line, hint) in [
             ("robot", "#!/usr/bin/env python3", "flush=True"),
             ("robot.py", "import sys", "flush=True"),
             ("robot.pl", "use strict;", "$| = 1"),
@@ -165,7 +162,7 @@ mod tests {
             let file = folder.path().join(name);
             std::fs::write(&file, format!("{first_line}\n")).unwrap();
             let text = unflushed(&words(&[file.to_str().unwrap()]));
-            assert!(text.contains(remedy), "{name}: {text}");
+            assert!(text.contains(hint), "{name}: {text}");
         }
 
         let text = unflushed(&words(&["no-such-program"]));

@@ -45,7 +45,7 @@ pub(crate) struct Kit {
 /// What the first request to join contained.
 struct Learned {
     request: JoinRequest,
-    cast: BTreeMap<RobotName, Role>,
+    fake_peers: BTreeMap<RobotName, Role>,
 }
 
 /// Attempts to find a free port before giving up.
@@ -88,13 +88,13 @@ impl Kit {
 
     /// The first request to join names the robot.
     pub(crate) fn learn(&self, request: &JoinRequest) -> Result<(), CannotRun> {
-        let cast = self
+        let fake_peers = self
             .setting
             .cast_for(&request.name)
             .map_err(CannotRun::Robot)?;
         let learned = Learned {
             request: request.clone(),
-            cast,
+            fake_peers,
         };
         self.learned
             .set(learned)
@@ -126,7 +126,7 @@ impl Kit {
     /// The robots that the kit plays.
     pub(crate) fn others(&self) -> BTreeMap<RobotName, Role> {
         let learned = self.learned();
-        let mut others = learned.cast.clone();
+        let mut others = learned.fake_peers.clone();
         others.remove(&learned.request.name);
         others
     }
@@ -142,7 +142,7 @@ impl Kit {
     /// Pairs of different commands: first those that the robot understands, as far as is known, then others. A robot that
     /// shows nothing of the one may show something of the other.
     pub(crate) fn pairs(&self) -> Vec<[String; 2]> {
-        let role = self.learned().cast.get(&self.subject());
+        let role = self.learned().fake_peers.get(&self.subject());
         let own = role
             .map(|role| role.understands.clone())
             .unwrap_or_default();
@@ -168,10 +168,10 @@ impl Kit {
     pub(crate) fn template(&self, run: &RunName) -> Welcome {
         let learned = self.learned.get();
         let name = learned.map_or_else(RobotName::operator, |learned| learned.request.name.clone());
-        let cast = learned
-            .map(|learned| learned.cast.clone())
+        let fake_peers = learned
+            .map(|learned| learned.fake_peers.clone())
             .unwrap_or_default();
-        let role = cast.get(&name).cloned().unwrap_or_default();
+        let role = fake_peers.get(&name).cloned().unwrap_or_default();
         let setting = &self.setting;
 
         Welcome {
@@ -188,7 +188,7 @@ impl Kit {
             body_m: setting.body_m,
             sensing_range_m: setting.sensing_range_m,
             location: role.location,
-            roster: cast.into_keys().collect(),
+            roster: fake_peers.into_keys().collect(),
             parameters: role.parameters,
             earlier_parameters: Vec::new(),
             later_parameters: Vec::new(),

@@ -15,11 +15,12 @@
 //! must be the same, which the promise of the project (same seed, same run) makes fair.
 
 mod body;
-mod cast;
 mod checks;
 mod comparison;
+mod fake_peers;
 mod findings;
 mod flushing;
+mod harness;
 mod kit;
 mod load;
 mod patience;
@@ -30,7 +31,6 @@ mod rules;
 mod script;
 mod seen;
 mod setting;
-mod stage;
 mod transcript;
 mod wire;
 

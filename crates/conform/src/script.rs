@@ -5,9 +5,9 @@ use protocol::messages::{Correction, Delivery, News, Performative};
 use protocol::{RobotName, Tick};
 
 use crate::body::{Body, ROUND};
+use crate::harness::{Harness, Options};
 use crate::kit::Kit;
 use crate::report::Failure;
-use crate::stage::{Options, Stage};
 use crate::transcript::{Entry, Transcript};
 
 /// In a round of ticks: the robot senses another one, and it cannot query any other.
@@ -46,17 +46,17 @@ pub(crate) struct Script {
 /// What a check does between the ticks. None of it may make a difference to the robot.
 pub(crate) trait Disturbance {
     /// Before a tick is granted.
-    fn before(&mut self, _stage: &mut Stage<'_>, _tick: Tick) -> Result<(), Failure> {
+    fn before(&mut self, _stage: &mut Harness<'_>, _tick: Tick) -> Result<(), Failure> {
         Ok(())
     }
 
     /// After news and clock of a tick are put.
-    fn during(&mut self, _stage: &mut Stage<'_>, _tick: Tick) -> Result<(), Failure> {
+    fn during(&mut self, _stage: &mut Harness<'_>, _tick: Tick) -> Result<(), Failure> {
         Ok(())
     }
 
     /// After the tick is complete.
-    fn after(&mut self, _stage: &mut Stage<'_>, _entry: &Entry) -> Result<(), Failure> {
+    fn after(&mut self, _stage: &mut Harness<'_>, _entry: &Entry) -> Result<(), Failure> {
         Ok(())
     }
 }
@@ -115,16 +115,16 @@ impl Script {
 }
 
 /// A robot that has joined a run of its own, ready for its first clock.
-pub(crate) fn seated(kit: &Kit, options: Options) -> Result<Stage<'_>, Failure> {
-    let mut stage = Stage::open_run(kit, options)?;
-    stage.join()?;
-    Ok(stage)
+pub(crate) fn with_robot(kit: &Kit, options: Options) -> Result<Harness<'_>, Failure> {
+    let mut harness = Harness::open_run(kit, options)?;
+    harness.join()?;
+    Ok(harness)
 }
 
 /// A process of its own, taken straight through a script.
 pub(crate) fn played(kit: &Kit, script: &Script) -> Result<Transcript, Failure> {
-    let mut stage = seated(kit, Options::default())?;
-    play(&mut stage, script, &mut Straight)
+    let mut harness = with_robot(kit, Options::default())?;
+    play(&mut harness, script, &mut Straight)
 }
 
 /// The usual ticks, as the robot went through them without any disturbance.
@@ -134,15 +134,15 @@ pub(crate) fn usual(kit: &Kit) -> Result<&Transcript, Failure> {
         .ok_or_else(|| Failure::new("the usual ticks are played first", "they were not"))
 }
 
-/// Plays a script to a robot that has joined, from the next tick of its stage on.
+/// Plays a script to a robot that has joined, from the next tick of its harness on.
 pub(crate) fn play(
-    stage: &mut Stage<'_>,
+    harness: &mut Harness<'_>,
     script: &Script,
     disturbance: &mut dyn Disturbance,
 ) -> Result<Transcript, Failure> {
     let mut transcript = Transcript::new();
     for _ in 0..=script.ticks {
-        transcript.push(step(stage, script, disturbance)?);
+        transcript.push(step(harness, script, disturbance)?);
     }
 
     Ok(transcript)
@@ -150,60 +150,60 @@ pub(crate) fn play(
 
 /// Plays the next tick.
 pub(crate) fn step(
-    stage: &mut Stage<'_>,
+    harness: &mut Harness<'_>,
     script: &Script,
     disturbance: &mut dyn Disturbance,
 ) -> Result<Entry, Failure> {
-    let epoch = stage.epoch();
-    let tick = stage.next_tick();
-    let news = news_of(stage, script, tick);
-    disturbance.before(stage, tick)?;
-    stage.open(&news)?;
-    disturbance.during(stage, tick)?;
+    let epoch = harness.epoch();
+    let tick = harness.next_tick();
+    let news = news_of(harness, script, tick);
+    disturbance.before(harness, tick)?;
+    harness.open(&news)?;
+    disturbance.during(harness, tick)?;
 
-    let done = stage.complete()?;
-    stage.body.proposal = done.report.proposal;
+    let done = harness.complete()?;
+    harness.body.proposal = done.report.proposal;
     let entry = Entry {
         epoch,
         tick,
         news,
-        location: stage.body.stands,
+        location: harness.body.stands,
         report: done.report,
         commands: done.commands,
         index: done.index,
         took: done.took,
     };
-    disturbance.after(stage, &entry)?;
+    disturbance.after(harness, &entry)?;
 
     Ok(entry)
 }
 
 /// What is new for the robot in a tick.
-fn news_of(stage: &mut Stage<'_>, script: &Script, tick: Tick) -> News {
-    let epoch = stage.epoch();
+fn news_of(harness: &mut Harness<'_>, script: &Script, tick: Tick) -> News {
+    let epoch = harness.epoch();
     let mut news = News {
         commands: script.deliveries(tick),
         ..News::default()
     };
-    if stage.kit.wants_bodies() {
-        news.bodies = stage.cast.bodies(epoch, tick);
+    if harness.kit.wants_bodies() {
+        news.bodies = harness.fake_peers.bodies(epoch, tick);
     }
 
-    if stage.takes_over() {
-        stage.body = Body::at(stage.template.location);
+    if harness.takes_over() {
+        harness.body = Body::at(harness.template.location);
         news.correction = Some(Correction {
-            location: stage.body.stands,
+            location: harness.body.stands,
             blocked: false,
         });
     } else if tick == 0 {
-        stage.body = Body::at(stage.template.location);
+        harness.body = Body::at(harness.template.location);
     } else {
-        news.correction = stage.body.advance(tick, &stage.template);
+        news.correction = harness.body.advance(tick, &harness.template);
         if tick % ROUND == SENSES {
-            news.sensed = stage.cast.sensed(epoch, tick).into_iter().collect();
+            news.sensed = harness.fake_peers.sensed(epoch, tick).into_iter().collect();
         }
         if tick % ROUND == CUT_OFF {
-            news.unreachable = stage.cast.names().cloned().collect();
+            news.unreachable = harness.fake_peers.names().cloned().collect();
         }
     }
 

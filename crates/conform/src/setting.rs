@@ -21,7 +21,7 @@ pub struct Setting {
     /// Distance within which the robot senses other bodies, meters.
     pub sensing_range_m: f64,
     /// The robots of the roster. Empty: the robot itself, without parameters, and one other.
-    pub cast: BTreeMap<RobotName, Role>,
+    pub fake_peers: BTreeMap<RobotName, Role>,
     /// Texts of commands that the robot understands, if its [`Role::understands`] has none.
     pub commands: Vec<String>,
     /// Ticks of the longer checks.
@@ -59,7 +59,7 @@ impl Default for Setting {
             field_m: [10.0, 10.0],
             body_m: 0.5,
             sensing_range_m: 2.0,
-            cast: BTreeMap::new(),
+            fake_peers: BTreeMap::new(),
             commands: Vec::new(),
             ticks: TICKS,
         }
@@ -75,25 +75,25 @@ impl Setting {
             ));
         }
 
-        if self.cast.is_empty() {
+        if self.fake_peers.is_empty() {
             return Ok(pair(name));
         }
 
-        if !self.cast.contains_key(name) {
-            let roster: Vec<&str> = self.cast.keys().map(RobotName::as_str).collect();
+        if !self.fake_peers.contains_key(name) {
+            let roster: Vec<&str> = self.fake_peers.keys().map(RobotName::as_str).collect();
             return Err(format!(
                 "no robot of the scenario is called {name}; its robots are {}",
                 roster.join(", ")
             ));
         }
 
-        Ok(self.cast.clone())
+        Ok(self.fake_peers.clone())
     }
 }
 
 /// The robot and one other.
 fn pair(name: &RobotName) -> BTreeMap<RobotName, Role> {
-    let mut cast = BTreeMap::new();
+    let mut fake_peers = BTreeMap::new();
     let other = OTHERS
         .iter()
         .filter_map(|other| RobotName::new(other).ok())
@@ -103,13 +103,13 @@ fn pair(name: &RobotName) -> BTreeMap<RobotName, Role> {
             location: BESIDE,
             ..Role::default()
         };
-        cast.insert(other, role);
+        fake_peers.insert(other, role);
     }
 
     let own = Role {
         location: CENTER,
         ..Role::default()
     };
-    cast.insert(name.clone(), own);
-    cast
+    fake_peers.insert(name.clone(), own);
+    fake_peers
 }

@@ -171,7 +171,7 @@ impl Wire {
     }
 }
 
-/// Subscribes to all that the robots of a run put, and receives their requests. A send fails only when the stage is over.
+/// Subscribes to all that the robots of a run put, and receives their requests. A send fails only when the harness is over.
 fn listen(bus: &Bus, keys: &Keys, queue: &SyncSender<Event>) -> Result<Vec<Declared>, BusError> {
     let sender = queue.clone();
     let reports = bus.subscribe_with_qos(&keys.reports(), move |key, bytes, qos| {

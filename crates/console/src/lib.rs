@@ -11,12 +11,12 @@ mod failed;
 mod failing;
 mod feed;
 mod guard;
-mod kept;
 mod live;
 mod opening;
 mod page;
 mod past;
 mod playback;
+mod saved_session;
 mod server;
 
 use std::io::ErrorKind;
@@ -36,9 +36,9 @@ use tokio::signal::unix::{Signal, SignalKind, signal};
 use app::{App, Mode};
 use failing::Next;
 use guard::{AllowedHost, Guard};
-use kept::Kept;
 use live::Live;
 use past::Past;
+use saved_session::SavedSession;
 
 /// The address to serve at without `--bind`.
 const DEFAULT_BIND: &str = "127.0.0.1:7007";
@@ -178,9 +178,9 @@ fn build_runtime() -> Result<Runtime, String> {
 
 /// Serves until the process receives SIGTERM or SIGINT, or until a run that has failed is not looked at any more.
 async fn serve(mode: Mode, past: Option<Past>, how: Serving) -> Result<Next, String> {
-    let kept = how.keep.as_deref().and_then(Kept::read);
+    let kept = how.keep.as_deref().and_then(SavedSession::read);
     if let Some(file) = how.keep.as_deref().filter(|_| kept.is_none()) {
-        Kept::check_replaceable(file)?;
+        SavedSession::check_replaceable(file)?;
     }
     let listener = match &kept {
         Some(kept) => listen_again(kept.address, how.bind).await?,
@@ -196,7 +196,7 @@ async fn serve(mode: Mode, past: Option<Past>, how: Serving) -> Result<Next, Str
     };
     let guard = guard.allowing(how.allowed);
     if let Some(file) = &how.keep
-        && let Err(error) = Kept::of(&guard).write(file)
+        && let Err(error) = SavedSession::of(&guard).write(file)
     {
         tracing::warn!("{}: {error}", file.display());
     }

@@ -9,13 +9,13 @@ use toml::{Table, Value};
 use crate::items::Change;
 
 /// Most letters of a label; the title has everything.
-const MOST_LETTERS: usize = 48;
+const MAX_LETTERS: usize = 48;
 /// Most letters of a value that is shown as it is set.
 const SETTING_LETTERS: usize = 40;
 /// Letters of such a value that are kept at its beginning, so that its end, which differs, is shown.
 const BEGINNING_LETTERS: usize = 14;
 /// Most links that a label names.
-const MOST_LINKS: usize = 2;
+const MAX_LINKS: usize = 2;
 
 /// A link, in the direction of its messages.
 type Link = (String, String);
@@ -34,7 +34,7 @@ pub(crate) fn in_words(changes: &[Change], tick_s: f64) -> String {
     let mut label = String::new();
     for (index, word) in words.into_iter().enumerate() {
         let letters = label.chars().count() + word.chars().count();
-        if index > 0 && letters > MOST_LETTERS {
+        if index > 0 && letters > MAX_LETTERS {
             label += &format!(", +{}", count - index);
             break;
         }
@@ -260,7 +260,7 @@ fn links(verb: &str, links: BTreeSet<Link>) -> Option<String> {
 
     match pairs.len() {
         0 => None,
-        1..=MOST_LINKS => {
+        1..=MAX_LINKS => {
             let pairs = pairs.into_iter();
             let named = pairs.map(|((from, to), arrow)| format!("{from} {arrow} {to}"));
             let named: Vec<String> = named.collect();

@@ -15,7 +15,7 @@ const WAIT_PX: f64 = 12.0;
 /// Distance between two waits at the same time, pixels.
 const NEXT_WAIT_PX: f64 = 5.0;
 /// Most waits beside each other; more are drawn over the last one.
-const MOST_WAITS: usize = 6;
+const MAX_WAITS: usize = 6;
 /// How far the two ends of a doubled command are from where it arrives, pixels.
 const FORK_PX: f64 = 4.0;
 
@@ -279,7 +279,7 @@ fn add_wait(
 fn take_slot(waits: &mut Waits, key: (usize, bool), begin_x: f64, end_x: f64) -> usize {
     let ends = waits.entry(key).or_default();
     let free = ends.iter().position(|end| *end < begin_x);
-    let slot = free.unwrap_or(ends.len()).min(MOST_WAITS - 1);
+    let slot = free.unwrap_or(ends.len()).min(MAX_WAITS - 1);
     if slot == ends.len() {
         ends.push(end_x);
     } else {

@@ -21,13 +21,13 @@ const BOTTOM_PX: f64 = 26.0;
 /// Space between two of a few lanes, pixels.
 const GAP_PX: f64 = 84.0;
 /// Space between two of many lanes, or between two that no message crosses, pixels.
-const LEAST_GAP_PX: f64 = 28.0;
+const MIN_GAP_PX: f64 = 28.0;
 /// All spaces between many lanes together, pixels.
 const GAPS_PX: f64 = 800.0;
 /// Font of the names, pixels.
 const NAME_PX: f64 = 12.0;
 /// Most width of the names, pixels.
-const MOST_NAME_PX: f64 = 150.0;
+const MAX_NAME_PX: f64 = 150.0;
 
 /// A lane.
 #[derive(Debug, Clone)]
@@ -70,7 +70,7 @@ impl Lanes {
             .filter(|is_crossed| **is_crossed)
             .count()
             .max(1) as f64;
-        let gap_px = (GAPS_PX / gaps).clamp(LEAST_GAP_PX, GAP_PX);
+        let gap_px = (GAPS_PX / gaps).clamp(MIN_GAP_PX, GAP_PX);
 
         let mut all = Vec::new();
         let mut names_px: f64 = 46.0;
@@ -88,13 +88,13 @@ impl Lanes {
                 top,
                 bottom,
             });
-            top = bottom + if is_crossed { gap_px } else { LEAST_GAP_PX };
+            top = bottom + if is_crossed { gap_px } else { MIN_GAP_PX };
         }
 
         let last = all.last().map_or(TOP_PX, |lane| lane.bottom);
         Self {
             all,
-            left_px: names_px.min(MOST_NAME_PX) + 26.0,
+            left_px: names_px.min(MAX_NAME_PX) + 26.0,
             bottom: last + BOTTOM_PX,
         }
     }

@@ -187,14 +187,14 @@ fn entries(picture: &Picture, items: &Items, kind: BandKind) -> Vec<Entry> {
 
 /// Draws entries in as many rows as they need; returns the base line of the last one.
 fn draw_entries(picture: &mut Picture, caption: &str, entries: &[Entry], y: f64) -> f64 {
-    const MOST_ENTRIES: usize = 40;
+    const MAX_ENTRIES: usize = 40;
     let left = picture.scale.left_px();
     let right = picture.right_px;
     picture.text("muted", left - CAPTION_PX, y, "end", caption);
 
     let mut x = left;
     let mut y = y;
-    for Entry { class, name } in entries.iter().take(MOST_ENTRIES) {
+    for Entry { class, name } in entries.iter().take(MAX_ENTRIES) {
         let width = 16.0 + width_px(name, LABEL_PX) + 14.0;
         if x + width > right && x > left {
             x = left;

@@ -35,11 +35,11 @@ pub use style::style;
 pub use words::{shortened, width_px};
 
 /// Most things in a diagram: bands, commands, marks. A picture with this many has about 4 MB.
-pub const MOST_ITEMS: usize = 12_000;
+pub const MAX_ITEMS: usize = 12_000;
 
 /// The window has more things than can be drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the window has {items} bands, commands and marks, and a diagram has at most {MOST_ITEMS}")]
+#[error("the window has {items} bands, commands and marks, and a diagram has at most {MAX_ITEMS}")]
 pub struct TooMuch {
     /// Number of things in the window.
     pub items: usize,
@@ -55,7 +55,7 @@ pub struct Diagram {
     to: Tick,
     options: Options,
     items: Items,
-    /// Number of things beyond [`MOST_ITEMS`], which are not kept.
+    /// Number of things beyond [`MAX_ITEMS`], which are not kept.
     beyond: usize,
     /// Whether the run ended with the last tick of the window.
     has_end: bool,
@@ -96,7 +96,7 @@ impl Diagram {
             });
         }
 
-        if self.items.count() <= MOST_ITEMS {
+        if self.items.count() <= MAX_ITEMS {
             self.items.append(items);
         } else {
             self.beyond += items.count();
@@ -106,12 +106,12 @@ impl Diagram {
     /// The picture.
     ///
     /// # Errors
-    /// [`TooMuch`] if the window has more than [`MOST_ITEMS`] things.
+    /// [`TooMuch`] if the window has more than [`MAX_ITEMS`] things.
     pub fn to_svg(&self) -> Result<String, TooMuch> {
         let mut items = self.items.clone();
         self.state.add_unfinished(&mut items);
         let count = items.count() + self.beyond;
-        if count > MOST_ITEMS {
+        if count > MAX_ITEMS {
             return Err(TooMuch { items: count });
         }
 

@@ -5,7 +5,7 @@
     reason = "a test that cannot set up its subject fails"
 )]
 
-use diagram::{Diagram, MOST_ITEMS, Options, State, TooMuch, width_px};
+use diagram::{Diagram, MAX_ITEMS, Options, State, TooMuch, width_px};
 use protocol::event::Cause;
 use protocol::messages::{Awaited, FaultKind, Performative, Point, Reason};
 use protocol::{Event, RobotName, Tick};
@@ -790,7 +790,7 @@ fn a_window_with_too_much_is_refused() {
     let refused = drawn.err().unwrap();
     // A band for every third tick, a command for each, the last bands, and the begin of a run.
     assert_eq!(refused.items, 11_999 + 3_999 + 4);
-    assert!(refused.items > MOST_ITEMS);
+    assert!(refused.items > MAX_ITEMS);
     assert!(
         refused.to_string().ends_with("a diagram has at most 12000"),
         "{refused}"

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use config::FileError;
 use miette::miette;
-use observe::{Expectation, Observation, Watches};
+use observe::{Expectation, Monitors, Observation};
 use protocol::messages::End;
 use protocol::{Event, Tick};
 use record::EpochFiles;
@@ -38,7 +38,7 @@ pub fn judge(
     let mut record = Record::of_events(&files.events)?;
     let mut recorded = States::open(files, expectations)?;
     let roster = scenario.roster();
-    let mut watches = Watches::new(expectations, scenario.tick_s, scenario.body_m, &roster);
+    let mut watches = Monitors::new(expectations, scenario.tick_s, scenario.body_m, &roster);
     let mut verdicts = Verdicts::default();
 
     while let Some(entry) = record.next_entry()? {
@@ -62,7 +62,7 @@ pub fn judge(
 }
 
 fn observe(
-    watches: &mut Watches,
+    watches: &mut Monitors,
     entry: &Entry,
     recorded: Option<&States>,
     tick_s: f64,

@@ -203,7 +203,7 @@ impl Reexecution {
     fn play_from_record(&mut self, name: &RobotName, tick: Tick) {
         if self.scripted.insert(name.clone()) {
             self.from_record.entry(name.clone()).or_insert(tick);
-            self.local.robots.reseat(name, self.script.robot());
+            self.local.robots.replace_runner(name, self.script.robot());
         }
     }
 

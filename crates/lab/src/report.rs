@@ -14,4 +14,4 @@ mod transitions;
 mod words;
 
 pub use experiment::{of_experiment, page_of_experiment};
-pub use runs::{MOST_RUNS, of_runs, page_of_runs};
+pub use runs::{MAX_RUNS, of_runs, page_of_runs};

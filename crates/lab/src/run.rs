@@ -209,7 +209,9 @@ impl Local {
         run: &RunName,
         robots: BTreeMap<RobotName, Box<dyn Robot>>,
     ) -> miette::Result<Self> {
-        Self::seated(scenario, epoch, |simulation| seats(simulation, run, robots))
+        Self::with_runners(scenario, epoch, |simulation| {
+            runners(simulation, run, robots)
+        })
     }
 
     /// The same for an epoch that was recorded: the robots of then had no objection to what the scenario planned.
@@ -222,25 +224,25 @@ impl Local {
         run: &RunName,
         robots: BTreeMap<RobotName, Box<dyn Robot>>,
     ) -> miette::Result<Self> {
-        Self::seated(scenario, epoch, |simulation| {
-            let mut seats = seats(simulation, run, robots);
-            for (_, welcome) in &mut seats {
+        Self::with_runners(scenario, epoch, |simulation| {
+            let mut runners = runners(simulation, run, robots);
+            for (_, welcome) in &mut runners {
                 welcome.later_parameters.clear();
             }
-            seats
+            runners
         })
     }
 
-    fn seated(
+    fn with_runners(
         scenario: Scenario,
         epoch: Epoch,
-        seats: impl FnOnce(&mut Simulation) -> Vec<(Box<dyn Robot>, Welcome)>,
+        runners: impl FnOnce(&mut Simulation) -> Vec<(Box<dyn Robot>, Welcome)>,
     ) -> miette::Result<Self> {
         let mut simulation = Simulation::new(scenario, epoch).into_diagnostic()?;
-        let seats = seats(&mut simulation);
+        let runners = runners(&mut simulation);
         Ok(Self {
             simulation,
-            robots: LocalHost::new(seats),
+            robots: LocalHost::new(runners),
         })
     }
 
@@ -300,19 +302,19 @@ impl Local {
 }
 
 /// The robots with their welcomes.
-fn seats(
+fn runners(
     simulation: &mut Simulation,
     run: &RunName,
     robots: BTreeMap<RobotName, Box<dyn Robot>>,
 ) -> Vec<(Box<dyn Robot>, Welcome)> {
-    let mut seats = Vec::new();
+    let mut runners = Vec::new();
     for (name, robot) in robots {
         simulation.list_bodies(&name, robot.senses_bodies());
         if let Some(welcome) = simulation.welcome(run, &name, 1, None) {
-            seats.push((robot, welcome));
+            runners.push((robot, welcome));
         }
     }
-    seats
+    runners
 }
 
 /// Checks the parameters that robots get after a tick, as far as their classes are of this process and can check them.

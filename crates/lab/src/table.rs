@@ -10,7 +10,7 @@ use record::summary::{Judged, RobotSummary};
 /// Width of a full bar, characters.
 const BAR: usize = 10;
 /// Most texts of commands that are shown of a robot.
-const MOST_TEXTS: usize = 5;
+const MAX_TEXTS: usize = 5;
 /// The time in which a robot takes no part.
 const ABSENT: &str = "(takes no part)";
 /// Times that differ by less are equal, seconds.
@@ -145,7 +145,7 @@ fn bar(share: f64) -> String {
 fn commands(robot: &RobotSummary) -> String {
     let mut sent: Vec<(&String, &u64)> = robot.sent.iter().collect();
     sent.sort_by(|one, other| other.1.cmp(one.1));
-    let (shown, others) = sent.split_at(sent.len().min(MOST_TEXTS));
+    let (shown, others) = sent.split_at(sent.len().min(MAX_TEXTS));
 
     let mut lines = Vec::new();
     for (command, count) in shown {

@@ -7,7 +7,7 @@ use std::time::Duration;
 use protocol::messages::{Clock, End, FaultKind, NEWS_FLAGS, OnLate, Presence, Reason};
 use protocol::{Epoch, Generation, RobotName, Tick};
 
-use crate::exchange::{Membership, Naming, Outcome, Sent};
+use crate::exchange::{IncarnationNotice, Membership, Outcome, Sent};
 use crate::member::{Admission, Attendance, Lateness, Member, Turn};
 use crate::rules::{Rule, Rules};
 
@@ -53,7 +53,7 @@ pub enum Output<R, C> {
     /// Put these news, each to its robot with the incarnations that it names, then the clock.
     Grant {
         /// Robots that get news, in the order of their names.
-        news: Vec<(RobotName, Naming)>,
+        news: Vec<(RobotName, IncarnationNotice)>,
         /// The clock.
         clock: Clock,
     },
@@ -194,6 +194,8 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         self.news.clear();
         self.membership.clear();
         self.attendance = None;
+        // Only what belongs to the epoch that is over is forgotten. Who is connected, and as which incarnation, stays: a robot keeps
+        // its process and its token from epoch to epoch.
         for member in self.members.values_mut() {
             member.turn = Turn::default();
             member.fault = None;
@@ -201,7 +203,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         }
 
         out.push(Output::SetTimer(Timer::Announce, self.timing.announce));
-        self.look_whether_gathered(out);
+        self.check_all_joined(out);
     }
 
     /// Says who takes part in the tick that is opened next, because it is executed again. `None` if that is open, as usual.
@@ -247,7 +249,9 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
             }
         }
 
-        self.give_up_those_that_are_out();
+        self.exclude_unavailable();
+        // Robots that cannot report are excluded before the clock goes out, so that it does not wait for them even once. The tick may
+        // be complete at once, without any report: where all robots are lost.
         self.grant(true, out);
         self.set_timers(out);
         self.settle(out);
@@ -289,6 +293,8 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
             member.must_rejoin = false;
         }
         if is_new {
+            // What the predecessor has sent for the open tick counts only if all of it is here: its successor cannot complete it, and
+            // messages of the old generation are stale from now on.
             member.instance = Some(Arc::from(instance));
             member.is_reserved = self.rules.hold(Rule::ReservesPlace);
             if self.rules.hold(Rule::DropsPredecessor) && !member.turn.is_complete(true) {
@@ -341,7 +347,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
             self.settle(out);
         }
         if self.phase == Phase::Gathering {
-            self.look_whether_gathered(out);
+            self.check_all_joined(out);
         }
         if self.is_announced {
             out.push(Output::Held);
@@ -372,7 +378,8 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
             return;
         }
 
-        // The first one counts; a repetition has the same content.
+        // The first one counts; a repetition has the same content. So repeating is idempotent, and a message that was delivered twice
+        // or overtaken by its repetition changes nothing.
         member.turn.commands.entry(number).or_insert(command);
         if member.turn.report.is_some() {
             self.settle(out);
@@ -406,6 +413,8 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
             return;
         }
 
+        // The report states how many commands belong to it. It completes the turn only when they are all here, in whatever order: on
+        // one session they arrive before it, but any of them may have been lost and be repeated later.
         member.turn.waits_for = None;
         member.turn.report.get_or_insert((commands, report));
         let counts = self.rules.hold(Rule::CountsCommands);
@@ -625,7 +634,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
             .push(Membership::Joined(name.clone(), generation));
     }
 
-    fn look_whether_gathered(&mut self, out: &mut Vec<Output<R, C>>) {
+    fn check_all_joined(&mut self, out: &mut Vec<Output<R, C>>) {
         if self.members.values().all(Member::is_ready) {
             self.phase = Phase::Gathered;
             if std::mem::take(&mut self.is_announced) {
@@ -671,21 +680,23 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
     fn grant(&mut self, has_news: bool, out: &mut Vec<Output<R, C>>) {
         let mut named = BTreeMap::new();
         for (name, member) in &self.members {
-            let naming = self.naming(member);
-            if naming != Naming::default() {
-                named.insert(name.clone(), naming);
+            let notice = self.notice(member);
+            if notice != IncarnationNotice::default() {
+                named.insert(name.clone(), notice);
             }
         }
 
         // A robot does not run a tick whose clock says that it has news, and they do not come.
         let mut withheld = BTreeSet::new();
         for name in self.attendance.iter().flat_map(|recorded| &recorded.absent) {
-            let naming = named.get(name).copied().unwrap_or_default();
-            if naming.rejoin.is_none() {
+            let notice = named.get(name).copied().unwrap_or_default();
+            if notice.rejoin.is_none() {
                 withheld.insert(name.clone());
             }
         }
 
+        // A flag may belong to several robots. All of them get news then, so that each one that finds its flag set waits for something
+        // that comes.
         let mut flags = 0;
         for (index, name) in self.members.keys().enumerate() {
             let has_own = self.news.contains(name) || named.contains_key(name);
@@ -717,7 +728,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
     }
 
     /// The incarnations that a robot's news name.
-    fn naming(&self, member: &Member<R, C>) -> Naming {
+    fn notice(&self, member: &Member<R, C>) -> IncarnationNotice {
         let is_replacement = member.seated > 1 && self.rules.hold(Rule::NamesReplacement);
         let is_newcomer = self.tick > 0
             && !member.has_reported
@@ -725,7 +736,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
             && self.rules.hold(Rule::NamesUntilReported);
         let asked = member.asked_to_rejoin();
 
-        Naming {
+        IncarnationNotice {
             joined: (is_replacement || is_newcomer).then_some(member.seated),
             rejoin: asked.filter(|_| self.rules.hold(Rule::AsksToRejoin)),
         }
@@ -745,7 +756,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
 
     /// Where the clock goes on without late robots, it does not wait for those that cannot report. It never waits for a report
     /// that would not count. Where the tick is executed again, its record says which robots those are.
-    fn give_up_those_that_are_out(&mut self) {
+    fn exclude_unavailable(&mut self) {
         let goes_on = self.rules.hold(Rule::GoesOnWithoutAbsent);
         let mut out = Vec::new();
         for (name, member) in &self.members {
@@ -814,6 +825,8 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
             return;
         }
 
+        // From here on nothing that arrives can change the tick: `is_open_for` asks for the phase, so reports and tokens that come
+        // between two ticks are for the next one, or stale.
         self.phase = Phase::Between;
         if self.is_announced {
             self.is_announced = false;
@@ -833,6 +846,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
 
             member.missed = 0;
             member.has_reported = true;
+            // A predecessor may have sent more commands than the report that counts states.
             let mut commands = turn.commands;
             commands.retain(|number, _| *number <= stated);
             reports.insert(name.clone(), (report, commands.into_values().collect()));

@@ -6,7 +6,7 @@ use protocol::RobotName;
 use protocol::messages::{Command, CommandText, News, Refusal, Report, Welcome};
 
 use crate::barrier::{Refused, Stamp};
-use crate::exchange::Naming;
+use crate::exchange::IncarnationNotice;
 use crate::exchange::Sent;
 use crate::member::Admission;
 use crate::participant::Answer;
@@ -52,7 +52,7 @@ impl From<&Welcome> for Admission {
     }
 }
 
-impl From<&News> for Naming {
+impl From<&News> for IncarnationNotice {
     fn from(news: &News) -> Self {
         Self {
             joined: news.joined,

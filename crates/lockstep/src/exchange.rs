@@ -24,7 +24,7 @@ pub trait Exchange<N, R, C> {
 
 /// The incarnations that a robot's news name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub struct Naming {
+pub struct IncarnationNotice {
     /// The incarnation that takes part from this tick on.
     pub joined: Option<Generation>,
     /// The incarnation that takes part no more, and whose process is to join again.
@@ -37,7 +37,7 @@ pub trait Bulletin<N> {
     fn robots(&self) -> BTreeSet<RobotName>;
 
     /// The news of a robot, with the incarnations that they name.
-    fn compose(&self, robot: &RobotName, naming: Naming) -> N;
+    fn compose(&self, robot: &RobotName, notice: IncarnationNotice) -> N;
 }
 
 impl<N: Clone + Default> Bulletin<N> for BTreeMap<RobotName, N> {
@@ -45,7 +45,7 @@ impl<N: Clone + Default> Bulletin<N> for BTreeMap<RobotName, N> {
         self.keys().cloned().collect()
     }
 
-    fn compose(&self, robot: &RobotName, _: Naming) -> N {
+    fn compose(&self, robot: &RobotName, _: IncarnationNotice) -> N {
         self.get(robot).cloned().unwrap_or_default()
     }
 }

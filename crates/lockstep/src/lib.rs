@@ -21,7 +21,7 @@ mod states;
 mod tests;
 
 pub use barrier::{Barrier, Ignored, Output, Refused, Stamp, Timer, Timing};
-pub use exchange::{Bulletin, Exchange, Membership, Naming, Outcome, Sent};
+pub use exchange::{Bulletin, Exchange, IncarnationNotice, Membership, Outcome, Sent};
 pub use member::{Admission, Attendance, Lateness};
-pub use participant::{Action, Answer, Begin, Leave, Participant, Patience, RobotTimer, Turn};
+pub use participant::{Action, Answer, Begin, Leave, Participant, RobotTimer, Timeouts, Turn};
 pub use states::{NoState, StateQuery, States};

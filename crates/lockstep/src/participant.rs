@@ -6,7 +6,7 @@ use std::time::Duration;
 use protocol::messages::{Clock, End, Refusal};
 use protocol::{Epoch, Generation, RobotName, Tick};
 
-use crate::exchange::Naming;
+use crate::exchange::IncarnationNotice;
 use crate::exchange::Sent;
 use crate::member::Admission;
 use crate::rules::{Rule, Rules};
@@ -14,7 +14,7 @@ use crate::states::{NoState, StateQuery, States};
 
 /// How long a participant waits for what.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Patience {
+pub struct Timeouts {
     /// How long to try to be admitted.
     pub join: Duration,
     /// How long to wait for a simulator that is gone: it has ended, or the link to it is down, which look the same from here.
@@ -172,7 +172,7 @@ struct Arrived<N> {
 /// A robot's side of the lock-step. `N` is the content of its news, `S` of a state, `C` of a command, `R` of a report.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Participant<N, S, C, R> {
-    patience: Patience,
+    timeouts: Timeouts,
     standing: Standing,
     admission: Option<Admission>,
     /// Whether the last answer to its request was that the name is taken.
@@ -208,21 +208,21 @@ type Out<N, S, C, R> = Vec<Action<N, S, C, R>>;
 impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
     /// A robot that asks to join.
     #[must_use]
-    pub fn new(patience: Patience, out: &mut Out<N, S, C, R>) -> Self {
-        Self::with_rules(patience, Rules::default(), out)
+    pub fn new(timeouts: Timeouts, out: &mut Out<N, S, C, R>) -> Self {
+        Self::with_rules(timeouts, Rules::default(), out)
     }
 
-    pub(crate) fn with_rules(patience: Patience, rules: Rules, out: &mut Out<N, S, C, R>) -> Self {
+    pub(crate) fn with_rules(timeouts: Timeouts, rules: Rules, out: &mut Out<N, S, C, R>) -> Self {
         // A token that is declared before the welcome would keep the robot's own request from being admitted.
         let has_token = !rules.hold(Rule::TokenAfterWelcome);
         if has_token {
             out.push(Action::DeclareToken);
         }
-        out.push(Action::SetTimer(RobotTimer::JoinPatience, patience.join));
+        out.push(Action::SetTimer(RobotTimer::JoinPatience, timeouts.join));
         out.push(Action::Join);
 
         Self {
-            patience,
+            timeouts,
             standing: Standing::Joining,
             admission: None,
             is_name_taken: false,
@@ -336,6 +336,8 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         if self.running == Some(at) {
             return; // It is being answered.
         }
+        // A clock that was answered comes again because something of the answer was lost. The whole answer is put again, from memory:
+        // the robot must not run a tick twice, since its random numbers and its state have moved on.
         if let Some(answer) = &self.answer
             && at <= (answer.epoch, answer.tick)
             && self.rules.hold(Rule::AnswersOnce)
@@ -360,7 +362,7 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         &mut self,
         epoch: Epoch,
         tick: Tick,
-        naming: Naming,
+        notice: IncarnationNotice,
         news: N,
         out: &mut Out<N, S, C, R>,
     ) {
@@ -370,7 +372,7 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         if self.standing == Standing::Left || epoch < admission.epoch {
             return;
         }
-        let Naming { joined, rejoin } = naming;
+        let IncarnationNotice { joined, rejoin } = notice;
         // While it joins again, a higher generation may become its own.
         let is_joining = self.standing == Standing::Joining && self.rules.hold(Rule::AwaitsWelcome);
         let is_replaced =
@@ -417,6 +419,7 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
             return;
         }
 
+        // The state can be queried before the report is put: a robot that runs the next tick already may ask for it.
         self.states.add(epoch, tick, state.clone());
         self.answer = Some(Box::new(Answer {
             epoch,
@@ -426,6 +429,7 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
             state,
             report,
         }));
+        // While it joins again, nobody knows whether the answer is still of its epoch and incarnation: the welcome decides.
         self.is_held_back = self.standing == Standing::Joining;
         if !self.is_held_back {
             self.put(out);
@@ -502,7 +506,7 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
     pub fn simulator(&mut self, is_present: bool, out: &mut Out<N, S, C, R>) {
         let was_gone = std::mem::replace(&mut self.is_simulator_gone, !is_present);
         if !is_present && !was_gone {
-            out.push(Action::SetTimer(RobotTimer::Gone, self.patience.gone));
+            out.push(Action::SetTimer(RobotTimer::Gone, self.timeouts.gone));
         }
     }
 
@@ -590,6 +594,8 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
     /// Forgets what it was.
     fn start_over(&mut self) {
         self.is_seated = false;
+        // The robot cannot be interrupted in the middle of a tick: what comes of it is discarded by `done`, and until then no other
+        // tick begins.
         self.is_discarding |= self.running.take().is_some();
         self.asking = None;
         self.answer = None;
@@ -618,6 +624,7 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
             return; // They were lost: both are repeated.
         }
 
+        // The clock is taken before anything else: a repetition that arrives from now on finds the tick running, and not pending.
         self.pending = None;
         let arrived = if self.rules.hold(Rule::MatchesNews) {
             self.news.remove(&at)

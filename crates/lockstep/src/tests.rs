@@ -8,9 +8,9 @@ use protocol::messages::{Clock, FaultKind, OnLate, Refusal};
 
 use crate::states::States;
 use crate::{
-    Action, Admission, Attendance, Barrier, Begin, Ignored, Lateness, Leave, Membership, Naming,
-    NoState, Outcome, Output, Participant, Patience, Refused, RobotTimer, Sent, Stamp, StateQuery,
-    Timer, Timing, Turn,
+    Action, Admission, Attendance, Barrier, Begin, Ignored, IncarnationNotice, Lateness, Leave,
+    Membership, NoState, Outcome, Output, Participant, Refused, RobotTimer, Sent, Stamp,
+    StateQuery, Timeouts, Timer, Timing, Turn,
 };
 
 type Simulator = Barrier<&'static str, &'static str>;
@@ -321,11 +321,11 @@ const ADMISSION: Admission = Admission {
 };
 
 fn robot() -> Robot {
-    let patience = Patience {
+    let timeouts = Timeouts {
         join: Duration::from_secs(1),
         gone: Duration::from_secs(1),
     };
-    Robot::new(patience, &mut Vec::new())
+    Robot::new(timeouts, &mut Vec::new())
 }
 
 fn clock(epoch: u32, tick: u64) -> Clock {
@@ -434,8 +434,8 @@ fn run(epoch: u32, tick: u64, begin: Begin) -> Action<(), &'static str, (), ()> 
     })
 }
 
-fn joined(generation: u32) -> Naming {
-    Naming {
+fn joined(generation: u32) -> IncarnationNotice {
+    IncarnationNotice {
         joined: Some(generation),
         rejoin: None,
     }
@@ -448,13 +448,13 @@ fn a_clock_of_an_epoch_that_has_not_begun_costs_a_welcome_and_nothing_else() {
 
     for tick in 0..8 {
         robot.clock(clock(9, tick), &mut out);
-        robot.news(9, tick, Naming::default(), (), &mut out);
+        robot.news(9, tick, IncarnationNotice::default(), (), &mut out);
     }
     assert_eq!(out, [Action::Join]);
     assert!(!robot.is_interrupted(), "its tick may count");
     out.clear();
     robot.done(Vec::new(), "of tick 1", (), &mut out);
-    robot.news(1, 2, Naming::default(), (), &mut out);
+    robot.news(1, 2, IncarnationNotice::default(), (), &mut out);
     let flagged = Clock {
         news: ADMISSION.news_flag,
         ..clock(1, 2)
@@ -479,7 +479,7 @@ fn a_clock_of_an_epoch_that_has_not_begun_costs_a_welcome_and_nothing_else() {
 fn a_robot_that_joins_again_forgets_the_tick_that_it_runs() {
     let mut robot = running();
     let mut out = Vec::new();
-    let asked = Naming {
+    let asked = IncarnationNotice {
         joined: None,
         rejoin: Some(1),
     };
@@ -538,7 +538,7 @@ fn a_robot_that_is_cut_off_where_an_epoch_begins_returns_as_a_further_incarnatio
     barrier.report(&name("A"), stamp, 0, "report", &mut out);
     complete(&mut barrier, 1);
     barrier.token(&name("B"), true, &mut out);
-    let asked = Naming {
+    let asked = IncarnationNotice {
         joined: None,
         rejoin: Some(1),
     };
@@ -579,7 +579,7 @@ fn a_robot_that_is_cut_off_where_an_epoch_begins_returns_as_a_further_incarnatio
 }
 
 /// The news and the clock's flags of the tick that was granted.
-fn granted(out: &Outputs) -> (Vec<(RobotName, Naming)>, u32) {
+fn granted(out: &Outputs) -> (Vec<(RobotName, IncarnationNotice)>, u32) {
     let granted = out.iter().find_map(|output| match output {
         Output::Grant { news, clock } => Some((news.clone(), clock.news)),
         _ => None,

@@ -8,4 +8,4 @@ pub use condition::{Condition, ConditionError};
 pub use rule::{
     ExpectError, Expectation, MAX_EXPECTATIONS, MAX_NAME_CHARS, Rule, WrongEntry, check_all,
 };
-pub use watch::{Judgment, Watch, Watches};
+pub use watch::{Judgment, Monitors, Watch};

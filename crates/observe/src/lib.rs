@@ -9,7 +9,7 @@ pub mod words;
 use protocol::messages::{Point, StateVariables};
 use protocol::{Event, RobotName, Tick};
 
-pub use expect::{Expectation, Judgment, Watch, Watches};
+pub use expect::{Expectation, Judgment, Monitors, Watch};
 pub use measure::{Kind, Measure, MeasureError, Measured};
 pub use pattern::{Pattern, PatternError};
 pub use probe::Probe;

@@ -8,7 +8,7 @@
 use std::collections::BTreeMap;
 
 use observe::expect::{MAX_EXPECTATIONS, check_all};
-use observe::{Expectation, Judgment, Observation, RobotState, Watch, Watches};
+use observe::{Expectation, Judgment, Monitors, Observation, RobotState, Watch};
 use protocol::messages::{End, Point, StateVariables, Verdict};
 use protocol::{Event, RobotName, Tick};
 use serde::{Deserialize, Serialize};
@@ -396,7 +396,7 @@ fn each_expectation_is_judged_once() {
             ..read("eventually = { event = 'lost' }\nwithin = '60 s'").unwrap()
         },
     ];
-    let mut watches = Watches::new(&expectations, TICK_S, BODY_M, &roster());
+    let mut watches = Monitors::new(&expectations, TICK_S, BODY_M, &roster());
     let mut judged = Vec::new();
     for tick in 0..3 {
         let events = [say("")];

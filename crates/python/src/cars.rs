@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::error::{Interrupted, TooEarly, UnknownRobot, Unreachable};
-use crate::lent::with_cars;
+use crate::scoped_borrow::with_cars;
 use crate::stream::Stream;
 use crate::values::{
     command, point, read_point, sensed_body, sensed_robot, state, tuple, variables,

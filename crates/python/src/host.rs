@@ -10,7 +10,7 @@ use robot::{End, Host, HostError as RobotHostError, Robot, RobotArgs, RobotName}
 
 use crate::error::HostError;
 use crate::interrupt::interruptible;
-use crate::seat::{Failure, PythonRobot};
+use crate::runner::{Failure, PythonRobot};
 
 type Robots = Vec<(RobotName, Box<dyn Robot>)>;
 
@@ -64,13 +64,13 @@ pub(crate) fn take_part(
         .map_err(|error| PyValueError::new_err(error.to_string()))?;
 
     let failure = Failure::default();
-    let mut seated: Robots = Vec::new();
+    let mut robots_to_play: Robots = Vec::new();
     for (name, object) in robots {
         let name = RobotName::new(&name).map_err(crate::error::plain)?;
-        seated.push((name, Box::new(PythonRobot::new(&object, &failure)?)));
+        robots_to_play.push((name, Box::new(PythonRobot::new(&object, &failure)?)));
     }
 
-    play(py, seated, &args, &failure)
+    play(py, robots_to_play, &args, &failure)
 }
 
 fn play(

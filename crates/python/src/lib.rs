@@ -6,11 +6,11 @@ mod error;
 mod experiment;
 mod host;
 mod interrupt;
-mod lent;
 mod make;
 mod pictures;
 mod run;
-mod seat;
+mod runner;
+mod scoped_borrow;
 mod stream;
 mod values;
 

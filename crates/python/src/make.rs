@@ -7,7 +7,7 @@ use robot::{Robot, RobotName};
 use scenario::Scenario;
 
 use crate::error::UnknownRobot;
-use crate::seat::{Failure, PythonRobot};
+use crate::runner::{Failure, PythonRobot};
 
 /// What makes robots of Python, by their names: classes, or functions without arguments.
 pub(crate) struct Makers {

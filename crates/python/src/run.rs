@@ -20,7 +20,7 @@ use scenario::Scenario;
 use crate::error::{argument, plain, read, reported};
 use crate::interrupt::Watch;
 use crate::make::Makers;
-use crate::seat::Failure;
+use crate::runner::Failure;
 
 /// Changes of a scenario, each as after `--set`.
 pub(crate) fn overrides(set: &[String]) -> PyResult<Vec<Override>> {

@@ -4,7 +4,7 @@ use protocol::random::unit;
 use pyo3::prelude::*;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
-use crate::lent::with_cars;
+use crate::scoped_borrow::with_cars;
 
 /// A generator of random numbers, xoshiro256++.
 #[pyclass(module = "cars")]

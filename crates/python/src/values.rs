@@ -112,7 +112,7 @@ fn read_variable(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Variable> {
 
     match value.extract() {
         Ok(number) => Ok(Variable::Number(number)),
-        // Not finite, which the seat leaves out and logs.
+        // Not finite, which the runner leaves out and logs.
         Err(error) if error.is_instance_of::<PyOverflowError>(value.py()) => {
             Ok(Variable::Number(f64::INFINITY))
         }

@@ -13,7 +13,7 @@ use crate::scale::Scale;
 /// Height of a row of a few, pixels.
 const ROW_PX: f64 = 20.0;
 /// Height of a row of many, pixels.
-const LEAST_ROW_PX: f64 = 8.0;
+const MIN_ROW_PX: f64 = 8.0;
 /// Rows that are higher than this have names in their bands.
 const NAMED_PX: f64 = 14.0;
 /// Height of all rows together above which rows are lower, pixels.
@@ -21,7 +21,7 @@ const ROWS_PX: f64 = 560.0;
 /// Bands that are not at least this wide are drawn as the state that lasted longest in a column of this width, pixels.
 const COLUMN_PX: f64 = 1.0;
 /// Most bands of a row that are drawn one by one.
-const MOST_BANDS: usize = 600;
+const MAX_BANDS: usize = 600;
 /// Most letters of a name.
 const NAME_LETTERS: usize = 24;
 
@@ -83,7 +83,7 @@ impl Bands {
     #[must_use]
     pub fn draw(&self) -> String {
         let count = self.rows.len().max(1) as f64;
-        let row_px = (ROWS_PX / count).clamp(LEAST_ROW_PX, ROW_PX);
+        let row_px = (ROWS_PX / count).clamp(MIN_ROW_PX, ROW_PX);
         let left = self.labels_px();
         let top = 4.0;
         let bottom = top + row_px * count;
@@ -137,7 +137,7 @@ impl Bands {
         let class = if height < LABEL_PX { "small" } else { "" };
         chart.text(class, scale.from_px - 8.0, baseline, "end", &label);
 
-        let is_drawn_one_by_one = row.bands.len() <= MOST_BANDS;
+        let is_drawn_one_by_one = row.bands.len() <= MAX_BANDS;
         let bands = if is_drawn_one_by_one {
             row.bands.clone()
         } else {

@@ -10,7 +10,7 @@ use crate::palette::{HEAT_SHADES, level};
 use crate::scale::Scale;
 
 /// Most height of the floor, pixels.
-const MOST_PX: f64 = 420.0;
+const MAX_PX: f64 = 420.0;
 
 /// The time that a robot spent in each part of the floor.
 #[derive(Debug, Clone)]
@@ -36,7 +36,7 @@ impl Floor {
         let [width_m, height_m] = self.field_m;
         let left = 44.0;
         let right = PANEL_PX - 2.0;
-        let px_per_m = ((right - left) / width_m).min(MOST_PX / height_m);
+        let px_per_m = ((right - left) / width_m).min(MAX_PX / height_m);
         let right = left + width_m * px_per_m;
         let top = 6.0;
         let bottom = top + height_m * px_per_m;

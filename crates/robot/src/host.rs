@@ -14,7 +14,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use bus::{Bus, BusError, Declared, Publisher, Role};
-use lockstep::{Action, Admission, Begin, Leave, Naming, Patience, StateQuery, Turn};
+use lockstep::{Action, Admission, Begin, IncarnationNotice, Leave, StateQuery, Timeouts, Turn};
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{
     Clock, End, JoinAnswer, JoinRequest, News, ParametersAnswer, ParametersOffer, PublicState,
@@ -25,7 +25,7 @@ use protocol::{Malformed, PROTOCOL_VERSION, RobotName, RunName, decode, encode};
 use crate::cri::Robot;
 use crate::error::RobotError;
 use crate::network::{Network, Undelivered};
-use crate::seat::{Done, Seat};
+use crate::runner::{Done, Runner};
 use shared::{HostAction, HostAnswer, Shared, Thread, Waited};
 
 /// Most robots for which a publisher of commands is declared. Without one, zenoh compares each command's key with all keys that
@@ -135,9 +135,9 @@ impl Stopper {
 
 /// One robot of the process.
 struct Member {
-    /// The robot, until its first welcome seats it.
+    /// The robot, until its first welcome makes a runner of it.
     robot: Option<Box<dyn Robot>>,
-    seat: Option<Seat>,
+    runner: Option<Runner>,
     /// The welcome of the epoch that it joined last, until its first tick.
     welcome: Option<Welcome>,
     /// Whether it perceives all bodies around it.
@@ -181,19 +181,19 @@ impl Host {
         options: HostOptions,
     ) -> Result<Self, HostError> {
         let keys = Keys::new(&options.run);
-        let patience = Patience {
+        let timeouts = Timeouts {
             join: options.patience,
             gone: options.gone_patience,
         };
         let names: Vec<RobotName> = robots.iter().map(|(name, _)| name.clone()).collect();
-        let shared = Arc::new(Shared::new(&names, patience));
+        let shared = Arc::new(Shared::new(&names, timeouts));
         let mut members = BTreeMap::new();
         for (name, robot) in robots {
             let member = Member {
                 senses_bodies: robot.senses_bodies(),
                 is_quick: robot.is_quick(),
                 robot: Some(robot),
-                seat: None,
+                runner: None,
                 welcome: None,
                 explanation: String::new(),
                 report: bus.publisher(&keys.report(&name))?,
@@ -232,8 +232,8 @@ impl Host {
             .subscribe(&self.keys.news(name), move |key, bytes| {
                 match decode::<News>(key, "simulator", bytes) {
                     Ok(news) => shared.with(&own, |participant, actions| {
-                        let naming = Naming::from(&news);
-                        participant.news(news.epoch, news.tick, naming, news, actions);
+                        let notice = IncarnationNotice::from(&news);
+                        participant.news(news.epoch, news.tick, notice, news, actions);
                     }),
                     Err(error) => tracing::warn!("{error}"),
                 }
@@ -343,18 +343,20 @@ impl Host {
             }));
         }
 
+        // Both threads carry actions out under this lock, and take them from one queue: so actions are carried out in the order in
+        // which participants wanted them, whichever thread is faster.
         loop {
             let Ok(mut working) = host.lock() else {
                 panic!("a robot panicked in its tick");
             };
             working.work(Thread::Own);
             if let Some(outcome) = working.outcome.take() {
-                for seat in working
+                for runner in working
                     .members
                     .values()
-                    .filter_map(|member| member.seat.as_ref())
+                    .filter_map(|member| member.runner.as_ref())
                 {
-                    seat.report_left_out();
+                    runner.report_left_out();
                 }
                 working.leave_bus();
                 return outcome;
@@ -431,15 +433,15 @@ impl Host {
             return Ok(());
         };
         if turn.begin != Begin::GoOn {
-            member.take_seat();
+            member.take_runner();
         }
         // While the robot waits for an answer, the host goes on carrying things out.
-        let Some(mut seat) = member.seat.take() else {
+        let Some(mut runner) = member.runner.take() else {
             unreachable!("a robot runs after its welcome");
         };
 
         let mut network = HostNetwork::new(self, name, turn);
-        let outcome = seat.run(turn, &mut network);
+        let outcome = runner.run(turn, &mut network);
         if let Some(failed) = network.failed.take() {
             return Err(failed);
         }
@@ -448,9 +450,10 @@ impl Host {
             state,
             report,
         } = outcome?;
+        // Encoded once: a repetition of the report has the same bytes, also if the robot's panel or parameters change meanwhile.
         let bytes = encode(report.as_ref());
         if let Some(member) = self.members.get_mut(name) {
-            member.seat = Some(seat);
+            member.runner = Some(runner);
         }
         self.shared.file(name, |participant, actions| {
             participant.done(commands, state, bytes.into(), actions);
@@ -526,12 +529,12 @@ impl Host {
         let is_due = member
             .painted
             .is_none_or(|at| at.elapsed() >= PANEL_INTERVAL);
-        if let Some(seat) = &member.seat
+        if let Some(runner) = &member.runner
             && member.panel.has_subscribers()
             && is_due
         {
             member.painted = Some(Instant::now());
-            member.panel.put(encode(&seat.panel()))?;
+            member.panel.put(encode(&runner.panel()))?;
         }
         member.report.put(answer.report.to_vec())?;
         Ok(())
@@ -552,6 +555,8 @@ impl Host {
             }
         })?;
 
+        // The query comes first: it answers for this tick, whatever the subscriber will see. A state that arrives by both ways is the
+        // same, and the participant keeps one.
         let follows = (name.clone(), of.clone());
         if !self.followed.contains_key(&follows) {
             let shared = self.shared.clone();
@@ -617,15 +622,15 @@ fn work_here(host: &Mutex<Host>) {
 }
 
 impl Member {
-    /// Seats the robot with its newest welcome.
-    fn take_seat(&mut self) {
+    /// Makes the robot's runner with its newest welcome, or starts it over.
+    fn take_runner(&mut self) {
         let Some(welcome) = self.welcome.take() else {
             return;
         };
-        match (&mut self.seat, self.robot.take()) {
-            (Some(seat), _) => seat.start_over(welcome),
-            (none, Some(robot)) => *none = Some(Seat::new(robot, welcome)),
-            (None, None) => unreachable!("a robot that is not seated is here"),
+        match (&mut self.runner, self.robot.take()) {
+            (Some(runner), _) => runner.start_over(welcome),
+            (none, Some(robot)) => *none = Some(Runner::new(robot, welcome)),
+            (None, None) => unreachable!("a robot that does not run is here"),
         }
     }
 }

@@ -44,7 +44,7 @@ mod figure7;
 mod host;
 mod local;
 mod network;
-mod seat;
+mod runner;
 
 pub use cars::{CallError, Cars, ReceivedCommand};
 pub use cri::{Action, Robot};
@@ -61,7 +61,7 @@ pub use protocol::messages::{
 };
 pub use protocol::random::Stream;
 pub use protocol::{RobotName, RunName, Tick};
-pub use seat::{Done, Seat};
+pub use runner::{Done, Runner};
 
 /// Rounds an angle to 1e-6 rad, so that languages whose arc tangents differ in the last bit publish the same number.
 #[must_use]

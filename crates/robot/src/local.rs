@@ -6,8 +6,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use lockstep::{
-    Action, Attendance, Barrier, Bulletin, Exchange, Lateness, Outcome, Output, Participant,
-    Patience, Stamp, StateQuery, Timing, Turn,
+    Action, Attendance, Barrier, Bulletin, Exchange, Lateness, Outcome, Output, Participant, Stamp,
+    StateQuery, Timeouts, Timing, Turn,
 };
 use protocol::messages::{
     CommandText, FaultKind, MAX_ENTRIES, News, OnLate, Panel, Presence, PublicState, Report,
@@ -18,7 +18,7 @@ use protocol::{Generation, RobotName, Tick};
 use crate::cri::Robot;
 use crate::error::RobotError;
 use crate::network::{Network, Undelivered};
-use crate::seat::{Done, Seat};
+use crate::runner::{Done, Runner};
 
 type LocalParticipant = Participant<News, Arc<PublicState>, CommandText, Arc<Report>>;
 type LocalAction = Action<News, Arc<PublicState>, CommandText, Arc<Report>>;
@@ -28,11 +28,11 @@ pub struct LocalHost {
     barrier: Barrier<Arc<Report>, CommandText>,
     outputs: Vec<Output<Arc<Report>, CommandText>>,
     names: Vec<RobotName>,
-    seats: Vec<Seat>,
+    runners: Vec<Runner>,
     participants: Vec<LocalParticipant>,
     /// Indices of the robots that are stopped and are not back.
     stopped: BTreeSet<usize>,
-    patience: Patience,
+    timeouts: Timeouts,
 }
 
 /// The other robots of the process, as one of them queries them.
@@ -57,7 +57,7 @@ impl Network for Others<'_> {
 }
 
 impl LocalHost {
-    /// Seats robots with their welcomes. The order does not matter.
+    /// Makes the runners of robots with their welcomes. The order does not matter.
     #[must_use]
     pub fn new(robots: Vec<(Box<dyn Robot>, Welcome)>) -> Self {
         // No robot of this process is ever late, and no timer ever fires.
@@ -67,7 +67,7 @@ impl LocalHost {
             deadline: Duration::MAX,
             lose_after: 1,
         };
-        let patience = Patience {
+        let timeouts = Timeouts {
             join: Duration::MAX,
             gone: Duration::MAX,
         };
@@ -86,18 +86,18 @@ impl LocalHost {
             max_commands,
         );
         barrier.gather(epoch, lateness, &mut outputs);
-        let mut seats = Vec::new();
+        let mut runners = Vec::new();
         let mut participants = Vec::new();
         for (robot, welcome) in robots {
             let mut actions = Vec::new();
-            let mut participant = Participant::new(patience, &mut actions);
+            let mut participant = Participant::new(timeouts, &mut actions);
             let admission = barrier
                 .join(&welcome.name, "local", &mut outputs)
                 .unwrap_or_else(|refused| unreachable!("it is of the roster: {refused:?}"));
             participant.admitted(admission, [], &mut actions);
             barrier.token(&welcome.name, true, &mut outputs);
             participants.push(participant);
-            seats.push(Seat::new(robot, welcome));
+            runners.push(Runner::new(robot, welcome));
         }
         outputs.clear();
 
@@ -105,10 +105,10 @@ impl LocalHost {
             barrier,
             outputs,
             names,
-            seats,
+            runners,
             participants,
             stopped: BTreeSet::new(),
-            patience,
+            timeouts,
         }
     }
 
@@ -180,11 +180,11 @@ impl LocalHost {
         self.barrier.presence(name).1 == Presence::Lost
     }
 
-    /// Seats another robot in the place of one that goes on as the same incarnation.
-    pub fn reseat(&mut self, name: &RobotName, robot: Box<dyn Robot>) {
+    /// Puts another robot in the place of one that goes on as the same incarnation.
+    pub fn replace_runner(&mut self, name: &RobotName, robot: Box<dyn Robot>) {
         if let Some(index) = self.index(name) {
-            let welcome = self.seats[index].welcome().clone();
-            self.seats[index] = Seat::new(robot, welcome);
+            let welcome = self.runners[index].welcome().clone();
+            self.runners[index] = Runner::new(robot, welcome);
         }
     }
 
@@ -213,12 +213,12 @@ impl LocalHost {
         };
 
         let mut actions = Vec::new();
-        let mut participant = Participant::new(self.patience, &mut actions);
+        let mut participant = Participant::new(self.timeouts, &mut actions);
         participant.admitted(admission, welcome.states_before(), &mut actions);
         self.barrier.token(name, true, &mut self.outputs);
         self.outputs.clear();
         self.participants[index] = participant;
-        self.seats[index] = Seat::new(robot, welcome);
+        self.runners[index] = Runner::new(robot, welcome);
     }
 
     /// The panels of the robots that are chosen and not stopped.
@@ -227,7 +227,7 @@ impl LocalHost {
         let mut panels = BTreeMap::new();
         for (index, name) in self.names.iter().enumerate() {
             if !self.stopped.contains(&index) && is_chosen(name) {
-                panels.insert(name.clone(), self.seats[index].panel());
+                panels.insert(name.clone(), self.runners[index].panel());
             }
         }
         panels
@@ -235,8 +235,8 @@ impl LocalHost {
 
     /// Warns of what was left out of the log in this epoch, as a robot's own process does at its end.
     pub fn report_left_out(&self) {
-        for seat in &self.seats {
-            seat.report_left_out();
+        for runner in &self.runners {
+            runner.report_left_out();
         }
     }
 
@@ -252,14 +252,14 @@ impl LocalHost {
                 continue;
             };
             let mut actions: Vec<LocalAction> = Vec::new();
-            for (name, naming) in to {
+            for (name, notice) in to {
                 let index = self.names.iter().position(|own| *own == name);
                 let index = index.filter(|index| !self.stopped.contains(index));
                 if let Some(index) = index {
                     // Robots that share a flag all get news, also those for which nothing is new.
-                    let news = news.compose(&name, naming);
+                    let news = news.compose(&name, notice);
                     let participant = &mut self.participants[index];
-                    participant.news(clock.epoch, clock.tick, naming, news, &mut actions);
+                    participant.news(clock.epoch, clock.tick, notice, news, &mut actions);
                 }
             }
             for (index, participant) in self.participants.iter_mut().enumerate() {
@@ -292,7 +292,7 @@ impl LocalHost {
             commands,
             state,
             report,
-        } = self.seats[index].run(turn, &mut others)?;
+        } = self.runners[index].run(turn, &mut others)?;
 
         let mut actions = Vec::new();
         self.participants[index].done(commands, state, report, &mut actions);

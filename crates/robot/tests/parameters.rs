@@ -8,7 +8,7 @@ use lockstep::{Begin, Turn};
 use protocol::messages::JoinAnswer;
 use robot::{
     Action, BadParameters, Cars, CommandText, Network, Parameters, ParametersCheck, PublicState,
-    Robot, RobotError, RobotName, Seat, Undelivered, Welcome, read_parameters,
+    Robot, RobotError, RobotName, Runner, Undelivered, Welcome, read_parameters,
 };
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -84,14 +84,14 @@ fn welcome(now: Value, earlier: Vec<Value>, later: Vec<Value>) -> Welcome {
 
 /// Begins with a welcome: the way that it goes, what it drew, the lines of its log, and its commands.
 fn begin(begin: Begin, welcome: Welcome) -> Result<(Value, Vec<String>, Vec<CommandText>), String> {
-    let mut seat = Seat::new(Box::new(Picky::default()), welcome);
+    let mut runner = Runner::new(Box::new(Picky::default()), welcome);
     let turn = Turn {
         epoch: 1,
         tick: 7,
         begin,
         news: None,
     };
-    let done = seat
+    let done = runner
         .run(&turn, &mut Nobody)
         .map_err(|error: RobotError| error.to_string())?;
     let commands = done.commands.into_iter().map(|sent| sent.command);

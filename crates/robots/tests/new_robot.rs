@@ -14,7 +14,8 @@ use std::sync::Arc;
 
 use lockstep::{Begin, Turn};
 use robot::{
-    Network, News, PublicState, RobotName, Seat, SensedBody, SensedKind, Tick, Undelivered, Widget,
+    Network, News, PublicState, RobotName, Runner, SensedBody, SensedKind, Tick, Undelivered,
+    Widget,
 };
 use stage::{Role, Stage, feet};
 
@@ -186,11 +187,11 @@ fn vera_accounts_for_what_she_feels() {
         &[stage::name("Vera")],
         stage::parameters(text),
     );
-    let mut seat = Seat::new(Box::new(vera::Vera::default()), welcome);
-    seat.run(&turn(0, 0), &mut Alone).unwrap();
+    let mut runner = Runner::new(Box::new(vera::Vera::default()), welcome);
+    runner.run(&turn(0, 0), &mut Alone).unwrap();
     let mut why = |tick, near| {
-        seat.run(&turn(tick, near), &mut Alone).unwrap();
-        match seat.panel().widgets.as_slice() {
+        runner.run(&turn(tick, near), &mut Alone).unwrap();
+        match runner.panel().widgets.as_slice() {
             [Widget::Text { text, .. }] => text.clone(),
             widgets => panic!("{widgets:?}"),
         }

@@ -214,6 +214,8 @@ impl Medium {
     /// The decisions at the beginning of `tick`.
     pub fn decide(&mut self, tick: Tick) -> Decision {
         let mut decision = Decision::default();
+        // Cuts come first, so that a command which is sent or arrives in the tick in which a cut begins is lost. Bursts advance before
+        // any command draws. What arrives in this tick includes what was decided in it.
         self.update_cuts(tick, &mut decision.events);
         self.advance_bursts();
         for command in std::mem::take(&mut self.sent) {
@@ -326,6 +328,7 @@ impl Medium {
         let from = command.from.clone();
         let seq = command.seq;
         let channel = self.network.commands(&from, &to);
+        // A stream for this command alone: that another robot sends more, or less, changes nothing of its fate.
         let mut chance = stream(self.seed, &format!("medium/{}/{from}/{to}/{seq}", tick - 1));
 
         // Always three draws in the same order, so that each decision is independent of the other settings.

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use crate::server::{Event, Options, Past, REPEAT_AFTER, Server, Stay};
+use crate::server::{Event, Options, REPEAT_AFTER, ReplayLog, Server, Stay};
 use bus::endpoint::connectable;
 use bus::{Bus, DEFAULT_ENDPOINT, Role, check_exposure, check_run};
 use clap::{Command, CommandFactory, Parser, ValueEnum};
@@ -192,10 +192,10 @@ fn open_folder(
     folder: &RunFolder,
     scenario: &Scenario,
     args: &Args,
-) -> miette::Result<(RunLock, Option<Past>)> {
+) -> miette::Result<(RunLock, Option<ReplayLog>)> {
     if args.resume {
         let (lock, files) = folder.reopen()?;
-        return Ok((lock, Some(Past::open(&files)?)));
+        return Ok((lock, Some(ReplayLog::open(&files)?)));
     }
 
     let if_taken = match (args.prepared, args.replace) {

@@ -98,7 +98,7 @@ pub struct Observed {
 }
 
 /// A tick that was noted and is not written: all that writing it needs beside the frame.
-struct Noted {
+struct PendingTick {
     record: TickRecord,
     lines: Vec<LogRecord>,
     reports: Vec<(RobotName, Arc<Report>)>,
@@ -117,7 +117,7 @@ pub struct Recorder {
     /// The field after the tick that was noted last. Its memory is used again.
     frame: Frame,
     /// What was noted and is not written.
-    noted: Option<Noted>,
+    noted: Option<PendingTick>,
     begun: Instant,
     /// Of the tick that is written next.
     observed: Option<Observed>,
@@ -296,7 +296,7 @@ impl Recorder {
             reports = simulation.reports_of(record.tick);
         }
 
-        self.noted = Some(Noted {
+        self.noted = Some(PendingTick {
             record: record.clone(),
             lines: lines.clone(),
             reports,
@@ -348,7 +348,7 @@ impl Recorder {
         Ok(())
     }
 
-    fn record_tick(&mut self, noted: &Noted) -> Result<(), FileError> {
+    fn record_tick(&mut self, noted: &PendingTick) -> Result<(), FileError> {
         let Some(recording) = &mut self.recording else {
             return Ok(());
         };

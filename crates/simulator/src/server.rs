@@ -27,6 +27,6 @@ mod timers;
 mod viewers;
 mod watchdog;
 
-pub use past::Past;
+pub use past::ReplayLog;
 pub use process::{Event, Interrupt, Options, REPEAT_AFTER, Server, ServerError, Stay};
 pub use replay::{Replay, ReplayError, ReplayOptions};

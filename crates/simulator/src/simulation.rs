@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use lockstep::{Bulletin, Exchange, Membership, Naming, Outcome, Sent};
-use observe::{Observation, RobotState, Watches};
+use lockstep::{Bulletin, Exchange, IncarnationNotice, Membership, Outcome, Sent};
+use observe::{Monitors, Observation, RobotState};
 use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::event::{Blocker, Cause, WaitedFor};
 use protocol::messages::{
@@ -109,7 +109,7 @@ pub struct Simulation {
     planned: Option<Vec<Change>>,
     digest: Digest,
     /// What the scenario expects of the run.
-    watches: Watches,
+    watches: Monitors,
 }
 
 impl Simulation {
@@ -155,7 +155,7 @@ impl Simulation {
             between: Vec::new(),
             planned: None,
             digest: Digest::default(),
-            watches: Watches::new(
+            watches: Monitors::new(
                 &scenario.expectations,
                 scenario.tick_s,
                 scenario.body_m,
@@ -473,16 +473,16 @@ impl Simulation {
     /// The news of a robot for the tick in progress, with the incarnations that they name. Those of an incarnation that takes
     /// part from this tick on always contain its location.
     #[must_use]
-    pub fn news(&self, name: &RobotName, naming: Naming) -> News {
+    pub fn news(&self, name: &RobotName, notice: IncarnationNotice) -> News {
         let mut news = self.news.get(name).cloned().unwrap_or(News {
             epoch: self.epoch,
             tick: self.now,
             ..News::default()
         });
 
-        news.joined = naming.joined;
-        news.rejoin = naming.rejoin;
-        if naming.joined.is_some() {
+        news.joined = notice.joined;
+        news.rejoin = notice.rejoin;
+        if notice.joined.is_some() {
             let location = self.location(name);
             news.correction = news.correction.or(location.map(|location| Correction {
                 location,
@@ -1066,8 +1066,8 @@ impl Bulletin<News> for Simulation {
         self.robots_with_news()
     }
 
-    fn compose(&self, robot: &RobotName, naming: Naming) -> News {
-        self.news(robot, naming)
+    fn compose(&self, robot: &RobotName, notice: IncarnationNotice) -> News {
+        self.news(robot, notice)
     }
 }
 

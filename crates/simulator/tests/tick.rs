@@ -7,7 +7,7 @@ use std::convert::Infallible;
 use std::path::Path;
 use std::sync::Arc;
 
-use lockstep::{Bulletin, Exchange, Naming, Outcome, Sent};
+use lockstep::{Bulletin, Exchange, IncarnationNotice, Outcome, Sent};
 use protocol::event::{Blocker, Cause, log_line};
 use protocol::messages::{
     CommandText, Delivery, End, News, Performative, Point, Report, SensedKind, StateVariables,
@@ -79,7 +79,7 @@ where
     ) -> Result<Outcome<Arc<Report>, CommandText>, Infallible> {
         let mut news = AllNews::new();
         for name in bulletin.robots() {
-            let of_robot = bulletin.compose(&name, Naming::default());
+            let of_robot = bulletin.compose(&name, IncarnationNotice::default());
             news.insert(name, of_robot);
         }
         let mut outcome = Outcome::default();

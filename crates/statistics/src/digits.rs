@@ -1,7 +1,7 @@
 //! Numbers as people read them: with as many digits as their intervals support.
 
 /// Most decimals.
-const MOST_DECIMALS: f64 = 12.0;
+const MAX_DECIMALS: f64 = 12.0;
 /// Digits of a number without an interval.
 const DIGITS: i32 = 4;
 /// Numbers from this on are written with an exponent.
@@ -54,7 +54,7 @@ fn decimals_of(value: f64, digits: i32) -> usize {
         return 0;
     }
     let magnitude = libm::floor(libm::log10(size));
-    (f64::from(digits - 1) - magnitude).clamp(0.0, MOST_DECIMALS) as usize
+    (f64::from(digits - 1) - magnitude).clamp(0.0, MAX_DECIMALS) as usize
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use protocol::random;
 use statistics::{Estimate, PairedTimes, TimeTo};
 
 use crate::population::{NUMBERS, Population, TIMES, draw};
-use crate::{ERRORS, LEAST_COVERED, SIZES, before, error};
+use crate::{ERRORS, MIN_COVERED, SIZES, before, error};
 
 /// Samples of each size.
 const SAMPLES: usize = 4_000;
@@ -159,7 +159,7 @@ impl Row {
         for (n, [_, (covered, with_interval)]) in SIZES.iter().zip(&self.covered).skip(1) {
             sum += covered;
             let draws = (SAMPLES as f64 * with_interval) as usize;
-            let least = LEAST_COVERED - ERRORS * error(LEAST_COVERED, draws);
+            let least = MIN_COVERED - ERRORS * error(MIN_COVERED, draws);
             let is_share = self.name.contains("share");
             assert!(
                 is_share || *covered >= least,
@@ -167,7 +167,7 @@ impl Row {
                 self.name
             );
         }
-        assert!(sum / 4.0 >= LEAST_COVERED - 0.01, "{}: {sum}", self.name);
+        assert!(sum / 4.0 >= MIN_COVERED - 0.01, "{}: {sum}", self.name);
     }
 }
 

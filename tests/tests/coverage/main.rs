@@ -19,7 +19,7 @@ use self::population::Population;
 /// Sizes of samples.
 const SIZES: [usize; 5] = [3, 8, 16, 32, 64];
 /// Shares of samples whose interval must cover the truth, from 8 pairs on.
-const LEAST_COVERED: f64 = 0.935;
+const MIN_COVERED: f64 = 0.935;
 /// Standard errors of the simulation that are allowed beyond a limit.
 const ERRORS: f64 = 3.0;
 

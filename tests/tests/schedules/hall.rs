@@ -184,18 +184,18 @@ fn digest_of(scenario: &Scenario) -> String {
     assert_eq!(scenario.ticks, TICKS);
     let run = RunName::new("schedule").expect("a legal name");
     let mut simulation = Simulation::new(scenario.clone(), 1).expect("the hall can be set up");
-    let mut seats = Vec::new();
+    let mut runners = Vec::new();
     for (name, spec) in &scenario.robots {
         let robot = make(&spec.class);
         simulation.list_bodies(name, robot.senses_bodies());
-        seats.push((
+        runners.push((
             robot,
             simulation
                 .welcome(&run, name, 1, None)
                 .expect("it is of the roster"),
         ));
     }
-    let mut robots = LocalHost::new(seats);
+    let mut robots = LocalHost::new(runners);
 
     simulation
         .init(&mut robots)

@@ -9,13 +9,14 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use lockstep::{
-    Action, Admission, Answer, Begin, Leave, Naming, Participant, Patience, RobotTimer, Turn,
+    Action, Admission, Answer, Begin, IncarnationNotice, Leave, Participant, RobotTimer, Timeouts,
+    Turn,
 };
 use protocol::messages::{
     CommandText, JoinAnswer, JoinRequest, News, PublicState, Waiting, Welcome,
 };
 use protocol::{Epoch, PROTOCOL_VERSION, RobotName, RunName, Tick, decode, encode};
-use robot::{Done, Network, Robot, Seat, Undelivered};
+use robot::{Done, Network, Robot, Runner, Undelivered};
 
 use crate::hall::make;
 use crate::plan::{Flaw, Micros, Point, S};
@@ -58,7 +59,7 @@ pub(crate) struct Process {
     pub(crate) life: Life,
     senses_bodies: bool,
     robot: Option<Box<dyn Robot>>,
-    seat: Option<Seat>,
+    runner: Option<Runner>,
     welcome: Option<Welcome>,
     participant: RobotParticipant,
     actions: VecDeque<RobotAction>,
@@ -96,20 +97,20 @@ impl Network for Recorded<'_> {
 
 impl Process {
     pub(crate) fn new(name: RobotName, class: &str) -> Self {
-        let patience = Patience {
+        let timeouts = Timeouts {
             join: PATIENCE,
             gone: PATIENCE,
         };
         let robot = make(class);
         let mut actions = Vec::new();
-        let participant = Participant::new(patience, &mut actions);
+        let participant = Participant::new(timeouts, &mut actions);
 
         Self {
             name,
             life: Life::Alive,
             senses_bodies: robot.senses_bodies(),
             robot: Some(robot),
-            seat: None,
+            runner: None,
             welcome: None,
             participant,
             actions: actions.into(),
@@ -132,14 +133,14 @@ impl Process {
         self.joining.is_some() || is_computing
     }
 
-    fn take_seat(&mut self) {
+    fn take_runner(&mut self) {
         let Some(welcome) = self.welcome.take() else {
             return;
         };
-        match (&mut self.seat, self.robot.take()) {
-            (Some(seat), _) => seat.start_over(welcome),
-            (none, Some(robot)) => *none = Some(Seat::new(robot, welcome)),
-            (None, None) => unreachable!("a robot that is not seated is here"),
+        match (&mut self.runner, self.robot.take()) {
+            (Some(runner), _) => runner.start_over(welcome),
+            (none, Some(robot)) => *none = Some(Runner::new(robot, welcome)),
+            (None, None) => unreachable!("a robot that does not run is here"),
         }
     }
 }
@@ -298,9 +299,9 @@ impl World {
         }
         let own = &mut self.processes[process];
         if turn.begin != Begin::GoOn {
-            own.take_seat();
+            own.take_runner();
         }
-        let seat = own.seat.as_mut().expect("a robot runs after its welcome");
+        let runner = own.runner.as_mut().expect("a robot runs after its welcome");
         let mut network = Recorded {
             facts: &self.facts,
             epoch: turn.epoch,
@@ -308,7 +309,7 @@ impl World {
             asked: VecDeque::new(),
         };
 
-        let done = match seat.run(turn, &mut network) {
+        let done = match runner.run(turn, &mut network) {
             Ok(done) => done,
             Err(error) => return self.fail_wrong(format!("a robot fails: {error}")),
         };
@@ -450,9 +451,9 @@ impl World {
         match message {
             Message::News(bytes) => {
                 let news: News = self.read(&bytes);
-                let naming = Naming::from(&news);
+                let notice = IncarnationNotice::from(&news);
                 self.feed(process, |participant, out| {
-                    participant.news(news.epoch, news.tick, naming, news, out);
+                    participant.news(news.epoch, news.tick, notice, news, out);
                 });
             }
             Message::Clock(bytes) => self.on_clock(process, &bytes),

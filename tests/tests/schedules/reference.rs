@@ -4,10 +4,10 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use lockstep::{Begin, Membership, Naming, Outcome, Sent, Turn};
+use lockstep::{Begin, IncarnationNotice, Membership, Outcome, Sent, Turn};
 use protocol::messages::{CommandText, PublicState, Report};
 use protocol::{Generation, RobotName, RunName, Tick};
-use robot::{Done, Network, Seat, Undelivered};
+use robot::{Done, Network, Runner, Undelivered};
 use scenario::Scenario;
 use simulator::{Simulation, TickRecord};
 
@@ -19,7 +19,7 @@ pub(crate) type Reports = Outcome<Arc<Report>, CommandText>;
 pub(crate) struct Reference {
     simulation: Simulation,
     run: RunName,
-    seats: BTreeMap<RobotName, Seat>,
+    runners: BTreeMap<RobotName, Runner>,
     /// States as of the tick before.
     states: BTreeMap<RobotName, Arc<PublicState>>,
 }
@@ -37,7 +37,7 @@ impl Reference {
         Self {
             simulation: Simulation::new(scenario.clone(), epoch).expect("the hall can be set up"),
             run: RunName::new("schedule").expect("a legal name"),
-            seats: BTreeMap::new(),
+            runners: BTreeMap::new(),
             states: BTreeMap::new(),
         }
     }
@@ -88,12 +88,12 @@ impl Reference {
             .get(name)
             .map_or(1, |(report, _)| report.generation);
         if tick == 0 {
-            self.seat(name, first);
+            self.runner(name, first);
         } else if let Some(generation) = joined {
-            self.seat(name, generation);
+            self.runner(name, generation);
         }
 
-        let naming = Naming {
+        let notice = IncarnationNotice {
             joined,
             rejoin: None,
         };
@@ -106,22 +106,24 @@ impl Reference {
                 (_, Some(_)) => Begin::TakeOver,
                 (_, None) => Begin::GoOn,
             },
-            news: has_news.then(|| self.simulation.news(name, naming)),
+            news: has_news.then(|| self.simulation.news(name, notice)),
         };
-        let seat = self
-            .seats
+        let runner = self
+            .runners
             .get_mut(name)
             .expect("every robot is seated at tick 0");
-        seat.run(&turn, &mut Others(&self.states))
+        runner
+            .run(&turn, &mut Others(&self.states))
             .expect("the parameters are good")
     }
 
-    fn seat(&mut self, name: &RobotName, generation: Generation) {
+    fn runner(&mut self, name: &RobotName, generation: Generation) {
         let robot = make(&self.simulation.scenario().robots[name].class);
         self.simulation.list_bodies(name, robot.senses_bodies());
         let welcome = self.simulation.welcome(&self.run, name, generation, None);
         let welcome = welcome.expect("it is of the roster");
 
-        self.seats.insert(name.clone(), Seat::new(robot, welcome));
+        self.runners
+            .insert(name.clone(), Runner::new(robot, welcome));
     }
 }

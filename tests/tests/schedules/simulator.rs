@@ -214,8 +214,8 @@ impl World {
                 self.on_opened(0);
             }
             Output::Grant { news, clock } => {
-                for (name, naming) in news {
-                    let news = self.simulator.simulation.news(&name, naming);
+                for (name, notice) in news {
+                    let news = self.simulator.simulation.news(&name, notice);
                     self.put_down(Some(&name), &Message::News(encode(&news).into()));
                 }
                 self.put_down(None, &Message::Clock(encode(&clock).into()));

@@ -21,7 +21,7 @@ pub(crate) const BOUND: Micros = 12 * S;
 /// Links are quiet from this time on, however far the run is.
 const QUIET_AT: Micros = 300 * S;
 /// The longest schedule, events.
-const MOST_EVENTS: u64 = 5_000_000;
+const MAX_EVENTS: u64 = 5_000_000;
 
 /// What is going to happen.
 #[derive(Debug)]
@@ -423,7 +423,7 @@ impl World {
 
     /// When the last fault is over, ticks follow, and at the end every process leaves.
     fn check_liveness(&mut self) {
-        if self.counts.events > MOST_EVENTS {
+        if self.counts.events > MAX_EVENTS {
             self.fail_stuck("it goes on for ever".to_owned());
         }
         let quiet = self

@@ -562,14 +562,14 @@ fn events_in_order(order: [&str; 3]) -> Vec<Event> {
     let run = RunName::new("order").unwrap();
     let mut simulation =
         Simulation::new(scenario(THREE, 5, &["network.commands={ loss = 0.1 }"]), 1).unwrap();
-    let seats = order.map(|class| {
+    let runners = order.map(|class| {
         let name = class.parse().unwrap();
         let robot = robots::make(class).unwrap();
         simulation.list_bodies(&name, robot.senses_bodies());
         let welcome = simulation.welcome(&run, &name, 1, None).unwrap();
         (robot, welcome)
     });
-    let mut robots = LocalHost::new(seats.into());
+    let mut robots = LocalHost::new(runners.into());
     let mut events = simulation.init(&mut robots).unwrap().events.to_vec();
     for _ in 0..simulation.scenario().ticks {
         events.extend(simulation.step(&mut robots).unwrap().events.to_vec());

@@ -7,7 +7,7 @@ use serde_json::Value;
 use system_tests::Lab;
 
 /// Most bytes of a report.
-const MOST_BYTES: usize = 8_000_000;
+const MAX_BYTES: usize = 8_000_000;
 
 fn parsed(html: &str) -> Document<'_> {
     let options = ParsingOptions {
@@ -222,7 +222,7 @@ fn a_report_of_sixty_four_runs_has_a_bounded_size() {
     let mut args = vec!["report"];
     args.extend(names.iter().map(String::as_str));
     let html = lab.ok(&args);
-    assert!(html.len() < MOST_BYTES, "{} bytes", html.len());
+    assert!(html.len() < MAX_BYTES, "{} bytes", html.len());
     assert!(html.contains("The diagrams of the other 62 runs are left out"));
 
     let document = parsed(&html);
@@ -587,7 +587,7 @@ fn ten_thousand_runs_over_two_factors_are_a_page_of_a_bounded_size() {
     let folder = play_experiment(&lab, file.to_str().unwrap(), &[]);
 
     let html = lab.ok(&["report", &folder]);
-    assert!(html.len() < MOST_BYTES, "{} bytes", html.len());
+    assert!(html.len() < MAX_BYTES, "{} bytes", html.len());
     let document = parsed(&html);
     let maps = document
         .descendants()

@@ -3,16 +3,16 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use lockstep::{Action, Begin, Participant, Patience, StateQuery, Turn};
+use lockstep::{Action, Begin, Participant, StateQuery, Timeouts, Turn};
 use protocol::messages::{CommandText, JoinRequest, News, PublicState, Welcome};
 use protocol::{PROTOCOL_VERSION, RobotName, RunName};
-use robot::{Done, Network, Robot, Seat, Undelivered};
+use robot::{Done, Network, Robot, Runner, Undelivered};
 
 pub(super) type Machine = Participant<News, Arc<PublicState>, CommandText, Vec<u8>>;
 pub(super) type MachineAction = Action<News, Arc<PublicState>, CommandText, Vec<u8>>;
 
 /// No timer ever fires.
-const PATIENCE: Patience = Patience {
+const PATIENCE: Timeouts = Timeouts {
     join: std::time::Duration::MAX,
     gone: std::time::Duration::MAX,
 };
@@ -22,7 +22,7 @@ pub(super) struct Process {
     pub(super) request: JoinRequest,
     /// The robot, until its first welcome.
     robot: Option<Box<dyn Robot>>,
-    seat: Option<Seat>,
+    runner: Option<Runner>,
     /// The newest welcome, until the tick that follows.
     pub(super) welcome: Option<Welcome>,
 }
@@ -66,7 +66,7 @@ impl Process {
             participant: Participant::new(PATIENCE, actions),
             request,
             robot: Some(robot),
-            seat: None,
+            runner: None,
             welcome: None,
         }
     }
@@ -74,20 +74,24 @@ impl Process {
     /// Runs the robot for a tick.
     pub(super) fn run(&mut self, turn: &Turn<News>, others: &mut Others<'_>) -> Done {
         if turn.begin != Begin::GoOn {
-            self.take_seat();
+            self.take_runner();
         }
-        let seat = self.seat.as_mut().expect("a robot runs after its welcome");
+        let runner = self
+            .runner
+            .as_mut()
+            .expect("a robot runs after its welcome");
 
-        seat.run(turn, others)
+        runner
+            .run(turn, others)
             .unwrap_or_else(|error| panic!("{error}"))
     }
 
-    fn take_seat(&mut self) {
+    fn take_runner(&mut self) {
         let welcome = self.welcome.take().expect("it has been admitted");
         match self.robot.take() {
-            Some(robot) => self.seat = Some(Seat::new(robot, welcome)),
+            Some(robot) => self.runner = Some(Runner::new(robot, welcome)),
             None => self
-                .seat
+                .runner
                 .as_mut()
                 .expect("a robot is seated once")
                 .start_over(welcome),

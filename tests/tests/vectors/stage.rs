@@ -7,8 +7,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use lockstep::{
-    Action, Admission, Answer, Barrier, Ignored, Leave, Naming, Output, Sent, Stamp, StateQuery,
-    Timing, Turn,
+    Action, Admission, Answer, Barrier, Ignored, IncarnationNotice, Leave, Output, Sent, Stamp,
+    StateQuery, Timing, Turn,
 };
 use protocol::keys::{Keys, STATE};
 use protocol::messages::{
@@ -200,8 +200,8 @@ impl Stage {
                 self.open(0);
             }
             Output::Grant { news, clock } => {
-                for (name, naming) in news {
-                    self.put_news(&name, naming);
+                for (name, notice) in news {
+                    self.put_news(&name, notice);
                 }
                 self.put_clock(clock);
             }
@@ -216,15 +216,21 @@ impl Stage {
         }
     }
 
-    fn put_news(&mut self, name: &RobotName, naming: Naming) {
-        let bytes = encode(&self.simulation.news(name, naming));
+    fn put_news(&mut self, name: &RobotName, notice: IncarnationNotice) {
+        let bytes = encode(&self.simulation.news(name, notice));
         if *name == self.robot {
             self.transcript.received(&self.keys.news(name), &bytes);
         }
 
         let news: News = read(&bytes);
         self.feed(name, |participant, actions| {
-            participant.news(news.epoch, news.tick, Naming::from(&news), news, actions);
+            participant.news(
+                news.epoch,
+                news.tick,
+                IncarnationNotice::from(&news),
+                news,
+                actions,
+            );
         });
     }
 

@@ -1,8 +1,8 @@
 //! Butler, the waiter.
 
-#[path = "../door.rs"]
-mod door;
+#[path = "../exec_as.rs"]
+mod exec_as;
 
 fn main() -> std::process::ExitCode {
-    door::open("cars-butler")
+    exec_as::exec_cars("cars-butler")
 }

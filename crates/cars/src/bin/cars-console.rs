@@ -1,8 +1,8 @@
 //! The console.
 
-#[path = "../door.rs"]
-mod door;
+#[path = "../exec_as.rs"]
+mod exec_as;
 
 fn main() -> std::process::ExitCode {
-    door::open("cars-console")
+    exec_as::exec_cars("cars-console")
 }

@@ -1,8 +1,8 @@
 //! Leguin, the refiller.
 
-#[path = "../door.rs"]
-mod door;
+#[path = "../exec_as.rs"]
+mod exec_as;
 
 fn main() -> std::process::ExitCode {
-    door::open("cars-leguin")
+    exec_as::exec_cars("cars-leguin")
 }

@@ -1,8 +1,8 @@
 //! The simulator.
 
-#[path = "../door.rs"]
-mod door;
+#[path = "../exec_as.rs"]
+mod exec_as;
 
 fn main() -> std::process::ExitCode {
-    door::open("cars-sim")
+    exec_as::exec_cars("cars-sim")
 }

@@ -1,8 +1,8 @@
 //! Vonda, a clone of Leguin under another name.
 
-#[path = "../door.rs"]
-mod door;
+#[path = "../exec_as.rs"]
+mod exec_as;
 
 fn main() -> std::process::ExitCode {
-    door::open("cars-vonda")
+    exec_as::exec_cars("cars-vonda")
 }

@@ -302,7 +302,7 @@ impl Drop for End<'_> {
 }
 
 /// Wrong tokens, at least, while answers to a page are timed.
-const LEAST_REFUSED: u32 = 100;
+const MIN_REFUSED: u32 = 100;
 
 #[test]
 fn many_wrong_tokens_do_not_slow_others() {
@@ -328,7 +328,7 @@ fn many_wrong_tokens_do_not_slow_others() {
         let started = Instant::now();
         let goes_on = || {
             let is_early = started.elapsed() < Duration::from_secs(2);
-            let has_guessed = refused.load(order) > LEAST_REFUSED;
+            let has_guessed = refused.load(order) > MIN_REFUSED;
             is_early || (!has_guessed && started.elapsed() < PATIENCE)
         };
         while goes_on() {
@@ -337,7 +337,7 @@ fn many_wrong_tokens_do_not_slow_others() {
     });
 
     let refused = refused.into_inner();
-    assert!(refused > LEAST_REFUSED, "{refused}");
+    assert!(refused > MIN_REFUSED, "{refused}");
     // Not the slowest: the machine may stand still for a moment.
     round_trips.sort();
     let median = round_trips[round_trips.len() / 2];

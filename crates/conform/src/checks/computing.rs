@@ -10,11 +10,11 @@ use std::time::{Duration, Instant};
 
 use protocol::Tick;
 
+use crate::harness::{Harness, Options};
 use crate::kit::Kit;
 use crate::patience::PATIENCE;
 use crate::report::Failure;
-use crate::script::{Disturbance, Script, play, seated};
-use crate::stage::{Options, Stage};
+use crate::script::{Disturbance, Script, play, with_robot};
 use crate::transcript::Entry;
 
 /// How often the robot is queried during a tick.
@@ -42,37 +42,37 @@ struct QueriesDuringTicks {
 }
 
 impl Disturbance for QueriesDuringTicks {
-    fn during(&mut self, stage: &mut Stage<'_>, tick: Tick) -> Result<(), Failure> {
+    fn during(&mut self, harness: &mut Harness<'_>, tick: Tick) -> Result<(), Failure> {
         self.pairs.clear();
         loop {
-            stage.pass_while(EVERY, Stage::is_open);
+            harness.pass_while(EVERY, Harness::is_open);
             // At tick 0 there is nothing to answer. A robot that never reports is found by the wait for its report.
             let is_long = self.pairs.len() >= MAX_PAIRS;
-            if !stage.is_open() || tick == 0 || is_long {
+            if !harness.is_open() || tick == 0 || is_long {
                 return Ok(());
             }
 
             self.pairs.push(Pair {
-                robot: stage.begin_query(stage.epoch(), tick)?,
-                control: stage.begin_control()?,
+                robot: harness.begin_query(harness.epoch(), tick)?,
+                control: harness.begin_control()?,
                 at: Instant::now(),
             });
         }
     }
 
-    fn after(&mut self, stage: &mut Stage<'_>, entry: &Entry) -> Result<(), Failure> {
+    fn after(&mut self, harness: &mut Harness<'_>, entry: &Entry) -> Result<(), Failure> {
         for pair in &self.pairs {
             let expected = format!("queried during tick {}, a reply", entry.tick);
             for number in [pair.robot, pair.control] {
-                stage.until(&expected, PATIENCE, |stage| {
-                    stage.seen.replies.contains_key(&number).then_some(())
+                harness.until(&expected, PATIENCE, |harness| {
+                    harness.seen.replies.contains_key(&number).then_some(())
                 })?;
             }
 
-            let report = &stage.seen.answers[entry.index];
+            let report = &harness.seen.answers[entry.index];
             let had = report.at.saturating_duration_since(pair.at);
-            let is_late = stage.seen.replies[&pair.robot].0 > report.order;
-            let is_control_late = stage.seen.replies[&pair.control].0 > report.order;
+            let is_late = harness.seen.replies[&pair.robot].0 > report.order;
+            let is_control_late = harness.seen.replies[&pair.control].0 > report.order;
             if is_late && !is_control_late && had >= ENOUGH {
                 self.late.entry(entry.tick).or_insert(had);
             }
@@ -106,9 +106,9 @@ pub(super) fn check(kit: &Kit) -> Result<(), Failure> {
 
 /// Plays the usual ticks. The ticks in which an answer came after the report although there was time for it before.
 fn late_ticks(kit: &Kit) -> Result<BTreeMap<Tick, Duration>, Failure> {
-    let mut stage = seated(kit, Options::default())?;
+    let mut harness = with_robot(kit, Options::default())?;
     let mut queries = QueriesDuringTicks::default();
-    play(&mut stage, &Script::usual(kit), &mut queries)?;
+    play(&mut harness, &Script::usual(kit), &mut queries)?;
 
     Ok(queries.late)
 }

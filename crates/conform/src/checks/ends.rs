@@ -7,11 +7,11 @@ use protocol::messages::End;
 
 use super::waiting;
 use crate::findings::Findings;
+use crate::harness::{Harness, Options};
 use crate::kit::Kit;
 use crate::patience::{PATIENCE, in_each_attempt};
 use crate::report::Failure;
-use crate::script::{Script, Straight, play, seated, step};
-use crate::stage::{Options, Stage};
+use crate::script::{Script, Straight, play, step, with_robot};
 
 /// A process ends within this time after SIGTERM. The page allows 2 s; signals and the kernel need some, too.
 const END_PATIENCE: Duration = Duration::from_secs(5);
@@ -25,43 +25,43 @@ const HASTY: Duration = Duration::from_millis(1200);
 /// However a run ends, and whatever the robot waits for: it ends, as it should.
 pub(super) fn clock(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     for end in [End::Finished, End::Stopped, End::Aborted] {
-        let mut stage = seated(kit, Options::default())?;
-        play(&mut stage, &Script::quiet(3), &mut Straight)?;
-        demand_end(&mut stage, end, "between two ticks")?;
+        let mut harness = with_robot(kit, Options::default())?;
+        play(&mut harness, &Script::quiet(3), &mut Straight)?;
+        demand_end(&mut harness, end, "between two ticks")?;
     }
 
-    let mut stage = waiting::for_news(kit)?;
-    demand_end(&mut stage, End::Stopped, "while it waits for its news")?;
+    let mut harness = waiting::for_news(kit)?;
+    demand_end(&mut harness, End::Stopped, "while it waits for its news")?;
 
-    let (mut stage, is_asking) = waiting::for_another(kit)?;
+    let (mut harness, is_asking) = waiting::for_another(kit)?;
     if is_asking {
         let when = "while it waits for another robot's answer";
-        demand_end(&mut stage, End::Aborted, when)?;
+        demand_end(&mut harness, End::Aborted, when)?;
     }
     Ok(())
 }
 
-fn demand_end(stage: &mut Stage<'_>, end: End, when: &str) -> Result<(), Failure> {
-    stage.put_end(end)?;
+fn demand_end(harness: &mut Harness<'_>, end: End, when: &str) -> Result<(), Failure> {
+    harness.put_end(end)?;
     let expected = format!("its process ends after a clock with end {end:?} {when}");
-    let status = stage.until_ended(&expected, PATIENCE)?;
+    let status = harness.until_ended(&expected, PATIENCE)?;
     if status.code() != Some(0) {
         return Err(Failure::new(
             format!("exit status 0 after a clock with end {end:?} {when}"),
-            stage.process.fate(),
+            harness.process.fate(),
         ));
     }
-    stage.until_gone()
+    harness.until_gone()
 }
 
 /// It is asked to end by a signal, in the middle of a run.
 pub(super) fn sigterm(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
-    let mut stage = seated(kit, Options::default())?;
-    play(&mut stage, &Script::quiet(3), &mut Straight)?;
+    let mut harness = with_robot(kit, Options::default())?;
+    play(&mut harness, &Script::quiet(3), &mut Straight)?;
 
-    stage.process.signal(Signal::SIGTERM);
-    stage.until_ended("its process ends within 2 s of SIGTERM", END_PATIENCE)?;
-    stage.until_gone()
+    harness.process.signal(Signal::SIGTERM);
+    harness.until_ended("its process ends within 2 s of SIGTERM", END_PATIENCE)?;
+    harness.until_gone()
 }
 
 /// The simulator's token goes: the robot waits for it, goes on if it comes back, and ends when its patience is over.
@@ -72,60 +72,60 @@ pub(super) fn gone(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
 }
 
 /// A robot that lost its simulator, and is to wait so long for it.
-fn without_simulator(kit: &Kit, gone_patience_s: u32) -> Result<Stage<'_>, Failure> {
+fn without_simulator(kit: &Kit, gone_patience_s: u32) -> Result<Harness<'_>, Failure> {
     let options = Options {
         gone_patience_s,
         ..Options::default()
     };
-    let mut stage = seated(kit, options)?;
-    play(&mut stage, &Script::quiet(3), &mut Straight)?;
-    stage.show_simulator(false)?;
-    Ok(stage)
+    let mut harness = with_robot(kit, options)?;
+    play(&mut harness, &Script::quiet(3), &mut Straight)?;
+    harness.show_simulator(false)?;
+    Ok(harness)
 }
 
 /// It does not end before its patience is over. There is so much of it that no machine uses it up meanwhile.
 fn gone_for_a_while(kit: &Kit) -> Result<(), Failure> {
-    let mut stage = without_simulator(kit, LONG_GONE_S)?;
-    stage.pass(HASTY);
+    let mut harness = without_simulator(kit, LONG_GONE_S)?;
+    harness.pass(HASTY);
     let expected =
         format!("it waits {LONG_GONE_S} s (CARS_GONE_PATIENCE_S) for a simulator that is gone");
-    demand_running(&mut stage, &expected)?;
+    demand_running(&mut harness, &expected)?;
 
-    stage.show_simulator(true)?;
-    step(&mut stage, &Script::quiet(1), &mut Straight).map(drop)
+    harness.show_simulator(true)?;
+    step(&mut harness, &Script::quiet(1), &mut Straight).map(drop)
 }
 
 /// The simulator is back before the robot's patience is over, and the time is over when its patience would have been.
 fn back_in_time(kit: &Kit, gone_patience_s: u32) -> Result<(), Failure> {
-    let mut stage = without_simulator(kit, gone_patience_s)?;
+    let mut harness = without_simulator(kit, gone_patience_s)?;
     let patience = Duration::from_secs(gone_patience_s.into());
-    stage.pass(patience / 4);
-    stage.show_simulator(true)?;
-    stage.pass(patience);
+    harness.pass(patience / 4);
+    harness.show_simulator(true)?;
+    harness.pass(patience);
     demand_running(
-        &mut stage,
+        &mut harness,
         "it goes on when the simulator is back in time, and waits no longer",
     )?;
-    step(&mut stage, &Script::quiet(1), &mut Straight).map(drop)
+    step(&mut harness, &Script::quiet(1), &mut Straight).map(drop)
 }
 
 /// The simulator does not come back.
 fn gone_forever(kit: &Kit) -> Result<(), Failure> {
-    let mut stage = without_simulator(kit, GONE_S)?;
+    let mut harness = without_simulator(kit, GONE_S)?;
     let expected = format!("its process ends when the simulator was gone for {GONE_S} s");
     let patience = PATIENCE + Duration::from_secs(GONE_S.into());
-    let status = stage.until_ended(&expected, patience)?;
+    let status = harness.until_ended(&expected, patience)?;
     if status.success() {
         let expected = "an exit status other than 0 when the simulator is gone";
         return Err(Failure::new(expected, format!("{status}")));
     }
-    stage.until_gone()
+    harness.until_gone()
 }
 
-fn demand_running(stage: &mut Stage<'_>, expected: &str) -> Result<(), Failure> {
-    if stage.process.ended().is_none() {
+fn demand_running(harness: &mut Harness<'_>, expected: &str) -> Result<(), Failure> {
+    if harness.process.ended().is_none() {
         return Ok(());
     }
 
-    Err(Failure::new(expected, stage.process.fate()))
+    Err(Failure::new(expected, harness.process.fate()))
 }

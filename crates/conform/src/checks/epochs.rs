@@ -7,11 +7,11 @@ use protocol::{Epoch, Tick};
 
 use crate::comparison::{Difference, demand_same, difference};
 use crate::findings::Findings;
+use crate::harness::{Harness, Options};
 use crate::kit::Kit;
 use crate::patience::PATIENCE;
 use crate::report::Failure;
-use crate::script::{Disturbance, Script, Straight, play, seated, usual};
-use crate::stage::{Options, Stage};
+use crate::script::{Disturbance, Script, Straight, play, usual, with_robot};
 use crate::transcript::Entry;
 use crate::wire::Joining;
 
@@ -25,9 +25,9 @@ const DRAWN: Tick = 12;
 
 /// Another process, the same seed: the same reports.
 pub(super) fn same_seed(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> {
-    let mut stage = seated(kit, Options::default())?;
-    let again = play(&mut stage, &Script::usual(kit), &mut Straight)?;
-    if let [Ok(request)] = &stage.seen.requests[..]
+    let mut harness = with_robot(kit, Options::default())?;
+    let again = play(&mut harness, &Script::usual(kit), &mut Straight)?;
+    if let [Ok(request)] = &harness.seen.requests[..]
         && request.instance == kit.first_instance()
     {
         let came = format!("two processes have {:?}", request.instance);
@@ -61,18 +61,18 @@ pub(super) fn streams(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
         return Ok(());
     }
 
-    let mut stage = seated(kit, Options::default())?;
-    play(&mut stage, &Script::quiet(DRAWN), &mut Straight)?;
-    let seed = stage.template.seed;
-    let stream = stage.template.stream.clone();
+    let mut harness = with_robot(kit, Options::default())?;
+    play(&mut harness, &Script::quiet(DRAWN), &mut Straight)?;
+    let seed = harness.template.seed;
+    let stream = harness.template.stream.clone();
     let mut by_stream = Vec::new();
     let mut by_seed = Vec::new();
     for number in 1..=DRAWS {
-        by_stream.push(moves(&mut stage, seed, format!("{stream}#{number}"))?);
+        by_stream.push(moves(&mut harness, seed, format!("{stream}#{number}"))?);
         if by_stream.last().is_some_and(Vec::is_empty) {
             return Ok(());
         }
-        by_seed.push(moves(&mut stage, seed + number, stream.clone())?);
+        by_seed.push(moves(&mut harness, seed + number, stream.clone())?);
     }
 
     let expected = format!("{DRAWS} streams and {DRAWS} seeds give different moves");
@@ -101,14 +101,14 @@ fn are_all_different(moves: &[Moves]) -> bool {
 }
 
 /// How the robot moves in a further epoch with this seed and stream.
-fn moves(stage: &mut Stage<'_>, seed: u64, stream: String) -> Result<Moves, Failure> {
-    stage.template.seed = seed;
-    stage.template.stream = stream;
-    let asked = stage.seen.requests.len();
-    stage.begin_epoch(stage.epoch() + 1);
-    let played = play(stage, &Script::quiet(DRAWN), &mut Straight);
+fn moves(harness: &mut Harness<'_>, seed: u64, stream: String) -> Result<Moves, Failure> {
+    harness.template.seed = seed;
+    harness.template.stream = stream;
+    let asked = harness.seen.requests.len();
+    harness.begin_epoch(harness.epoch() + 1);
+    let played = play(harness, &Script::quiet(DRAWN), &mut Straight);
     // A robot that does not start over shows nothing here; that is another rule's matter.
-    if stage.seen.requests.len() == asked {
+    if harness.seen.requests.len() == asked {
         return Ok(Moves::new());
     }
 
@@ -125,35 +125,35 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     /// At tick 0 the robot is welcomed to the epoch that is over before it is welcomed to the next one.
     struct WrongWelcome;
     impl Disturbance for WrongWelcome {
-        fn during(&mut self, stage: &mut Stage<'_>, tick: Tick) -> Result<(), Failure> {
+        fn during(&mut self, harness: &mut Harness<'_>, tick: Tick) -> Result<(), Failure> {
             if tick > 0 {
                 return Ok(());
             }
-            let joining = join_again(stage)?;
-            stage.welcome_to(&joining, 1);
-            stage.settle(QUIET);
+            let joining = join_again(harness)?;
+            harness.welcome_to(&joining, 1);
+            harness.settle(QUIET);
             demand_silence(
-                stage,
+                harness,
                 "welcomed to epoch 1, no report for a clock of epoch 2",
             )?;
-            stage.repeat();
-            let joining = join_again(stage)?;
-            stage.admit(&joining);
-            stage.keeps_requests = false;
+            harness.repeat();
+            let joining = join_again(harness)?;
+            harness.admit(&joining);
+            harness.keeps_requests = false;
             Ok(())
         }
     }
-    let mut stage = seated(kit, Options::default())?;
+    let mut harness = with_robot(kit, Options::default())?;
     let busy = Script {
         ticks: BUSY,
         ..Script::usual(kit)
     };
-    play(&mut stage, &busy, &mut Straight)?;
+    play(&mut harness, &busy, &mut Straight)?;
     let [text, _] = kit.texts();
     // News of a tick that is never granted must not be taken for those of the next epoch.
-    stage.put_news(&News {
+    harness.put_news(&News {
         epoch: 1,
-        tick: stage.next_tick(),
+        tick: harness.next_tick(),
         commands: vec![Delivery {
             from: kit.sender(),
             performative: Performative::Achieve,
@@ -161,14 +161,14 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
         }],
         ..News::default()
     })?;
-    let tokens_lost = stage.seen.tokens_lost;
+    let tokens_lost = harness.seen.tokens_lost;
 
-    stage.begin_epoch(2);
-    stage.keeps_requests = true;
-    let again = play(&mut stage, &Script::usual(kit), &mut WrongWelcome);
-    demand_same_process(&stage)?;
+    harness.begin_epoch(2);
+    harness.keeps_requests = true;
+    let again = play(&mut harness, &Script::usual(kit), &mut WrongWelcome);
+    demand_same_process(&harness)?;
     let again = again?;
-    if stage.seen.tokens_lost > tokens_lost {
+    if harness.seen.tokens_lost > tokens_lost {
         return Err(Failure::new(
             "its token stays declared when an epoch begins",
             "it was undeclared",
@@ -184,35 +184,35 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
 
 /// A robot that has missed the beginning of an epoch joins again, too, and waits until it is named.
 pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
-    let mut stage = seated(kit, Options::default())?;
-    play(&mut stage, &Script::quiet(3), &mut Straight)?;
-    let tokens_lost = stage.seen.tokens_lost;
+    let mut harness = with_robot(kit, Options::default())?;
+    play(&mut harness, &Script::quiet(3), &mut Straight)?;
+    let tokens_lost = harness.seen.tokens_lost;
 
-    stage.begin_epoch(2);
-    stage.miss()?;
-    stage.keeps_requests = true;
+    harness.begin_epoch(2);
+    harness.miss()?;
+    harness.keeps_requests = true;
 
     // A clock that does not name the robot: what the barrier puts for a robot that has not reported names it.
-    stage.is_cut_off = true;
-    stage.open(&News::default())?;
-    stage.put_clock(&Clock {
+    harness.is_cut_off = true;
+    harness.open(&News::default())?;
+    harness.put_clock(&Clock {
         epoch: 2,
         tick: 1,
         ..Clock::default()
     })?;
-    stage.is_cut_off = false;
+    harness.is_cut_off = false;
 
-    let joining = join_again(&mut stage)?;
-    stage.admit(&joining);
-    stage.keeps_requests = false;
-    demand_same_process(&stage)?;
-    stage.settle(QUIET);
+    let joining = join_again(&mut harness)?;
+    harness.admit(&joining);
+    harness.keeps_requests = false;
+    demand_same_process(&harness)?;
+    harness.settle(QUIET);
     let expected = "admitted in tick 1 of an epoch, no report before its news name its generation";
-    demand_silence(&stage, expected)?;
+    demand_silence(&harness, expected)?;
 
-    let transcript = play(&mut stage, &Script::quiet(4), &mut Straight)?;
+    let transcript = play(&mut harness, &Script::quiet(4), &mut Straight)?;
     demand_epoch(&transcript, 2)?;
-    if stage.seen.tokens_lost > tokens_lost {
+    if harness.seen.tokens_lost > tokens_lost {
         return Err(Failure::new(
             "its token stays declared when it joins a further epoch",
             "it was undeclared",
@@ -221,18 +221,18 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     Ok(())
 }
 
-fn join_again(stage: &mut Stage<'_>) -> Result<Joining, Failure> {
-    let epoch = stage.epoch();
-    stage.next_join(PATIENCE).map_err(|failure| {
+fn join_again(harness: &mut Harness<'_>) -> Result<Joining, Failure> {
+    let epoch = harness.epoch();
+    harness.next_join(PATIENCE).map_err(|failure| {
         let expected = format!("another request to join for a clock of epoch {epoch}");
         Failure::new(expected, failure.came)
     })
 }
 
 /// No report of the epoch under way has come.
-fn demand_silence(stage: &Stage<'_>, expected: &str) -> Result<(), Failure> {
-    let epoch = stage.epoch();
-    let mut reports = stage
+fn demand_silence(harness: &Harness<'_>, expected: &str) -> Result<(), Failure> {
+    let epoch = harness.epoch();
+    let mut reports = harness
         .seen
         .answers
         .iter()
@@ -248,10 +248,10 @@ fn demand_silence(stage: &Stage<'_>, expected: &str) -> Result<(), Failure> {
 }
 
 /// It asked to join again as the process that it is.
-fn demand_same_process(stage: &Stage<'_>) -> Result<(), Failure> {
+fn demand_same_process(harness: &Harness<'_>) -> Result<(), Failure> {
     let expected = "further requests to join with the same name and instance when an epoch begins";
     let mut first = None;
-    for request in &stage.seen.requests {
+    for request in &harness.seen.requests {
         let request = match request {
             Ok(JoinRequest { name, instance, .. }) => format!("{name} with instance {instance:?}"),
             Err(error) => return Err(Failure::new(expected, error)),

@@ -6,11 +6,11 @@ use protocol::keys::{QUERIES, STATE};
 use protocol::messages::Refusal;
 
 use crate::findings::Findings;
+use crate::harness::{Harness, Options};
 use crate::kit::Kit;
 use crate::patience::{Limit, PATIENCE, START_PATIENCE};
 use crate::report::Failure;
 use crate::script::{Script, Straight, play};
-use crate::stage::{Options, Stage};
 
 /// For how long a welcome is held back, to see whether the robot waits for it.
 const HELD_BACK: Duration = Duration::from_millis(200);
@@ -21,35 +21,35 @@ const GRACE: Duration = Duration::from_secs(10);
 
 /// Everything is declared before the token, and the token comes after the welcome.
 pub(super) fn ready_last(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
-    let mut stage = Stage::open_run(kit, Options::default())?;
-    stage.prepare()?;
-    let joining = stage.next_join(START_PATIENCE)?;
-    stage.settle(HELD_BACK);
-    if stage.is_present() {
+    let mut harness = Harness::open_run(kit, Options::default())?;
+    harness.prepare()?;
+    let joining = harness.next_join(START_PATIENCE)?;
+    harness.settle(HELD_BACK);
+    if harness.is_present() {
         return Err(Failure::new(
             "its liveliness token after the welcome",
             "it came before",
         ));
     }
-    stage.admit(&joining);
-    stage.keeps_requests = false;
-    stage.until_ready()?;
+    harness.admit(&joining);
+    harness.keeps_requests = false;
+    harness.until_ready()?;
 
     // First what takes longest to look up later: a queryable that is missing now was declared after the token.
     let subject = kit.subject();
     for what in QUERIES.iter().chain([&STATE]) {
-        if stage.ask(what, "")?.is_none() {
+        if harness.ask(what, "")?.is_none() {
             let expected = format!("a queryable of {what} is declared before the token");
             return Err(Failure::new(expected, "the token without it"));
         }
     }
-    for key in [stage.keys.clock(), stage.keys.news(&subject)] {
-        if !stage.has_subscriber(&key)? {
+    for key in [harness.keys.clock(), harness.keys.news(&subject)] {
+        if !harness.has_subscriber(&key)? {
             let expected = format!("a subscriber of {key} is declared before the token");
             return Err(Failure::new(expected, "the token without it"));
         }
     }
-    play(&mut stage, &Script::quiet(2), &mut Straight).map(drop)
+    play(&mut harness, &Script::quiet(2), &mut Straight).map(drop)
 }
 
 /// Refused for good, it ends with the reason on its standard error; refused because its place is taken, it tries again until its patience is over.
@@ -60,12 +60,12 @@ pub(super) fn refused(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
 }
 
 fn refused_for_good(kit: &Kit) -> Result<(), Failure> {
-    let mut stage = Stage::open_run(kit, Options::default())?;
-    let joining = stage.next_join(START_PATIENCE)?;
-    let explanation = format!("no robot of {} has this name", stage.run);
-    stage.refuse_join(&joining, Refusal::UnknownName, &explanation);
+    let mut harness = Harness::open_run(kit, Options::default())?;
+    let joining = harness.next_join(START_PATIENCE)?;
+    let explanation = format!("no robot of {} has this name", harness.run);
+    harness.refuse_join(&joining, Refusal::UnknownName, &explanation);
     let expected = "its process ends when it is refused with unknown_name";
-    let status = stage.until_ended(expected, PATIENCE)?;
+    let status = harness.until_ended(expected, PATIENCE)?;
     if status.success() {
         return Err(Failure::new(
             "an exit status other than 0 when it is refused",
@@ -73,9 +73,9 @@ fn refused_for_good(kit: &Kit) -> Result<(), Failure> {
         ));
     }
 
-    if !bare(&stage.process.errors()).contains(&bare(&explanation)) {
+    if !bare(&harness.process.errors()).contains(&bare(&explanation)) {
         let expected = format!("the explanation on its standard error: {explanation}");
-        return Err(Failure::new(expected, stage.process.fate()));
+        return Err(Failure::new(expected, harness.process.fate()));
     }
     Ok(())
 }
@@ -86,27 +86,27 @@ fn bare(text: &str) -> String {
 }
 
 fn taken_for_a_while(kit: &Kit) -> Result<(), Failure> {
-    let mut stage = Stage::open_run(kit, Options::default())?;
-    stage.prepare()?;
+    let mut harness = Harness::open_run(kit, Options::default())?;
+    harness.prepare()?;
     for _ in 0..TAKEN {
-        let joining = stage.next_join(START_PATIENCE)?;
-        stage.refuse_join(
+        let joining = harness.next_join(START_PATIENCE)?;
+        harness.refuse_join(
             &joining,
             Refusal::NameTaken,
             "another process is this robot",
         );
     }
 
-    let joining = stage.next_join(PATIENCE).map_err(|failure| {
+    let joining = harness.next_join(PATIENCE).map_err(|failure| {
         Failure::new(
             "another request to join after its place was taken (name_taken)",
             failure.came,
         )
     })?;
-    stage.admit(&joining);
-    stage.keeps_requests = false;
-    stage.until_ready()?;
-    play(&mut stage, &Script::quiet(2), &mut Straight).map(drop)
+    harness.admit(&joining);
+    harness.keeps_requests = false;
+    harness.until_ready()?;
+    play(&mut harness, &Script::quiet(2), &mut Straight).map(drop)
 }
 
 fn taken_forever(kit: &Kit) -> Result<(), Failure> {
@@ -115,19 +115,19 @@ fn taken_forever(kit: &Kit) -> Result<(), Failure> {
         ..Options::default()
     };
     let patience = Duration::from_secs(u64::from(options.patience_s)) + GRACE;
-    let mut stage = Stage::open_run(kit, options)?;
+    let mut harness = Harness::open_run(kit, options)?;
     let explanation = "another process is this robot";
     let expected = "its process ends when its place stays taken for longer than CARS_PATIENCE_S";
-    let first = stage.next_join(START_PATIENCE)?;
-    stage.refuse_join(&first, Refusal::NameTaken, explanation);
+    let first = harness.next_join(START_PATIENCE)?;
+    harness.refuse_join(&first, Refusal::NameTaken, explanation);
 
     let mut limit = Limit::new(patience);
-    while stage.process.ended().is_none() && !limit.is_over(&stage.process) {
-        if let Ok(joining) = stage.next_join(Duration::from_millis(100)) {
-            stage.refuse_join(&joining, Refusal::NameTaken, explanation);
+    while harness.process.ended().is_none() && !limit.is_over(&harness.process) {
+        if let Ok(joining) = harness.next_join(Duration::from_millis(100)) {
+            harness.refuse_join(&joining, Refusal::NameTaken, explanation);
         }
     }
-    let status = stage.until_ended(expected, Duration::ZERO)?;
+    let status = harness.until_ended(expected, Duration::ZERO)?;
     if status.success() {
         return Err(Failure::new(
             "an exit status other than 0 when it gives up",

@@ -7,10 +7,10 @@ use protocol::messages::{Clock, Correction, News, Point};
 
 use crate::comparison::demand_same;
 use crate::findings::Findings;
+use crate::harness::{Harness, Options};
 use crate::kit::Kit;
 use crate::report::Failure;
-use crate::script::{Disturbance, Script, Straight, play, seated, usual};
-use crate::stage::{Options, Stage};
+use crate::script::{Disturbance, Script, Straight, play, usual, with_robot};
 
 /// A report that must not come has come after this time.
 const QUIET: Duration = Duration::from_millis(150);
@@ -22,20 +22,20 @@ pub(super) fn wait(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     /// The news of the first ticks come after their clock, and after news of other ticks and epochs.
     struct LateNews;
     impl Disturbance for LateNews {
-        fn before(&mut self, stage: &mut Stage<'_>, tick: Tick) -> Result<(), Failure> {
-            stage.withholds_news = tick <= LATE_UP_TO;
+        fn before(&mut self, harness: &mut Harness<'_>, tick: Tick) -> Result<(), Failure> {
+            harness.withholds_news = tick <= LATE_UP_TO;
             Ok(())
         }
 
-        fn during(&mut self, stage: &mut Stage<'_>, tick: Tick) -> Result<(), Failure> {
-            let news = stage.open_news();
+        fn during(&mut self, harness: &mut Harness<'_>, tick: Tick) -> Result<(), Failure> {
+            let news = harness.open_news();
             if tick > LATE_UP_TO || news.is_empty() {
                 return Ok(());
             }
 
-            put_stale(stage, tick)?;
-            stage.settle(QUIET);
-            let has_answered = stage.seen.answers.iter().any(|answer| {
+            put_stale(harness, tick)?;
+            harness.settle(QUIET);
+            let has_answered = harness.seen.answers.iter().any(|answer| {
                 let report = &answer.reading.report;
                 (report.epoch, report.tick) == (news.epoch, tick)
             });
@@ -47,11 +47,11 @@ pub(super) fn wait(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
                     "a report",
                 ));
             }
-            stage.put_news(&news)
+            harness.put_news(&news)
         }
     }
-    let mut stage = seated(kit, Options::default())?;
-    let played = play(&mut stage, &Script::usual(kit), &mut LateNews)?;
+    let mut harness = with_robot(kit, Options::default())?;
+    let played = play(&mut harness, &Script::usual(kit), &mut LateNews)?;
     demand_same(
         kit,
         "that its news come after the clock",
@@ -63,16 +63,16 @@ pub(super) fn wait(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
 }
 
 /// News of the tick before and of the epoch before, which would move the robot.
-fn put_stale(stage: &Stage<'_>, tick: Tick) -> Result<(), Failure> {
+fn put_stale(harness: &Harness<'_>, tick: Tick) -> Result<(), Failure> {
     let elsewhere = Some(Correction {
         location: Point::new(1.0, 1.0),
         blocked: true,
     });
 
-    let of_other_epoch = (stage.epoch() - 1, tick);
-    let of_other_tick = tick.checked_sub(1).map(|before| (stage.epoch(), before));
+    let of_other_epoch = (harness.epoch() - 1, tick);
+    let of_other_tick = tick.checked_sub(1).map(|before| (harness.epoch(), before));
     for (epoch, tick) in of_other_tick.into_iter().chain([of_other_epoch]) {
-        stage.put_news(&News {
+        harness.put_news(&News {
             epoch,
             tick,
             correction: elsewhere,
@@ -84,20 +84,20 @@ fn put_stale(stage: &Stage<'_>, tick: Tick) -> Result<(), Failure> {
 
 /// Flags of other robots do not concern it.
 fn others_flags(kit: &Kit) -> Result<(), Failure> {
-    let mut stage = seated(kit, Options::default())?;
-    play(&mut stage, &Script::quiet(2), &mut Straight)?;
+    let mut harness = with_robot(kit, Options::default())?;
+    play(&mut harness, &Script::quiet(2), &mut Straight)?;
 
     // The barrier's own clock, which has no flag, does not reach the robot.
-    stage.is_cut_off = true;
-    stage.open(&News::default())?;
-    stage.put_clock(&Clock {
+    harness.is_cut_off = true;
+    harness.open(&News::default())?;
+    harness.put_clock(&Clock {
         epoch: 1,
         tick: 3,
-        news: !stage.flag(),
+        news: !harness.flag(),
         end: None,
     })?;
 
-    stage.complete().map(drop).map_err(|failure| {
+    harness.complete().map(drop).map_err(|failure| {
         Failure::new(
             "a report for a clock that has the flags of other robots only, without any news",
             failure.came,

@@ -10,11 +10,11 @@ use protocol::{Epoch, Tick, decode};
 use super::{computing, waiting, wire};
 use crate::comparison::demand_same;
 use crate::findings::Findings;
+use crate::harness::{Harness, Options};
 use crate::kit::Kit;
 use crate::patience::{PATIENCE, in_each_attempt};
 use crate::report::Failure;
-use crate::script::{Disturbance, Script, Straight, play, seated, usual};
-use crate::stage::{Options, Stage};
+use crate::script::{Disturbance, Script, Straight, play, usual, with_robot};
 use crate::transcript::Entry;
 
 /// The kit's own limit where it waits until all replies are in.
@@ -43,7 +43,7 @@ struct StateQueries {
 
 /// What a robot shows in every tick: the tick before, and where it stands.
 pub(super) fn by_tick(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> {
-    let mut stage = seated(
+    let mut harness = with_robot(
         kit,
         Options {
             is_followed: true,
@@ -53,13 +53,13 @@ pub(super) fn by_tick(kit: &Kit, findings: &mut Findings) -> Result<(), Failure>
     let mut queries = StateQueries {
         findings: Findings::default(),
         before: None,
-        location: stage.template.location,
+        location: harness.template.location,
     };
 
-    let played = play(&mut stage, &Script::usual(kit), &mut queries);
-    wire::check(&stage, findings);
+    let played = play(&mut harness, &Script::usual(kit), &mut queries);
+    wire::check(&harness, findings);
     findings.0.extend(queries.findings.0);
-    if stage.seen.states.is_empty() {
+    if harness.seen.states.is_empty() {
         let came = "in none of the ticks, although there is a subscriber";
         findings.fail(
             "tick.state-first",
@@ -67,18 +67,18 @@ pub(super) fn by_tick(kit: &Kit, findings: &mut Findings) -> Result<(), Failure>
         );
     }
     played?;
-    demand_refused(&mut stage, findings);
+    demand_refused(&mut harness, findings);
     Ok(())
 }
 
 /// The state of a tick, if that is what the robot shows.
 fn state_of(
-    stage: &Stage<'_>,
+    harness: &Harness<'_>,
     epoch: Epoch,
     tick: Tick,
     expected: &str,
 ) -> Result<Result<PublicState, Failure>, Failure> {
-    let reply = stage.state_in(epoch, tick + 1)?;
+    let reply = harness.state_in(epoch, tick + 1)?;
     let shown = state(reply, expected).and_then(|now| {
         if (now.epoch, now.tick) == (epoch, tick) {
             return Ok(now);
@@ -94,7 +94,7 @@ fn state_of(
 
 /// The same, for a robot that shows it after its report.
 fn late_state_of(
-    stage: &Stage<'_>,
+    harness: &Harness<'_>,
     epoch: Epoch,
     tick: Tick,
     expected: &str,
@@ -102,7 +102,7 @@ fn late_state_of(
     let begun = Instant::now();
 
     loop {
-        let came = state_of(stage, epoch, tick, expected)?;
+        let came = state_of(harness, epoch, tick, expected)?;
         if came.is_ok() || begun.elapsed() > LATE {
             return Ok(came);
         }
@@ -126,18 +126,18 @@ pub(super) fn state(answer: Option<Reply>, expected: &str) -> Result<PublicState
 }
 
 impl Disturbance for StateQueries {
-    fn after(&mut self, stage: &mut Stage<'_>, entry: &Entry) -> Result<(), Failure> {
+    fn after(&mut self, harness: &mut Harness<'_>, entry: &Entry) -> Result<(), Failure> {
         let epoch = entry.epoch;
         let tick = entry.tick;
         let expected = format!("asked with tick={}, the state of tick {tick}", tick + 1);
         // At once after the report: a robot that runs the next tick may query it.
-        let mut came = state_of(stage, epoch, tick, &expected)?;
+        let mut came = state_of(harness, epoch, tick, &expected)?;
         if let Err(failure) = came {
             // It takes time to find out that a state never comes: once is enough.
             if self.findings.has_failed("query.tick") {
                 return Ok(());
             }
-            came = late_state_of(stage, epoch, tick, &expected)?;
+            came = late_state_of(harness, epoch, tick, &expected)?;
             let rule = if came.is_ok() {
                 "tick.state-first"
             } else {
@@ -148,12 +148,12 @@ impl Disturbance for StateQueries {
         let Ok(now) = came else { return Ok(()) };
 
         self.findings
-            .settle("tick.state-first", check_followed(stage, entry, &now));
+            .settle("tick.state-first", check_followed(harness, entry, &now));
         self.check_location(entry, &now);
         let matched = check_state(entry, &now)
-            .and_then(|()| self.check_before(stage, epoch, tick))
-            .and_then(|()| check_newest(stage, tick, &now))
-            .and_then(|()| check_six(stage, epoch, tick, &now));
+            .and_then(|()| self.check_before(harness, epoch, tick))
+            .and_then(|()| check_newest(harness, tick, &now))
+            .and_then(|()| check_six(harness, epoch, tick, &now));
         self.findings.settle("query.tick", matched);
 
         self.before = Some(now);
@@ -192,7 +192,7 @@ impl StateQueries {
     }
 
     /// The tick before can still be queried.
-    fn check_before(&self, stage: &Stage<'_>, epoch: Epoch, tick: Tick) -> Result<(), Failure> {
+    fn check_before(&self, harness: &Harness<'_>, epoch: Epoch, tick: Tick) -> Result<(), Failure> {
         let Some(before) = &self.before else {
             return Ok(());
         };
@@ -200,7 +200,7 @@ impl StateQueries {
             "asked with tick={tick}, still the state of tick {}",
             before.tick
         );
-        let came = state(stage.state_in(epoch, tick)?, &expected)?;
+        let came = state(harness.state_in(epoch, tick)?, &expected)?;
 
         if came != *before {
             return Err(Failure::new(expected, format!("{came:?}")));
@@ -210,15 +210,15 @@ impl StateQueries {
 }
 
 /// What is put for subscribers comes before the report, in every tick once the robot knows of a subscriber.
-fn check_followed(stage: &Stage<'_>, entry: &Entry, now: &PublicState) -> Result<(), Failure> {
+fn check_followed(harness: &Harness<'_>, entry: &Entry, now: &PublicState) -> Result<(), Failure> {
     let tick = entry.tick;
-    let report = stage
+    let report = harness
         .seen
         .answers
         .get(entry.index)
         .map_or(usize::MAX, |answer| answer.order);
 
-    let mut before = stage
+    let mut before = harness
         .seen
         .states
         .iter()
@@ -263,13 +263,13 @@ fn check_state(entry: &Entry, now: &PublicState) -> Result<(), Failure> {
 }
 
 /// Queried without parameters, it shows its newest state.
-fn check_newest(stage: &Stage<'_>, tick: Tick, now: &PublicState) -> Result<(), Failure> {
+fn check_newest(harness: &Harness<'_>, tick: Tick, now: &PublicState) -> Result<(), Failure> {
     if !tick.is_multiple_of(ROUND) {
         return Ok(());
     }
 
     let expected = format!("asked without parameters after tick {tick}, the state of tick {tick}");
-    let came = state(stage.ask(STATE, "")?, &expected)?;
+    let came = state(harness.ask(STATE, "")?, &expected)?;
     if came != *now {
         return Err(Failure::new(expected, format!("{came:?}")));
     }
@@ -278,7 +278,7 @@ fn check_newest(stage: &Stage<'_>, tick: Tick, now: &PublicState) -> Result<(), 
 
 /// The six queries have the same answers, each its part.
 fn check_six(
-    stage: &Stage<'_>,
+    harness: &Harness<'_>,
     epoch: Epoch,
     tick: Tick,
     now: &PublicState,
@@ -292,7 +292,7 @@ fn check_six(
             "the answer to {what} for tick {tick}: {:?}",
             now.answer(what)
         );
-        let came = match stage.ask(what, &format!("tick={};epoch={epoch}", tick + 1))? {
+        let came = match harness.ask(what, &format!("tick={};epoch={epoch}", tick + 1))? {
             Some(Reply {
                 result: Ok(bytes), ..
             }) => decode::<Answer>(what, "the robot", &bytes)
@@ -330,13 +330,13 @@ fn same_value(one: &serde_json::Value, two: &serde_json::Value) -> bool {
 }
 
 /// Queried for what it does not have, it refuses at once, in words.
-fn demand_refused(stage: &mut Stage<'_>, findings: &mut Findings) {
-    let result = try_refused(stage);
+fn demand_refused(harness: &mut Harness<'_>, findings: &mut Findings) {
+    let result = try_refused(harness);
     findings.settle("query.tick", result);
 }
 
-fn try_refused(stage: &Stage<'_>) -> Result<(), Failure> {
-    let now = stage.next_tick() - 1;
+fn try_refused(harness: &Harness<'_>) -> Result<(), Failure> {
+    let now = harness.next_tick() - 1;
     let never = [
         (1, now + 2),
         (2, 1),
@@ -352,7 +352,7 @@ fn try_refused(stage: &Stage<'_>) -> Result<(), Failure> {
         let expected = format!(
             "after tick {now} of epoch 1, an error reply in words to tick={tick};epoch={epoch}, at once"
         );
-        match stage.state_in(epoch, tick)? {
+        match harness.state_in(epoch, tick)? {
             Some(Reply {
                 result: Err(words), ..
             }) if !words.trim().is_empty() => {}
@@ -374,25 +374,25 @@ fn try_refused(stage: &Stage<'_>) -> Result<(), Failure> {
 pub(super) fn at_once(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> {
     computing::check(kit)?;
 
-    let mut stage = waiting::for_news(kit)?;
-    demand_replies(&mut stage, "while it waits for its news")?;
+    let mut harness = waiting::for_news(kit)?;
+    demand_replies(&mut harness, "while it waits for its news")?;
 
-    let (mut stage, is_asking) = waiting::for_another(kit)?;
+    let (mut harness, is_asking) = waiting::for_another(kit)?;
     if !is_asking {
         let reason = "no fault was found, but the robot queried no other one, so that this was not checked while it \
                       waits for another robot's answer";
         findings.skip("query.at-once", reason);
         return Ok(());
     }
-    demand_replies(&mut stage, "while it waits for another robot's answer")?;
-    stage.cast.release();
-    stage.complete().map(drop)
+    demand_replies(&mut harness, "while it waits for another robot's answer")?;
+    harness.fake_peers.release();
+    harness.complete().map(drop)
 }
 
 /// The robot answers in the open tick. Its wait lasts until the kit ends it, so that no answer is late: it comes or not. A
 /// robot that does not wait gives no occasion to see it.
-fn demand_replies(stage: &mut Stage<'_>, when: &str) -> Result<(), Failure> {
-    let tick = stage.next_tick() - 1;
+fn demand_replies(harness: &mut Harness<'_>, when: &str) -> Result<(), Failure> {
+    let tick = harness.next_tick() - 1;
     let expected = format!(
         "queried in tick {tick} {when}, the state of tick {} at once",
         tick - 1
@@ -400,8 +400,8 @@ fn demand_replies(stage: &mut Stage<'_>, when: &str) -> Result<(), Failure> {
 
     for _ in 0..TIMES {
         let begun = Instant::now();
-        let reply = reply_in(stage, tick, &expected)?;
-        if !stage.is_open() {
+        let reply = reply_in(harness, tick, &expected)?;
+        if !harness.is_open() {
             if begun.elapsed() < DEFERRED {
                 return Ok(());
             }
@@ -415,20 +415,24 @@ fn demand_replies(stage: &mut Stage<'_>, when: &str) -> Result<(), Failure> {
                 format!("the state of tick {}", came.tick),
             ));
         }
-        stage.pass(APART);
+        harness.pass(APART);
     }
     Ok(())
 }
 
 /// The robot's reply; `None` if the tick is over before there is one.
-fn reply_in(stage: &mut Stage<'_>, tick: Tick, expected: &str) -> Result<Option<Reply>, Failure> {
+fn reply_in(
+    harness: &mut Harness<'_>,
+    tick: Tick,
+    expected: &str,
+) -> Result<Option<Reply>, Failure> {
     for _ in 0..ATTEMPTS {
-        let number = stage.begin_query(stage.epoch(), tick)?;
-        let reply = stage.until(expected, PATIENCE, |stage| {
-            let (_, reply) = stage.seen.replies.get(&number)?;
+        let number = harness.begin_query(harness.epoch(), tick)?;
+        let reply = harness.until(expected, PATIENCE, |harness| {
+            let (_, reply) = harness.seen.replies.get(&number)?;
             Some(reply.clone())
         })?;
-        if reply.is_some() || !stage.is_open() {
+        if reply.is_some() || !harness.is_open() {
             return Ok(reply);
         }
     }
@@ -437,9 +441,9 @@ fn reply_in(stage: &mut Stage<'_>, tick: Tick, expected: &str) -> Result<Option<
 
 /// What it asks others: with tick and epoch, not at tick 0, not those that it cannot reach.
 pub(super) fn asking(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> {
-    let mut stage = waiting::of_queries(kit)?;
-    let played = play(&mut stage, &Script::usual(kit), &mut Straight)?;
-    let asked = stage.cast.asked();
+    let mut harness = waiting::of_queries(kit)?;
+    let played = play(&mut harness, &Script::usual(kit), &mut Straight)?;
+    let asked = harness.fake_peers.asked();
     if asked.is_empty() {
         findings.skip("query.asking", "the robot queried no other one");
         return Ok(());
@@ -472,23 +476,23 @@ pub(super) fn asking(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> 
 
 /// Each query has exactly one reply, the query object is released, and the robot has no queryable of another key.
 pub(super) fn once(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
-    let mut stage = seated(kit, Options::default())?;
-    play(&mut stage, &Script::quiet(3), &mut Straight)?;
+    let mut harness = with_robot(kit, Options::default())?;
+    play(&mut harness, &Script::quiet(3), &mut Straight)?;
     for what in QUERIES.iter().chain([&STATE]) {
-        in_each_attempt(|scale| demand_one_reply(&stage, what, ALL_REPLIES * scale))?;
+        in_each_attempt(|scale| demand_one_reply(&harness, what, ALL_REPLIES * scale))?;
     }
 
     let subject = kit.subject();
     for what in ["percept", "news", "report", "panel", "waiting"] {
-        let key = stage.keys.query(&subject, what);
+        let key = harness.keys.query(&subject, what);
         let replies = kit.bus.get_all(&key, "", ALL_REPLIES)?;
         if !replies.is_empty() {
             let expected = format!("no queryable of {what}: a robot declares its seven keys");
             return Err(Failure::new(expected, "a reply"));
         }
     }
-    for other in stage.cast.names() {
-        let key = stage.keys.query(other, STATE);
+    for other in harness.fake_peers.names() {
+        let key = harness.keys.query(other, STATE);
         let replies = kit.bus.get_all(&key, "tick=4;epoch=1", ALL_REPLIES)?;
         if replies.len() > 1 {
             let expected = format!("no reply of its own to a query of {other}");
@@ -499,10 +503,10 @@ pub(super) fn once(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
 }
 
 /// One reply, and the end of the query with it: a query that is not released takes all the time that the kit has.
-fn demand_one_reply(stage: &Stage<'_>, what: &str, patience: Duration) -> Result<(), Failure> {
-    let key = stage.keys.query(&stage.kit.subject(), what);
+fn demand_one_reply(harness: &Harness<'_>, what: &str, patience: Duration) -> Result<(), Failure> {
+    let key = harness.keys.query(&harness.kit.subject(), what);
     let begun = Instant::now();
-    let replies = stage.kit.bus.get_all(&key, "tick=4;epoch=1", patience)?;
+    let replies = harness.kit.bus.get_all(&key, "tick=4;epoch=1", patience)?;
     let took = begun.elapsed();
 
     if replies.len() != 1 {
@@ -524,7 +528,7 @@ fn demand_one_reply(stage: &Stage<'_>, what: &str, patience: Duration) -> Result
 pub(super) fn unknown(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     struct Odd;
     impl Disturbance for Odd {
-        fn after(&mut self, stage: &mut Stage<'_>, entry: &Entry) -> Result<(), Failure> {
+        fn after(&mut self, harness: &mut Harness<'_>, entry: &Entry) -> Result<(), Failure> {
             if !entry.tick.is_multiple_of(8) {
                 return Ok(());
             }
@@ -537,7 +541,7 @@ pub(super) fn unknown(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
             ] {
                 if let Some(Reply {
                     result: Ok(bytes), ..
-                }) = stage.ask(what, parameters)?
+                }) = harness.ask(what, parameters)?
                 {
                     let expected = format!("no answer to {what}?{parameters}: refused, or none");
                     return Err(Failure::new(expected, String::from_utf8_lossy(&bytes)));
@@ -547,7 +551,7 @@ pub(super) fn unknown(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
         }
     }
 
-    let mut stage = seated(kit, Options::default())?;
-    let asked = play(&mut stage, &Script::usual(kit), &mut Odd)?;
+    let mut harness = with_robot(kit, Options::default())?;
+    let asked = play(&mut harness, &Script::usual(kit), &mut Odd)?;
     demand_same(kit, "a query for what does not exist", usual(kit)?, &asked)
 }

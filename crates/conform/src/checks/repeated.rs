@@ -8,12 +8,12 @@ use protocol::{Epoch, Tick};
 
 use crate::comparison::demand_same;
 use crate::findings::Findings;
+use crate::harness::{Harness, Options};
 use crate::kit::Kit;
 use crate::patience::PATIENCE;
 use crate::report::Failure;
-use crate::script::{Disturbance, Script, play, seated, usual};
+use crate::script::{Disturbance, Script, play, usual, with_robot};
 use crate::seen::{Answer, Sent};
-use crate::stage::{Options, Stage};
 use crate::transcript::Entry;
 
 /// One clock in so many comes again, and each whose tick had commands.
@@ -27,55 +27,57 @@ const COMMANDS_PATIENCE: Duration = Duration::from_secs(2);
 pub(super) fn duplicate(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     struct Again;
     impl Disturbance for Again {
-        fn after(&mut self, stage: &mut Stage<'_>, entry: &Entry) -> Result<(), Failure> {
+        fn after(&mut self, harness: &mut Harness<'_>, entry: &Entry) -> Result<(), Failure> {
             if entry.tick.is_multiple_of(EVERY) || !entry.commands.is_empty() {
-                repeat(stage, entry)?;
+                repeat(harness, entry)?;
             }
             Ok(())
         }
     }
-    let mut stage = seated(kit, Options::default())?;
-    let repeated = play(&mut stage, &Script::usual(kit), &mut Again)?;
+    let mut harness = with_robot(kit, Options::default())?;
+    let repeated = play(&mut harness, &Script::usual(kit), &mut Again)?;
     demand_same(kit, "a clock that comes again", usual(kit)?, &repeated)
 }
 
 /// Repeats the clock of a tick, and waits for its report and its commands.
-fn repeat(stage: &mut Stage<'_>, entry: &Entry) -> Result<(), Failure> {
+fn repeat(harness: &mut Harness<'_>, entry: &Entry) -> Result<(), Failure> {
     // A robot that reports twice by itself breaks another rule: what it still sends is not the repetition.
-    stage.pass(BEFORE_REPEATING);
-    let since = stage.seen.count;
-    stage.repeat();
+    harness.pass(BEFORE_REPEATING);
+    let since = harness.seen.count;
+    harness.repeat();
 
     let tick = entry.tick;
     let expected = format!("the report of tick {tick} again when its clock comes again");
-    stage.until(&expected, PATIENCE, |stage| {
-        answers_of(stage, tick)
+    harness.until(&expected, PATIENCE, |harness| {
+        answers_of(harness, tick)
             .any(|answer| answer.order >= since)
             .then_some(())
     })?;
-    let mut answers = answers_of(stage, tick);
+    let mut answers = answers_of(harness, tick);
     let first = answers.next().map(|answer| answer.bytes.clone());
     for again in answers {
         demand_bytes("report", first.as_deref().unwrap_or_default(), &again.bytes)?;
     }
 
     // A second report that the robot put by itself may have come before the one that follows the commands.
-    let came = stage.until("", COMMANDS_PATIENCE, |stage| {
-        let report = answers_of(stage, tick).last()?.order;
-        missing(stage, entry, since, report).is_none().then_some(())
+    let came = harness.until("", COMMANDS_PATIENCE, |harness| {
+        let report = answers_of(harness, tick).last()?.order;
+        missing(harness, entry, since, report)
+            .is_none()
+            .then_some(())
     });
     if came.is_err() {
-        let report = answers_of(stage, tick).last();
+        let report = answers_of(harness, tick).last();
         let report = report.map_or(usize::MAX, |answer| answer.order);
         let expected = format!(
             "command {} of tick {tick} again, before the report, when the clock of tick {tick} comes again",
-            missing(stage, entry, since, report).unwrap_or_default()
+            missing(harness, entry, since, report).unwrap_or_default()
         );
         return Err(Failure::new(expected, "the report without it"));
     }
 
     for first in &entry.commands {
-        for again in commands_since(stage, since) {
+        for again in commands_since(harness, since) {
             if again.number() == first.number() && again.tick() == Some(tick) {
                 demand_bytes("command", &first.bytes, &again.bytes)?;
             }
@@ -84,8 +86,8 @@ fn repeat(stage: &mut Stage<'_>, entry: &Entry) -> Result<(), Failure> {
     Ok(())
 }
 
-fn answers_of<'s>(stage: &'s Stage<'_>, tick: Tick) -> impl Iterator<Item = &'s Answer> {
-    stage
+fn answers_of<'s>(harness: &'s Harness<'_>, tick: Tick) -> impl Iterator<Item = &'s Answer> {
+    harness
         .seen
         .answers
         .iter()
@@ -93,8 +95,8 @@ fn answers_of<'s>(stage: &'s Stage<'_>, tick: Tick) -> impl Iterator<Item = &'s 
 }
 
 /// Commands that came since a place among all that came.
-fn commands_since<'s>(stage: &'s Stage<'_>, since: usize) -> impl Iterator<Item = &'s Sent> {
-    stage
+fn commands_since<'s>(harness: &'s Harness<'_>, since: usize) -> impl Iterator<Item = &'s Sent> {
+    harness
         .seen
         .commands
         .iter()
@@ -102,8 +104,8 @@ fn commands_since<'s>(stage: &'s Stage<'_>, since: usize) -> impl Iterator<Item 
 }
 
 /// The number of a command of the tick that did not come again between two places among all that came.
-fn missing(stage: &Stage<'_>, entry: &Entry, since: usize, report: usize) -> Option<u32> {
-    let came: BTreeSet<Option<u32>> = commands_since(stage, since)
+fn missing(harness: &Harness<'_>, entry: &Entry, since: usize, report: usize) -> Option<u32> {
+    let came: BTreeSet<Option<u32>> = commands_since(harness, since)
         .filter(|sent| sent.order < report && sent.tick() == Some(entry.tick))
         .map(Sent::number)
         .collect();
@@ -127,8 +129,8 @@ fn demand_bytes(what: &str, first: &[u8], again: &[u8]) -> Result<(), Failure> {
     ))
 }
 
-fn count_of(stage: &Stage<'_>, (epoch, tick): (Epoch, Tick)) -> usize {
-    answers_of(stage, tick)
+fn count_of(harness: &Harness<'_>, (epoch, tick): (Epoch, Tick)) -> usize {
+    answers_of(harness, tick)
         .filter(|answer| answer.reading.report.epoch == epoch)
         .count()
 }
@@ -138,17 +140,17 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     /// Reports that had come for the late clocks' epochs and ticks before they were put.
     struct Late(Vec<((Epoch, Tick), usize)>);
     impl Disturbance for Late {
-        fn before(&mut self, stage: &mut Stage<'_>, tick: Tick) -> Result<(), Failure> {
+        fn before(&mut self, harness: &mut Harness<'_>, tick: Tick) -> Result<(), Failure> {
             if tick < 6 || !tick.is_multiple_of(EVERY) {
                 return Ok(());
             }
 
             let late = [(1, tick - 2), (1, tick - 5), (0, tick), (0, tick + 9)];
-            self.0 = late.map(|of| (of, count_of(stage, of))).into();
-            let flag = stage.flag();
+            self.0 = late.map(|of| (of, count_of(harness, of))).into();
+            let flag = harness.flag();
             for (epoch, tick) in late {
                 // If it took them for its own, it would stand elsewhere.
-                stage.put_news(&News {
+                harness.put_news(&News {
                     epoch,
                     tick,
                     correction: Some(Correction {
@@ -157,7 +159,7 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
                     }),
                     ..News::default()
                 })?;
-                stage.put_clock(&Clock {
+                harness.put_clock(&Clock {
                     epoch,
                     tick,
                     news: flag,
@@ -167,12 +169,12 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
             Ok(())
         }
 
-        fn after(&mut self, stage: &mut Stage<'_>, _: &Entry) -> Result<(), Failure> {
+        fn after(&mut self, harness: &mut Harness<'_>, _: &Entry) -> Result<(), Failure> {
             // In order on one link: an answer to a late clock would have come before that to this one.
             let answered = self
                 .0
                 .iter()
-                .find(|(of, before)| count_of(stage, *of) > *before);
+                .find(|(of, before)| count_of(harness, *of) > *before);
             match answered {
                 None => Ok(()),
                 Some(((epoch, tick), _)) => {
@@ -182,8 +184,8 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
             }
         }
     }
-    let mut stage = seated(kit, Options::default())?;
-    let played = play(&mut stage, &Script::usual(kit), &mut Late(Vec::new()))?;
+    let mut harness = with_robot(kit, Options::default())?;
+    let played = play(&mut harness, &Script::usual(kit), &mut Late(Vec::new()))?;
     demand_same(
         kit,
         "a clock of an earlier tick or epoch",

@@ -7,11 +7,11 @@ use protocol::{Generation, Tick};
 
 use crate::comparison::demand_same;
 use crate::findings::Findings;
+use crate::harness::{Harness, Options};
 use crate::kit::Kit;
 use crate::patience::PATIENCE;
 use crate::report::Failure;
-use crate::script::{Script, Straight, play, seated, step, usual};
-use crate::stage::{Options, Stage};
+use crate::script::{Script, Straight, play, step, usual, with_robot};
 use crate::transcript::Entry;
 
 /// The last tick of the predecessor.
@@ -35,42 +35,42 @@ fn state_of(entry: &Entry) -> PublicState {
     }
 }
 
-/// A stage on which the robot has joined as a second incarnation, whose predecessor was gone after tick `last`.
-fn returned(kit: &Kit, last: Tick) -> Result<Stage<'_>, Failure> {
-    let mut stage = Stage::open_run(kit, Options::default())?;
-    stage.prepare()?;
-    stage.play_predecessor(last)?;
-    bequeath(kit, &mut stage)?;
-    stage.admit_first()?;
-    Ok(stage)
+/// A harness on which the robot has joined as a second incarnation, whose predecessor was gone after tick `last`.
+fn returned(kit: &Kit, last: Tick) -> Result<Harness<'_>, Failure> {
+    let mut harness = Harness::open_run(kit, Options::default())?;
+    harness.prepare()?;
+    harness.play_predecessor(last)?;
+    bequeath(kit, &mut harness)?;
+    harness.admit_first()?;
+    Ok(harness)
 }
 
 /// Further welcomes are those of a second incarnation. Its predecessor has reported as usual, [`LAST`] being the last tick.
-fn bequeath(kit: &Kit, stage: &mut Stage<'_>) -> Result<(), Failure> {
+fn bequeath(kit: &Kit, harness: &mut Harness<'_>) -> Result<(), Failure> {
     let state =
         |tick| usual(kit).map(|usual| usual.iter().find(|entry| entry.tick == tick).map(state_of));
 
-    stage.template.state_before = state(LAST - 1)?;
-    stage.template.last_state = state(LAST)?;
-    stage.template.stream = format!("robot/{}#{GENERATION}", stage.template.name);
-    if let Some(last) = &stage.template.last_state {
-        stage.template.location = last.location;
+    harness.template.state_before = state(LAST - 1)?;
+    harness.template.last_state = state(LAST)?;
+    harness.template.stream = format!("robot/{}#{GENERATION}", harness.template.name);
+    if let Some(last) = &harness.template.last_state {
+        harness.template.location = last.location;
     }
     Ok(())
 }
 
 /// It waits for the news that name it, shows meanwhile what its predecessor reported, and reports as what it is.
 pub(super) fn generation(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
-    let mut stage = returned(kit, LAST)?;
+    let mut harness = returned(kit, LAST)?;
     // The last tick was its predecessor's; the next one may go on without it.
-    stage.repeat();
-    stage.put_clock(&Clock {
+    harness.repeat();
+    harness.put_clock(&Clock {
         epoch: 1,
         tick: LAST + 1,
         ..Clock::default()
     })?;
-    stage.settle(QUIET);
-    if let Some(answer) = stage.seen.answers.first() {
+    harness.settle(QUIET);
+    if let Some(answer) = harness.seen.answers.first() {
         let came = format!("a report for tick {}", answer.reading.report.tick);
         return Err(Failure::new(
             "no report before its news name its generation",
@@ -79,15 +79,15 @@ pub(super) fn generation(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     }
 
     let states = [
-        stage.template.state_before.clone(),
-        stage.template.last_state.clone(),
+        harness.template.state_before.clone(),
+        harness.template.last_state.clone(),
     ];
     for state in states.into_iter().flatten() {
         let expected = format!(
             "queried before its first report, the state of tick {} of its welcome",
             state.tick
         );
-        let came = super::queries::state(stage.state_in(1, state.tick + 1)?, &expected)?;
+        let came = super::queries::state(harness.state_in(1, state.tick + 1)?, &expected)?;
         if came != state {
             return Err(Failure::new(
                 expected,
@@ -96,7 +96,7 @@ pub(super) fn generation(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
         }
     }
 
-    let transcript = play(&mut stage, &Script::quiet(5), &mut Straight)?;
+    let transcript = play(&mut harness, &Script::quiet(5), &mut Straight)?;
     demand_generation(&transcript)
 }
 
@@ -118,24 +118,24 @@ fn demand_generation(transcript: &[Entry]) -> Result<(), Failure> {
 
 /// The clock has gone on without it: it joins again as the process that it is, and then does what a new process does.
 pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
-    let mut stage = seated(kit, Options::default())?;
+    let mut harness = with_robot(kit, Options::default())?;
     let usual = Script::usual(kit);
     for _ in 0..=LAST {
-        step(&mut stage, &usual, &mut Straight)?;
+        step(&mut harness, &usual, &mut Straight)?;
     }
-    bequeath(kit, &mut stage)?;
-    stage.miss()?;
+    bequeath(kit, &mut harness)?;
+    harness.miss()?;
 
-    stage.keeps_requests = true;
-    stage.open(&News::default())?;
+    harness.keeps_requests = true;
+    harness.open(&News::default())?;
     let expected = "another request to join when its news have its generation as `rejoin`";
-    let joining = stage
+    let joining = harness
         .next_join(PATIENCE)
         .map_err(|failure| Failure::new(expected, failure.came))?;
-    stage.admit(&joining);
-    stage.keeps_requests = false;
+    harness.admit(&joining);
+    harness.keeps_requests = false;
     let mut instances = Vec::new();
-    for request in stage.seen.requests.iter().flatten() {
+    for request in harness.seen.requests.iter().flatten() {
         instances.push(&request.instance);
     }
     instances.dedup();
@@ -145,9 +145,9 @@ pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     }
 
     // Its turn is the next tick, whose news name it.
-    let last = stage.next_tick() - 1;
-    stage.settle(QUIET);
-    let again = play(&mut stage, &Script::quiet(5), &mut Straight)?;
+    let last = harness.next_tick() - 1;
+    harness.settle(QUIET);
+    let again = play(&mut harness, &Script::quiet(5), &mut Straight)?;
     demand_generation(&again)?;
     let anew = play(&mut returned(kit, last)?, &Script::quiet(5), &mut Straight)?;
     demand_same(kit, "to join again instead of a new process", &anew, &again)
@@ -155,19 +155,19 @@ pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
 
 /// News that name a later incarnation: this one ends.
 pub(super) fn replaced(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
-    let mut stage = seated(kit, Options::default())?;
-    play(&mut stage, &Script::quiet(3), &mut Straight)?;
-    let tick = stage.next_tick();
-    stage.play_successor();
-    stage.open(&News::default())?;
+    let mut harness = with_robot(kit, Options::default())?;
+    play(&mut harness, &Script::quiet(3), &mut Straight)?;
+    let tick = harness.next_tick();
+    harness.play_successor();
+    harness.open(&News::default())?;
     let expected = "its process ends, with an exit status other than 0, when its news name a later incarnation";
-    let status = stage.until_ended(expected, PATIENCE)?;
+    let status = harness.until_ended(expected, PATIENCE)?;
     if status.success() {
         return Err(Failure::new(expected, format!("{status}")));
     }
-    stage.until_gone()?;
+    harness.until_gone()?;
 
-    let has_answered = stage
+    let has_answered = harness
         .seen
         .answers
         .iter()

@@ -9,12 +9,12 @@ use protocol::name::OPERATOR;
 
 use super::wire;
 use crate::findings::Findings;
+use crate::harness::{Harness, Options};
 use crate::kit::{CannotRun, Kit};
 use crate::patience::START_PATIENCE;
 use crate::report::{AnswerTimes, Failure};
-use crate::script::{Script, Straight, play, seated};
+use crate::script::{Script, Straight, play, with_robot};
 use crate::seen::Sent;
-use crate::stage::{Options, Stage};
 use crate::transcript::{Entry, Transcript};
 use crate::wire::Joining;
 
@@ -44,23 +44,23 @@ pub(super) fn usual(
     kit: &Kit,
     findings: &mut Findings,
 ) -> Result<(Option<&'static str>, Option<AnswerTimes>), CannotRun> {
-    let mut stage = Stage::open_run(kit, Options::default())
+    let mut harness = Harness::open_run(kit, Options::default())
         .map_err(|failure| CannotRun::Robot(failure.came))?;
-    let joining = stage.next_join(START_PATIENCE).map_err(cannot_run)?;
+    let joining = harness.next_join(START_PATIENCE).map_err(cannot_run)?;
     let request = joining.request.clone().map_err(CannotRun::Robot)?;
     kit.learn(&request)?;
-    findings.settle("join.request", check_request(&stage, &joining));
-    stage.prepare().map_err(cannot_run)?;
-    stage.admit(&joining);
-    stage.keeps_requests = false;
-    stage.until_ready().map_err(cannot_run)?;
+    findings.settle("join.request", check_request(&harness, &joining));
+    harness.prepare().map_err(cannot_run)?;
+    harness.admit(&joining);
+    harness.keeps_requests = false;
+    harness.until_ready().map_err(cannot_run)?;
 
-    let played = play(&mut stage, &Script::usual(kit), &mut Straight);
-    wire::check(&stage, findings);
+    let played = play(&mut harness, &Script::usual(kit), &mut Straight);
+    wire::check(&harness, findings);
     let transcript = match played {
         Ok(transcript) => transcript,
         Err(failure) => {
-            let broken = if stage.incomplete().is_some() {
+            let broken = if harness.incomplete().is_some() {
                 "command.sent"
             } else {
                 "tick.answer"
@@ -69,10 +69,10 @@ pub(super) fn usual(
             return Ok((Some(broken), None));
         }
     };
-    stage.settle(ECHO);
-    findings.settle("tick.answer", check_answers(&stage, &transcript));
-    check_commands(&stage, &transcript, findings);
-    check_numbers(&stage, &transcript, findings);
+    harness.settle(ECHO);
+    findings.settle("tick.answer", check_answers(&harness, &transcript));
+    check_commands(&harness, &transcript, findings);
+    check_numbers(&harness, &transcript, findings);
     findings.close(&USUAL, Ok(()));
 
     let times = transcript
@@ -99,7 +99,7 @@ fn expect(holds: bool, expected: String, came: String) -> Result<(), Failure> {
 }
 
 /// What a request to join must contain.
-fn check_request(stage: &Stage<'_>, joining: &Joining) -> Result<(), Failure> {
+fn check_request(harness: &Harness<'_>, joining: &Joining) -> Result<(), Failure> {
     let Ok(request) = &joining.request else {
         return Ok(());
     };
@@ -111,8 +111,8 @@ fn check_request(stage: &Stage<'_>, joining: &Joining) -> Result<(), Failure> {
     )?;
 
     expect(
-        request.run == stage.run,
-        format!("run {}, the value of CARS_RUN", stage.run),
+        request.run == harness.run,
+        format!("run {}, the value of CARS_RUN", harness.run),
         format!("run {}", request.run),
     )?;
     expect(
@@ -121,7 +121,7 @@ fn check_request(stage: &Stage<'_>, joining: &Joining) -> Result<(), Failure> {
         "an empty one".to_owned(),
     )?;
 
-    let own = stage.keys.join_as(&request.name);
+    let own = harness.keys.join_as(&request.name);
     expect(
         joining.key == own,
         format!("a request at {own}"),
@@ -130,12 +130,12 @@ fn check_request(stage: &Stage<'_>, joining: &Joining) -> Result<(), Failure> {
 }
 
 /// One report for each clock, and no other.
-fn check_answers(stage: &Stage<'_>, transcript: &Transcript) -> Result<(), Failure> {
-    if let Some(unreadable) = stage.seen.unreadable.first() {
+fn check_answers(harness: &Harness<'_>, transcript: &Transcript) -> Result<(), Failure> {
+    if let Some(unreadable) = harness.seen.unreadable.first() {
         return Err(Failure::new("reports that can be read", unreadable));
     }
 
-    for (index, answer) in stage.seen.answers.iter().enumerate() {
+    for (index, answer) in harness.seen.answers.iter().enumerate() {
         let report = &answer.reading.report;
         let epoch = report.epoch;
         let tick = report.tick;
@@ -151,7 +151,7 @@ fn check_answers(stage: &Stage<'_>, transcript: &Transcript) -> Result<(), Failu
             return Err(Failure::new(expected, came));
         };
         // A clock that was repeated while its report was awaited may have been answered twice.
-        if entry.index != index && !stage.repeated.contains(&(epoch, tick)) {
+        if entry.index != index && !harness.repeated.contains(&(epoch, tick)) {
             return Err(Failure::new(
                 format!("one report for tick {tick}"),
                 "more than one",
@@ -163,40 +163,40 @@ fn check_answers(stage: &Stage<'_>, transcript: &Transcript) -> Result<(), Failu
 
 /// No clock, no report.
 pub(super) fn unasked(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
-    let mut stage = seated(kit, Options::default())?;
-    stage.settle(ECHO);
-    if let Some(answer) = stage.seen.answers.first() {
+    let mut harness = with_robot(kit, Options::default())?;
+    harness.settle(ECHO);
+    if let Some(answer) = harness.seen.answers.first() {
         let came = format!("a report for tick {}", answer.reading.report.tick);
         return Err(Failure::new("no report before the first clock", came));
     }
-    let transcript = play(&mut stage, &Script::quiet(2), &mut Straight)?;
-    stage.settle(ECHO);
-    check_answers(&stage, &transcript)
+    let transcript = play(&mut harness, &Script::quiet(2), &mut Straight)?;
+    harness.settle(ECHO);
+    check_answers(&harness, &transcript)
 }
 
 /// Commands and reports fit together.
-fn check_commands(stage: &Stage<'_>, transcript: &Transcript, findings: &mut Findings) {
+fn check_commands(harness: &Harness<'_>, transcript: &Transcript, findings: &mut Findings) {
     let has_stated = transcript.iter().any(|entry| entry.report.commands > 0);
-    if !has_stated && stage.seen.commands.is_empty() {
+    if !has_stated && harness.seen.commands.is_empty() {
         return findings.skip(
             "command.sent",
             "the robot sent no command in the usual ticks",
         );
     }
 
-    let checked = check_stamps(stage, transcript);
+    let checked = check_stamps(harness, transcript);
     let checked = checked.and_then(|()| {
         transcript
             .iter()
-            .try_for_each(|entry| check_tick(stage, entry))
+            .try_for_each(|entry| check_tick(harness, entry))
     });
     findings.settle("command.sent", checked);
 }
 
 /// Each command can be read, is of a tick that was granted, and goes to another robot of the roster.
-fn check_stamps(stage: &Stage<'_>, transcript: &Transcript) -> Result<(), Failure> {
-    let subject = stage.kit.subject();
-    for sent in &stage.seen.commands {
+fn check_stamps(harness: &Harness<'_>, transcript: &Transcript) -> Result<(), Failure> {
+    let subject = harness.kit.subject();
+    for sent in &harness.seen.commands {
         let command = match &sent.command {
             Ok(command) => command,
             Err(error) => return Err(Failure::new("commands that can be read", error)),
@@ -208,7 +208,7 @@ fn check_stamps(stage: &Stage<'_>, transcript: &Transcript) -> Result<(), Failur
         let is_own = sent.from == subject.as_str();
         // That the operator is not commanded is a rule of its own.
         let is_known = sent.to == OPERATOR
-            || stage
+            || harness
                 .template
                 .roster
                 .iter()
@@ -227,15 +227,15 @@ fn check_stamps(stage: &Stage<'_>, transcript: &Transcript) -> Result<(), Failur
 }
 
 /// The commands of a tick are numbered from 1, are as many as the report states, and were put before it.
-fn check_tick(stage: &Stage<'_>, entry: &Entry) -> Result<(), Failure> {
+fn check_tick(harness: &Harness<'_>, entry: &Entry) -> Result<(), Failure> {
     let tick = entry.tick;
-    let report = stage
+    let report = harness
         .seen
         .answers
         .get(entry.index)
         .map_or(usize::MAX, |answer| answer.order);
     let mut first: BTreeMap<u32, &Sent> = BTreeMap::new();
-    for sent in &stage.seen.commands {
+    for sent in &harness.seen.commands {
         let Ok(command) = &sent.command else { continue };
         if (command.epoch, command.tick) != (entry.epoch, tick) {
             continue;
@@ -283,8 +283,8 @@ fn describe(sent: &Sent) -> String {
 }
 
 /// Angles as they are published, and numbers that are finite and written as they should be.
-fn check_numbers(stage: &Stage<'_>, transcript: &Transcript, findings: &mut Findings) {
-    for answer in &stage.seen.answers {
+fn check_numbers(harness: &Harness<'_>, transcript: &Transcript, findings: &mut Findings) {
+    for answer in &harness.seen.answers {
         let tick = answer.reading.report.tick;
         if let Some(field) = answer.reading.not_numbers.first() {
             let came = format!("{field} is not finite in tick {tick}");
@@ -295,7 +295,7 @@ fn check_numbers(stage: &Stage<'_>, transcript: &Transcript, findings: &mut Find
             findings.fail("number.integers", Failure::new(WHOLE, came));
         }
     }
-    if let Some(field) = stage.seen.not_integers.first() {
+    if let Some(field) = harness.seen.not_integers.first() {
         let came = format!("{field} of a command");
         findings.fail("number.integers", Failure::new(WHOLE, came));
     }

@@ -5,34 +5,34 @@ use protocol::messages::MAX_TEXT_BYTES;
 
 use crate::comparison::demand_same;
 use crate::findings::Findings;
+use crate::harness::{Harness, Options};
 use crate::kit::Kit;
 use crate::report::Failure;
-use crate::script::{Disturbance, Script, Straight, play, seated, usual};
-use crate::stage::{Options, Stage};
+use crate::script::{Disturbance, Script, Straight, play, usual, with_robot};
 
 /// Later versions of the contract add fields: everything that the robot receives carries some.
 pub(super) fn unknown_fields(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
-    let mut stage = seated(
+    let mut harness = with_robot(
         kit,
         Options {
             has_extras: true,
             ..Options::default()
         },
     )?;
-    let played = play(&mut stage, &Script::usual(kit), &mut Straight)?;
+    let played = play(&mut harness, &Script::usual(kit), &mut Straight)?;
     demand_same(kit, "an unknown field", usual(kit)?, &played)
 }
 
 /// JSON does not distinguish 7 from 7.0: everything that the robot receives has whole numbers without a fraction.
 pub(super) fn integers(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
-    let mut stage = seated(
+    let mut harness = with_robot(
         kit,
         Options {
             writes_integers: true,
             ..Options::default()
         },
     )?;
-    let played = play(&mut stage, &Script::usual(kit), &mut Straight)?;
+    let played = play(&mut harness, &Script::usual(kit), &mut Straight)?;
     demand_same(kit, "that 7.0 is written as 7", usual(kit)?, &played)
 }
 
@@ -40,23 +40,23 @@ pub(super) fn integers(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
 pub(super) fn malformed(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     struct Rubbish;
     impl Disturbance for Rubbish {
-        fn before(&mut self, stage: &mut Stage<'_>, tick: Tick) -> Result<(), Failure> {
+        fn before(&mut self, harness: &mut Harness<'_>, tick: Tick) -> Result<(), Failure> {
             if tick % 4 != 1 {
                 return Ok(());
             }
             for rubbish in clocks(tick) {
-                stage.put_as_clock(&rubbish)?;
+                harness.put_as_clock(&rubbish)?;
             }
             for rubbish in news(tick) {
-                stage.put_as_news(&rubbish)?;
+                harness.put_as_news(&rubbish)?;
             }
             Ok(())
         }
     }
 
-    let mut stage = seated(kit, Options::default())?;
-    let before = stage.process.error_bytes();
-    let played = play(&mut stage, &Script::usual(kit), &mut Rubbish)?;
+    let mut harness = with_robot(kit, Options::default())?;
+    let before = harness.process.error_bytes();
+    let played = play(&mut harness, &Script::usual(kit), &mut Rubbish)?;
     demand_same(
         kit,
         "a message that cannot be understood",
@@ -64,7 +64,7 @@ pub(super) fn malformed(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
         &played,
     )?;
 
-    if stage.process.error_bytes() == before {
+    if harness.process.error_bytes() == before {
         return Err(Failure::new(
             "messages that cannot be understood are reported on its standard error",
             "nothing",

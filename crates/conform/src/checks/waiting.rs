@@ -5,20 +5,20 @@ use std::time::Duration;
 use protocol::Tick;
 use protocol::messages::{Correction, News};
 
+use crate::harness::{Harness, Options};
 use crate::kit::Kit;
 use crate::patience::PATIENCE;
 use crate::report::Failure;
-use crate::script::{Script, Straight, play, seated};
-use crate::stage::{Options, Stage};
+use crate::script::{Script, Straight, play, with_robot};
 
 /// After this time, a robot that received a clock is in its tick.
 const UNDER_WAY: Duration = Duration::from_millis(50);
 /// Ticks within which a robot that queries others at all does so.
 const TICKS: Tick = 24;
 
-/// A stage on which the other robots put no states, so that a robot that wants to know them must query.
-pub(super) fn of_queries(kit: &Kit) -> Result<Stage<'_>, Failure> {
-    seated(
+/// A harness on which the other robots put no states, so that a robot that wants to know them must query.
+pub(super) fn of_queries(kit: &Kit) -> Result<Harness<'_>, Failure> {
+    with_robot(
         kit,
         Options {
             puts_states: false,
@@ -28,39 +28,39 @@ pub(super) fn of_queries(kit: &Kit) -> Result<Stage<'_>, Failure> {
 }
 
 /// A robot that waits for its news: the clock of the open tick has its flag, and its news are withheld.
-pub(super) fn for_news(kit: &Kit) -> Result<Stage<'_>, Failure> {
-    let mut stage = seated(kit, Options::default())?;
-    play(&mut stage, &Script::quiet(3), &mut Straight)?;
+pub(super) fn for_news(kit: &Kit) -> Result<Harness<'_>, Failure> {
+    let mut harness = with_robot(kit, Options::default())?;
+    play(&mut harness, &Script::quiet(3), &mut Straight)?;
 
-    stage.withholds_news = true;
-    stage.open(&News {
+    harness.withholds_news = true;
+    harness.open(&News {
         correction: Some(Correction {
-            location: stage.body.stands,
+            location: harness.body.stands,
             blocked: true,
         }),
         ..News::default()
     })?;
-    stage.settle(UNDER_WAY);
-    Ok(stage)
+    harness.settle(UNDER_WAY);
+    Ok(harness)
 }
 
 /// A robot that waits for an answer that the others hold back, if it queries others at all. With it, whether it does: the
 /// last tick is then open.
-pub(super) fn for_another(kit: &Kit) -> Result<(Stage<'_>, bool), Failure> {
-    let mut stage = of_queries(kit)?;
-    stage.cast.hold();
+pub(super) fn for_another(kit: &Kit) -> Result<(Harness<'_>, bool), Failure> {
+    let mut harness = of_queries(kit)?;
+    harness.fake_peers.hold();
     for _ in 0..TICKS {
-        stage.open(&News::default())?;
-        let came = stage.until("a report or a query", PATIENCE, |stage| {
-            (stage.cast.has_held() || !stage.is_open()).then_some(())
+        harness.open(&News::default())?;
+        let came = harness.until("a report or a query", PATIENCE, |harness| {
+            (harness.fake_peers.has_held() || !harness.is_open()).then_some(())
         });
-        if stage.cast.has_held() {
-            stage.settle(UNDER_WAY);
-            return Ok((stage, true));
+        if harness.fake_peers.has_held() {
+            harness.settle(UNDER_WAY);
+            return Ok((harness, true));
         }
         came?;
-        stage.complete()?;
+        harness.complete()?;
     }
 
-    Ok((stage, false))
+    Ok((harness, false))
 }

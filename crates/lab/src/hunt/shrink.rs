@@ -16,7 +16,7 @@ use super::parallel::first;
 use super::trial::{Played, Trial};
 
 /// Least time of a fault, ticks.
-const LEAST_TICKS: Tick = 2;
+const MIN_TICKS: Tick = 2;
 
 /// What bounds the shrinking of one case.
 #[derive(Debug, Clone, Copy)]
@@ -458,7 +458,7 @@ fn shorter(span: Span) -> Vec<Span> {
     let lasting = span.until - span.from;
     let mut all = Vec::new();
     for part in [lasting / 2, lasting / 8, 1] {
-        if part == 0 || lasting.saturating_sub(part) < LEAST_TICKS {
+        if part == 0 || lasting.saturating_sub(part) < MIN_TICKS {
             continue;
         }
 

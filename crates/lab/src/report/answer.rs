@@ -10,7 +10,7 @@ use super::study::{Study, is_shown, label};
 use crate::experiment::{Contrast, Difference, SHOWN_P, least_p_holm};
 
 /// Most comparisons that a sentence names.
-const MOST_NAMED: usize = 8;
+const MAX_NAMED: usize = 8;
 
 /// What all comparisons show, in one or two sentences.
 pub(super) fn lead(study: &Study<'_>) -> Vec<Part> {
@@ -123,7 +123,7 @@ fn sentence(
     ];
 
     let mut named = Vec::new();
-    for contrast in contrasts.iter().take(MOST_NAMED) {
+    for contrast in contrasts.iter().take(MAX_NAMED) {
         let heading = study.heading_of(&contrast.condition);
         let under = if heading.is_empty() {
             String::new()
@@ -134,10 +134,10 @@ fn sentence(
     }
 
     let mut text = named.join("; ");
-    if contrasts.len() > MOST_NAMED {
+    if contrasts.len() > MAX_NAMED {
         text += &format!(
             "; and {} more, which are in the table",
-            contrasts.len() - MOST_NAMED
+            contrasts.len() - MAX_NAMED
         );
     }
 

@@ -11,11 +11,11 @@ use crate::moment::Moment;
 /// Ticks of one line of a space-time diagram, in which commands are told apart.
 const LINE_TICKS: Tick = 150;
 /// Most ticks of a line.
-const MOST_LINE_TICKS: Tick = 600;
+const MAX_LINE_TICKS: Tick = 600;
 /// Most lines of a diagram.
-const MOST_LINES: Tick = 12;
+const MAX_LINES: Tick = 12;
 /// No further line is drawn after this many bytes.
-const MOST_DIAGRAM_BYTES: usize = 400_000;
+const MAX_DIAGRAM_BYTES: usize = 400_000;
 /// Width of a line without the names at its left, pixels.
 const LINE_PX: f64 = 620.0;
 
@@ -78,13 +78,13 @@ pub(super) fn diagram_lines(
 ) -> miette::Result<DiagramLines> {
     let ticks = facts.last_tick + 1;
     // A short rest is not a line of its own.
-    let count = ((ticks + LINE_TICKS / 2) / LINE_TICKS).clamp(1, MOST_LINES);
-    let length = ticks.div_ceil(count).clamp(LINE_TICKS, MOST_LINE_TICKS);
+    let count = ((ticks + LINE_TICKS / 2) / LINE_TICKS).clamp(1, MAX_LINES);
+    let length = ticks.div_ceil(count).clamp(LINE_TICKS, MAX_LINE_TICKS);
 
     let mut lines = Vec::new();
     let mut bytes = 0;
     let mut next = 0;
-    while next < ticks && next < MOST_LINES * length && bytes < MOST_DIAGRAM_BYTES {
+    while next < ticks && next < MAX_LINES * length && bytes < MAX_DIAGRAM_BYTES {
         let window = Window {
             from: Some(Moment::Tick(next)),
             to: Some(Moment::Tick(next + length - 1)),

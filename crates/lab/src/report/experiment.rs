@@ -22,13 +22,13 @@ use crate::run::execute;
 use crate::shell;
 
 /// Units that are named one by one where there are more of them.
-const MOST_NAMED: usize = 10;
+const MAX_NAMED: usize = 10;
 
 /// No further measure is shown on a page with this many bytes.
-const MOST_BYTES_OF_MEASURES: usize = 3_000_000;
+const MAX_BYTES_OF_MEASURES: usize = 3_000_000;
 
 /// No further figure of an example run is shown on a page with this many bytes.
-const MOST_BYTES_OF_EXAMPLES: usize = 6_000_000;
+const MAX_BYTES_OF_EXAMPLES: usize = 6_000_000;
 
 /// What is shown of example runs.
 const EXAMPLE_PARTS: [Shown; 3] = [Shown::Runs, Shown::Transitions, Shown::Floor];
@@ -100,7 +100,7 @@ fn write_answer(page: &mut Page, study: &Study<'_>) {
 
     if !results.conflicts.is_empty() {
         let units: Vec<String> = results.conflicts.iter().map(usize::to_string).collect();
-        let named = units.len().min(MOST_NAMED);
+        let named = units.len().min(MAX_NAMED);
         page.remark(&[Part::text(format!(
             "{} gave different runs when they were played again, so the results are not reproducible: {}{}.",
             counted(units.len(), "unit"),
@@ -175,7 +175,7 @@ fn write_measures(page: &mut Page, study: &Study<'_>) {
     let shown = study.shown_measures();
     let mut large = Vec::new();
     for measure in &shown {
-        if page.size() > MOST_BYTES_OF_MEASURES {
+        if page.size() > MAX_BYTES_OF_MEASURES {
             large.push(label(measure));
             continue;
         }
@@ -424,7 +424,7 @@ fn write_course(page: &mut Page, study: &Study<'_>, outcome: &Outcome) -> miette
 
     let all = figures.len();
     for (index, figure) in figures.iter().enumerate() {
-        if page.size() > MOST_BYTES_OF_EXAMPLES {
+        if page.size() > MAX_BYTES_OF_EXAMPLES {
             page.remark(&[Part::text(format!(
                 "So that this page stays small, {} of this run are left out.",
                 counted(all - index, "figure")
@@ -519,7 +519,7 @@ fn write_failures(page: &mut Page, study: &Study<'_>) {
         Column::number("seed"),
         Column::text("reason"),
     ]);
-    for failure in failures.iter().take(MOST_NAMED) {
+    for failure in failures.iter().take(MAX_NAMED) {
         table.rows.push(vec![
             Cell::Count(failure.unit as u64),
             Cell::text(study.heading_of(&failure.condition)),

@@ -12,13 +12,13 @@ use report::{
 };
 use statistics::{Interval, ecdf};
 
-use super::limits::{MOST_PANELS, limited};
+use super::limits::{MAX_PANELS, limited};
 use super::study::{CellPlace, Study, axis, drawn, is_shown, label, level_number, named};
 use super::words::{capitalized, counted};
 use crate::experiment::{Contrast, Difference, Estimated};
 
 /// Most rows of a table.
-const MOST_ROWS: usize = 500;
+const MAX_ROWS: usize = 500;
 /// How many values a factor has of which lines are drawn.
 const LINE_LEVELS: RangeInclusive<usize> = 3..=60;
 
@@ -410,7 +410,7 @@ pub(super) fn look(study: &Study<'_>, arm: usize) -> usize {
 
 fn interval_panels(study: &Study<'_>, measure: &Measure, range: (f64, f64)) -> Vec<Panel> {
     let mut panels = Vec::new();
-    for (condition, of) in study.conditions.iter().enumerate().take(MOST_PANELS) {
+    for (condition, of) in study.conditions.iter().enumerate().take(MAX_PANELS) {
         let mut rows = Vec::new();
         for (arm, of) in study.arms.iter().enumerate() {
             rows.push(IntervalRow {
@@ -472,7 +472,7 @@ fn estimates_table(study: &Study<'_>, measure: &Measure) -> Table {
     columns.push(Column::text("runs without a number"));
     let mut table = Table::new(columns);
 
-    for (condition, arm) in places(study).into_iter().take(MOST_ROWS) {
+    for (condition, arm) in places(study).into_iter().take(MAX_ROWS) {
         let Some(cell) = study.cell(measure, (condition, arm)) else {
             continue;
         };
@@ -539,7 +539,7 @@ pub(super) fn differences(study: &Study<'_>, measure: &Measure, what: Of) -> Opt
     let compared: BTreeSet<&str> = contrasts.iter().map(|one| one.condition.as_str()).collect();
     let compared = compared.len();
     let mut panels = Vec::new();
-    for condition in study.conditions.iter().take(MOST_PANELS) {
+    for condition in study.conditions.iter().take(MAX_PANELS) {
         let mut rows = Vec::new();
         for (arm, of) in study.arms.iter().enumerate() {
             if let Some(contrast) = study.contrast(measure, condition, of) {
@@ -657,7 +657,7 @@ fn differences_table(study: &Study<'_>, contrasts: &[&Contrast], what: Of) -> Ta
         Column::text("runs of the arm without a number"),
         Column::text("of the baseline"),
     ]);
-    for contrast in contrasts.iter().take(MOST_ROWS) {
+    for contrast in contrasts.iter().take(MAX_ROWS) {
         let mut row = vec![
             Cell::text(study.heading_of(&contrast.condition)),
             Cell::text(&contrast.arm),
@@ -694,7 +694,7 @@ pub(super) fn survival(study: &Study<'_>, measure: &Measure) -> Figure {
         .collect();
 
     let mut panels = Vec::new();
-    for (condition, of) in study.conditions.iter().enumerate().take(MOST_PANELS) {
+    for (condition, of) in study.conditions.iter().enumerate().take(MAX_PANELS) {
         let mut curves = Vec::new();
         for (arm, of) in study.arms.iter().enumerate() {
             let sample = study.times(measure, (condition, arm));
@@ -775,7 +775,7 @@ pub(super) fn distributions(study: &Study<'_>, measure: &Measure) -> Figure {
     let range = widened(&values, true);
 
     let mut panels = Vec::new();
-    for (condition, of) in study.conditions.iter().enumerate().take(MOST_PANELS) {
+    for (condition, of) in study.conditions.iter().enumerate().take(MAX_PANELS) {
         let mut curves = Vec::new();
         for (arm, of) in study.arms.iter().enumerate() {
             let steps = ecdf(&study.numbers(measure, (condition, arm)));
@@ -843,7 +843,7 @@ pub(super) fn heat_maps(study: &Study<'_>, measure: &Measure) -> Option<Figure> 
 
     let range = estimates_range(study, measure);
     let mut panels = Vec::new();
-    for (arm, of) in study.arms.iter().enumerate().take(MOST_PANELS) {
+    for (arm, of) in study.arms.iter().enumerate().take(MAX_PANELS) {
         let mut cells = vec![vec![None; column_levels.len()]; row_levels.len()];
         for (condition, place) in study.conditions.iter().enumerate() {
             let row = position(&row_levels, &place.levels[of_rows].1);
@@ -963,7 +963,7 @@ pub(super) fn verdicts(study: &Study<'_>) -> Option<Figure> {
                     (fails, _) => format!("{fails} fail"),
                 },
             });
-            if table.rows.len() < MOST_ROWS {
+            if table.rows.len() < MAX_ROWS {
                 table.rows.push(vec![
                     Cell::text(name),
                     Cell::text(study.heading(&study.conditions[condition])),
@@ -975,7 +975,7 @@ pub(super) fn verdicts(study: &Study<'_>) -> Option<Figure> {
                 ]);
             }
         }
-        if panels.len() < MOST_PANELS {
+        if panels.len() < MAX_PANELS {
             let chart = Matrix {
                 title: format!("Expectation {name}"),
                 rows_title: "arm".to_owned(),

@@ -6,7 +6,7 @@ use protocol::RobotName;
 use report::{Cell, Column, Figure, Floor, Panel, Part, Table};
 
 use super::facts::RunFacts;
-use super::limits::{MOST_PANELS, limited};
+use super::limits::{MAX_PANELS, limited};
 use super::words::counted;
 
 /// Where the robots of these runs were: a floor for each robot; `None` if no run has a recording.
@@ -41,7 +41,7 @@ pub(super) fn occupancy(runs: &[&RunFacts]) -> Option<Figure> {
         Column::number("at y, m"),
     ]);
     let all = floors.len();
-    for (name, mut floor) in floors.into_iter().take(MOST_PANELS) {
+    for (name, mut floor) in floors.into_iter().take(MAX_PANELS) {
         floor.title = format!("Where {name} was");
         add_row(&mut table, name, &floor);
         panels.push(Panel {

@@ -3,9 +3,9 @@
 use report::Panel;
 
 /// Most panels of a figure.
-pub(super) const MOST_PANELS: usize = 24;
+pub(super) const MAX_PANELS: usize = 24;
 /// Most bytes of the charts of a figure, beside its first one.
-const MOST_FIGURE_BYTES: usize = 600_000;
+const MAX_FIGURE_BYTES: usize = 600_000;
 
 /// The first panels of a figure, as many as are allowed, and a sentence about what is left out. `all` is how many there could be.
 pub(super) fn limited(panels: Vec<Panel>, all: usize, what: &str) -> (Vec<Panel>, String) {
@@ -13,8 +13,8 @@ pub(super) fn limited(panels: Vec<Panel>, all: usize, what: &str) -> (Vec<Panel>
     let mut bytes = 0;
     for panel in panels {
         bytes += panel.svg.len();
-        let fits = kept.is_empty() || bytes <= MOST_FIGURE_BYTES;
-        if !fits || kept.len() == MOST_PANELS {
+        let fits = kept.is_empty() || bytes <= MAX_FIGURE_BYTES;
+        if !fits || kept.len() == MAX_PANELS {
             break;
         }
         kept.push(panel);
@@ -47,7 +47,7 @@ mod tests {
 
         let many = (0..30).map(|_| panel(10)).collect();
         let (kept, sentence) = limited(many, 60, "conditions");
-        assert_eq!(kept.len(), MOST_PANELS);
+        assert_eq!(kept.len(), MAX_PANELS);
         assert_eq!(sentence, " The first 24 of 60 conditions are drawn.");
     }
 }

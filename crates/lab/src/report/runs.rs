@@ -13,21 +13,21 @@ use report::{BandRow, Cell, Column, Figure, Page, Panel, Part, State, Table};
 use super::course::{diagram_lines, run_panel, state_panel, states_of};
 use super::facts::{Disturbance, RunFacts};
 use super::floor::occupancy;
-use super::limits::{MOST_PANELS, limited};
+use super::limits::{MAX_PANELS, limited};
 use super::transitions::transitions;
 use super::words::counted;
 use crate::folder::{read_summary, recorded_epoch};
 use crate::shell;
 
 /// Most runs of a report.
-pub const MOST_RUNS: usize = 64;
+pub const MAX_RUNS: usize = 64;
 /// Runs of which the space-time diagram is drawn.
-const MOST_DIAGRAMS: usize = 2;
+const MAX_DIAGRAMS: usize = 2;
 /// Most rows of a table of disturbances.
-const MOST_DISTURBANCES: usize = 200;
+const MAX_DISTURBANCES: usize = 200;
 
 /// Most rows of the table of verdicts.
-const MOST_VERDICTS: usize = 200;
+const MAX_VERDICTS: usize = 200;
 
 /// A run with its facts.
 struct Run {
@@ -54,10 +54,10 @@ pub fn of_runs(folders: &[RunFolder]) -> miette::Result<String> {
 /// # Errors
 /// As [`of_runs`].
 pub fn page_of_runs(folders: &[RunFolder]) -> miette::Result<Page> {
-    if folders.len() > MOST_RUNS {
+    if folders.len() > MAX_RUNS {
         return Err(miette!(
             help = "compare many runs by an experiment: `cars experiment run FILE`, then `cars report` with its folder",
-            "a report shows at most {MOST_RUNS} runs, and these are {}",
+            "a report shows at most {MAX_RUNS} runs, and these are {}",
             folders.len()
         ));
     }
@@ -374,7 +374,7 @@ fn state_panels(runs: &[Run], state: State, what: &str) -> Vec<Panel> {
         .iter()
         .map(|run| run.facts.time_s())
         .fold(0.0, f64::max);
-    for name in all_robots(runs).into_iter().take(MOST_PANELS) {
+    for name in all_robots(runs).into_iter().take(MAX_PANELS) {
         let mut rows = Vec::new();
         for run in runs {
             if let Some(robot) = run.facts.robots.get(name) {
@@ -436,7 +436,7 @@ fn states_table(runs: &[Run], state: State) -> Table {
 
 fn write_diagrams(page: &mut Page, runs: &[Run]) {
     page.section("Space-time diagram");
-    for run in runs.iter().take(MOST_DIAGRAMS) {
+    for run in runs.iter().take(MAX_DIAGRAMS) {
         let lines = diagram_lines(&run.name, &run.facts, &run.files);
         let diagram = match lines {
             Ok(diagram) => diagram,
@@ -470,11 +470,11 @@ fn write_diagrams(page: &mut Page, runs: &[Run]) {
         });
     }
 
-    if let Some(run) = runs.get(MOST_DIAGRAMS) {
+    if let Some(run) = runs.get(MAX_DIAGRAMS) {
         page.remark(&[
             Part::text(format!(
                 "The diagrams of the other {} runs are left out. Draw one with ",
-                runs.len() - MOST_DIAGRAMS
+                runs.len() - MAX_DIAGRAMS
             )),
             Part::code(format!(
                 "cars diagram {} -o diagram.svg",
@@ -506,7 +506,7 @@ fn write_disturbances(page: &mut Page, runs: &[Run]) {
     for run in runs {
         for one in &run.facts.disturbances {
             count += 1;
-            if table.rows.len() < MOST_DISTURBANCES {
+            if table.rows.len() < MAX_DISTURBANCES {
                 table.rows.push(disturbance_row(run, one));
             }
         }
@@ -538,7 +538,7 @@ fn write_expectations(page: &mut Page, runs: &[Run]) {
     for run in runs {
         for one in &run.facts.judged {
             count += 1;
-            if table.rows.len() < MOST_VERDICTS {
+            if table.rows.len() < MAX_VERDICTS {
                 table.rows.push(vec![
                     Cell::text(&run.name),
                     Cell::text(&one.expectation),

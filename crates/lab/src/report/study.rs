@@ -11,7 +11,7 @@ use crate::experiment::{
 };
 
 /// Most arms that are shown.
-const MOST_ARMS: usize = 24;
+const MAX_ARMS: usize = 24;
 
 /// The results of an experiment.
 pub(super) struct Study<'a> {
@@ -66,7 +66,7 @@ impl<'a> Study<'a> {
         Self {
             results,
             conditions,
-            arms: &experiment.arms[..experiment.arms.len().min(MOST_ARMS)],
+            arms: &experiment.arms[..experiment.arms.len().min(MAX_ARMS)],
             factors: factors.collect(),
             estimates,
             contrasts: results.contrasts(),

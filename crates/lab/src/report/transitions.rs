@@ -7,7 +7,7 @@ use report::{Cell, Column, Figure, Matrix, MatrixCell, MatrixLabel, Panel, Part,
 
 use super::course::states_of;
 use super::facts::RunFacts;
-use super::limits::{MOST_PANELS, limited};
+use super::limits::{MAX_PANELS, limited};
 use super::words::counted;
 
 /// How often a state, the first one, was followed by another one.
@@ -28,7 +28,7 @@ pub(super) fn transitions(runs: &[&RunFacts]) -> Vec<Figure> {
         ]);
         let counts = counts(runs, state);
         let all = counts.len();
-        for (name, counts) in counts.into_iter().take(MOST_PANELS) {
+        for (name, counts) in counts.into_iter().take(MAX_PANELS) {
             let chart = matrix(name, state, what, &counts);
             panels.push(Panel {
                 heading: name.to_string(),

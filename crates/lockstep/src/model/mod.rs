@@ -17,7 +17,7 @@
 //! by a search backwards ([`liveness`]). That the checker sees anything at all is shown by breaking each rule of the code.
 //!
 //! Left out: queries between robots (a robot that waits for an answer is a robot that is slow), announcements to people, and
-//! the patience of a robot with a simulator that is gone.
+//! the timeouts of a robot with a simulator that is gone.
 
 mod liveness;
 mod process;

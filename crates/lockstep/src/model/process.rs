@@ -7,10 +7,10 @@ use protocol::{Epoch, Generation, RobotName, Tick};
 
 use super::simulation::{self, News, Order, Report, Simulation, Violation};
 use crate::barrier::{Refused, Stamp};
-use crate::exchange::Naming;
+use crate::exchange::IncarnationNotice;
 use crate::exchange::Sent;
 use crate::member::Admission;
-use crate::participant::{Action, Begin, Leave, Participant, Patience, RobotTimer, Turn};
+use crate::participant::{Action, Begin, Leave, Participant, RobotTimer, Timeouts, Turn};
 use crate::rules::{Rule, Rules};
 
 /// From a process to the simulator, in order.
@@ -27,7 +27,7 @@ pub(super) enum Up {
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) enum Down {
     Answer(Result<Admission, Refused>),
-    News(Epoch, Tick, Naming, News),
+    News(Epoch, Tick, IncarnationNotice, News),
     Clock(Clock),
 }
 
@@ -79,12 +79,12 @@ pub(super) struct Around<'a> {
 impl Process {
     /// A process that asks to join.
     pub(super) fn start(name: RobotName, around: Around) -> (Self, Option<Violation>) {
-        let patience = Patience {
+        let timeouts = Timeouts {
             join: std::time::Duration::MAX,
             gone: std::time::Duration::MAX,
         };
         let mut out = Vec::new();
-        let robot = Robot::with_rules(patience, around.rules, &mut out);
+        let robot = Robot::with_rules(timeouts, around.rules, &mut out);
         let mut process = Self {
             name,
             robot,
@@ -131,7 +131,7 @@ impl Process {
         self.feed(around, |robot, out| match message {
             Down::Answer(Ok(admission)) => robot.admitted(admission, [], out),
             Down::Answer(Err(refused)) => robot.refused(refused.into(), out),
-            Down::News(epoch, tick, naming, news) => robot.news(epoch, tick, naming, news, out),
+            Down::News(epoch, tick, notice, news) => robot.news(epoch, tick, notice, news, out),
             Down::Clock(clock) => robot.clock(clock, out),
         })
     }

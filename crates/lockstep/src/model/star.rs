@@ -10,7 +10,7 @@ use stateright::{Model, Property};
 use super::process::{Around, Down, Process, Robot, Up};
 use super::simulation::{News, Order, Ordered, Report, Simulation, Violation};
 use crate::barrier::{Barrier, Output, Timer, Timing};
-use crate::exchange::Naming;
+use crate::exchange::IncarnationNotice;
 use crate::exchange::{Membership, Outcome};
 use crate::member::Lateness;
 use crate::participant::RobotTimer;
@@ -326,16 +326,16 @@ impl Star {
     }
 
     /// The news each to its robot, then the clock to all, as [`Output::Grant`] wants it.
-    fn put(state: &mut State, news: Vec<(RobotName, Naming)>, clock: Clock) {
+    fn put(state: &mut State, news: Vec<(RobotName, IncarnationNotice)>, clock: Clock) {
         let simulation = &mut state.simulation;
-        for (name, naming) in news {
+        for (name, notice) in news {
             let content = News {
                 epoch: clock.epoch,
                 tick: clock.tick,
                 orders: simulation.news.get(&name).cloned().unwrap_or_default(),
             };
 
-            if let (Some(generation), Some(part)) = (naming.joined, simulation.parts.get_mut(&name))
+            if let (Some(generation), Some(part)) = (notice.joined, simulation.parts.get_mut(&name))
             {
                 part.named = Some((clock.epoch, clock.tick, generation));
             }
@@ -345,7 +345,7 @@ impl Star {
                     process.down.push_back(Down::News(
                         clock.epoch,
                         clock.tick,
-                        naming,
+                        notice,
                         content.clone(),
                     ));
                 }

@@ -243,17 +243,17 @@ impl Watch {
 
 /// All expectations of a run while it is observed.
 #[derive(Debug, Clone, Default)]
-pub struct Watches(Vec<Watched>);
+pub struct Monitors(Vec<Monitored>);
 
 /// An expectation of a run, and its judgment when it is decided.
 #[derive(Debug, Clone)]
-struct Watched {
+struct Monitored {
     name: String,
     watch: Watch,
     judgment: Option<Judgment>,
 }
 
-impl Watches {
+impl Monitors {
     /// Begins to watch a run with ticks of `tick_s` seconds, bodies with sides of `body_m` meters, and these robots.
     #[must_use]
     pub fn new(
@@ -264,7 +264,7 @@ impl Watches {
     ) -> Self {
         let mut watches = Vec::new();
         for expectation in expectations {
-            watches.push(Watched {
+            watches.push(Monitored {
                 name: expectation.name.clone(),
                 watch: Watch::new(expectation, tick_s, body_m, roster),
                 judgment: None,
@@ -314,13 +314,13 @@ impl Watches {
     }
 
     /// Those that are not decided.
-    fn open(&mut self) -> impl Iterator<Item = &mut Watched> {
+    fn open(&mut self) -> impl Iterator<Item = &mut Monitored> {
         let watches = self.0.iter_mut();
         watches.filter(|watched| watched.judgment.is_none())
     }
 }
 
-impl Watched {
+impl Monitored {
     fn event(&self) -> Option<Event> {
         let judgment = self.judgment.as_ref()?;
         Some(Event::Judged {

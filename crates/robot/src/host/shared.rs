@@ -5,7 +5,7 @@ use std::fmt;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
-use lockstep::{Action, Answer, NoState, Participant, Patience, RobotTimer, StateQuery};
+use lockstep::{Action, Answer, NoState, Participant, RobotTimer, StateQuery, Timeouts};
 use protocol::RobotName;
 use protocol::messages::{CommandText, News, PublicState};
 
@@ -25,11 +25,11 @@ pub(super) struct Shared {
     /// Wakes a robot that waits for another robot's answer.
     has_news: Condvar,
     /// Runs ticks on the middleware's thread, where the robots allow it.
-    runner: OnceLock<Runner>,
+    on_arrival: OnceLock<OnArrival>,
 }
 
 /// Has the middleware's thread carry out what it may. Returns whether it will.
-type Runner = Box<dyn Fn() -> bool + Send + Sync>;
+type OnArrival = Box<dyn Fn() -> bool + Send + Sync>;
 
 #[derive(Debug)]
 struct Inner {
@@ -122,7 +122,7 @@ impl fmt::Debug for Shared {
 
 impl Shared {
     /// Participants for these robots, which begin by asking to join.
-    pub(super) fn new(names: &[RobotName], patience: Patience) -> Self {
+    pub(super) fn new(names: &[RobotName], timeouts: Timeouts) -> Self {
         let mut inner = Inner {
             participants: BTreeMap::new(),
             actions: VecDeque::new(),
@@ -131,12 +131,12 @@ impl Shared {
             is_robot_waiting: false,
             is_over: false,
             has_simulator: false,
-            join_patience: patience.join,
+            join_patience: timeouts.join,
             extensions: BTreeMap::new(),
         };
         for name in names {
             let mut actions = Vec::new();
-            let participant = Participant::new(patience, &mut actions);
+            let participant = Participant::new(timeouts, &mut actions);
             inner.participants.insert(name.clone(), participant);
             inner.file(name, actions);
         }
@@ -145,14 +145,14 @@ impl Shared {
             inner: Mutex::new(inner),
             has_work: Condvar::new(),
             has_news: Condvar::new(),
-            runner: OnceLock::new(),
+            on_arrival: OnceLock::new(),
         }
     }
 
-    /// From now on `runner` runs ticks on the middleware's thread.
-    pub(super) fn run_on_arrival(&self, runner: Runner) {
+    /// From now on `on_arrival` runs ticks on the middleware's thread.
+    pub(super) fn run_on_arrival(&self, on_arrival: OnArrival) {
         // There is one host, and it sets this once.
-        let _set_once = self.runner.set(runner);
+        let _set_once = self.on_arrival.set(on_arrival);
     }
 
     fn lock(&self) -> MutexGuard<'_, Inner> {
@@ -197,14 +197,16 @@ impl Shared {
         let is_for_middleware = next.is_some_and(|(_, action)| Thread::middleware().takes(action));
         let has_actions = !inner.actions.is_empty();
         let has_earlier_timer = inner.has_earlier_timer();
+        // The lock is given back before anyone is woken, so that no thread wakes only to wait for it. Nothing is lost in between: each
+        // thread looks into the queue before it sleeps, under the lock.
         drop(inner);
 
         if is_robot_waiting {
             self.has_news.notify_all();
             return;
         }
-        let runner = self.runner.get().filter(|_| is_for_middleware);
-        let is_run = runner.is_some_and(|runner| runner());
+        let on_arrival = self.on_arrival.get().filter(|_| is_for_middleware);
+        let is_run = on_arrival.is_some_and(|run| run());
         if has_earlier_timer || has_actions && !is_run {
             self.has_work.notify_one();
         }
@@ -275,6 +277,7 @@ impl Shared {
     /// The host's own thread sleeps until there is something to do.
     pub(super) fn sleep(&self) {
         let mut inner = self.lock();
+        // Looked at under the same lock under which actions are filed: none can be filed between the look and the sleep.
         if inner.actions.is_empty() && !inner.is_over {
             inner.sleeps_until = inner.next_timer();
             inner = wait(&self.has_work, inner);
@@ -321,8 +324,8 @@ fn wait<'a>(condition: &Condvar, inner: MutexGuard<'a, Inner>) -> MutexGuard<'a,
             .unwrap_or_else(PoisonError::into_inner);
     };
 
-    let patience: Duration = due.saturating_duration_since(Instant::now());
-    let waited = condition.wait_timeout(inner, patience);
+    let timeout: Duration = due.saturating_duration_since(Instant::now());
+    let waited = condition.wait_timeout(inner, timeout);
     waited.unwrap_or_else(PoisonError::into_inner).0
 }
 

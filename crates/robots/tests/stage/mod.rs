@@ -118,13 +118,13 @@ impl Stage {
             .filter(|role| role.robot.senses_bodies())
             .map(|role| name(role.name))
             .collect();
-        let seats = cast.into_iter().map(|role| {
+        let runners = cast.into_iter().map(|role| {
             let welcome = welcome(role.name, role.at, seed, &roster, role.parameters);
             (role.robot, welcome)
         });
 
         Self {
-            host: LocalHost::new(seats.collect()),
+            host: LocalHost::new(runners.collect()),
             tick: 0,
             places,
             obstacles: Vec::new(),

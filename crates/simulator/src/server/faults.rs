@@ -7,7 +7,7 @@ use bus::BusError;
 use protocol::messages::{FaultKind, FaultOrder, ProcessOrder};
 use protocol::{Epoch, RobotName, Tick, encode};
 
-use super::orders::Underway;
+use super::orders::PendingOrders;
 use super::process::{REPEAT_AFTER, Server, Stage};
 use crate::simulation::Simulation;
 
@@ -26,7 +26,7 @@ impl Server {
     pub(super) fn order_faults(
         &mut self,
         simulation: &mut Simulation,
-    ) -> Result<Option<Underway>, BusError> {
+    ) -> Result<Option<PendingOrders>, BusError> {
         let mut orders = simulation.faults_due();
         let lateness = self.barrier.lateness();
         simulation.note_faults(&orders, |robot| lateness.of(robot));
@@ -37,16 +37,16 @@ impl Server {
             then.push(restart_order(&robot, false));
         }
         let next = (simulation.epoch(), simulation.tick() + 1);
-        Ok((!orders.is_empty()).then(|| self.underway(next, orders, then)))
+        Ok((!orders.is_empty()).then(|| self.pending_orders(next, orders, then)))
     }
 
     /// Begins to end the faults of an epoch that is over, before tick 0 of the next one, if there are any.
-    pub(super) fn order_end_of_faults(&mut self, epoch: Epoch) -> Option<Underway> {
+    pub(super) fn order_end_of_faults(&mut self, epoch: Epoch) -> Option<PendingOrders> {
         let [kills, ends] = self.orders.ending_all();
         if kills.is_empty() {
-            return (!ends.is_empty()).then(|| self.underway((epoch, 0), ends, Vec::new()));
+            return (!ends.is_empty()).then(|| self.pending_orders((epoch, 0), ends, Vec::new()));
         }
-        Some(self.underway((epoch, 0), kills, ends))
+        Some(self.pending_orders((epoch, 0), kills, ends))
     }
 
     /// Has the fault of a robot ended for which the open tick waits. Only the wall clock would have ended it, so the record does
@@ -72,12 +72,12 @@ impl Server {
     }
 
     /// Begins to have orders carried out, and then others.
-    fn underway(
+    fn pending_orders(
         &mut self,
         (epoch, tick): (Epoch, Tick),
         orders: Vec<ProcessOrder>,
         then: Vec<ProcessOrder>,
-    ) -> Underway {
+    ) -> PendingOrders {
         for order in &orders {
             self.barrier.fault(&order.robot, order.lasting());
         }
@@ -85,7 +85,7 @@ impl Server {
 
         self.orders.done = None;
         let now = Instant::now();
-        Underway {
+        PendingOrders {
             order: FaultOrder {
                 epoch,
                 tick,
@@ -100,42 +100,42 @@ impl Server {
 
     /// Goes on with the order under way. Returns how long to wait before looking again; `None` when it is carried out.
     pub(super) fn await_faults(&mut self) -> Result<Option<Duration>, BusError> {
-        let Stage::Faults(underway) = &mut self.stage else {
+        let Stage::Faults(pending_orders) = &mut self.stage else {
             return Ok(None);
         };
-        let Some(put) = underway.put else {
-            let begun = underway.begun;
+        let Some(put) = pending_orders.put else {
+            let begun = pending_orders.begun;
             return self.await_launcher(begun);
         };
-        let tick = underway.order.tick;
-        if underway.begun.elapsed() > PATIENCE {
+        let tick = pending_orders.order.tick;
+        if pending_orders.begun.elapsed() > PATIENCE {
             tracing::error!("the faults before tick {tick} were not carried out in time");
             return Ok(None);
         }
 
         if put.elapsed() > REPEAT_AFTER {
-            underway.put = Some(Instant::now());
-            self.orders.publisher.put(encode(&underway.order))?;
+            pending_orders.put = Some(Instant::now());
+            self.orders.publisher.put(encode(&pending_orders.order))?;
         }
-        let is_done = self.orders.done == Some((underway.order.epoch, tick));
+        let is_done = self.orders.done == Some((pending_orders.order.epoch, tick));
         let mut is_carried_out = is_done;
-        for order in &underway.order.orders {
+        for order in &pending_orders.order.orders {
             // Before tick 0 robots are gathered, which waits for those whose faults are over.
             let is_gathered = tick == 0 && !order.begins;
             is_carried_out &= is_gathered || is_in_effect(&self.barrier, order);
         }
         if is_carried_out {
-            let then = std::mem::take(&mut underway.then);
+            let then = std::mem::take(&mut pending_orders.then);
             if then.is_empty() {
                 return Ok(None);
             }
-            let before = (underway.order.epoch, tick);
-            let underway = self.underway(before, then, Vec::new());
-            self.stage = Stage::Faults(underway);
+            let before = (pending_orders.order.epoch, tick);
+            let pending_orders = self.pending_orders(before, then, Vec::new());
+            self.stage = Stage::Faults(pending_orders);
             return Ok(Some(Duration::ZERO));
         }
-        if is_done && underway.nudged.elapsed() > NUDGE {
-            underway.nudged = Instant::now();
+        if is_done && pending_orders.nudged.elapsed() > NUDGE {
+            pending_orders.nudged = Instant::now();
             self.barrier.repeat(&mut self.outputs);
         }
         Ok(Some(LOOK))
@@ -144,9 +144,9 @@ impl Server {
     /// Puts the order as soon as a launcher subscribes. If none does in time, the run goes on and has logged it.
     fn await_launcher(&mut self, begun: Instant) -> Result<Option<Duration>, BusError> {
         if self.orders.publisher.has_subscribers() {
-            if let Stage::Faults(underway) = &mut self.stage {
-                underway.put = Some(Instant::now());
-                self.orders.publisher.put(encode(&underway.order))?;
+            if let Stage::Faults(pending_orders) = &mut self.stage {
+                pending_orders.put = Some(Instant::now());
+                self.orders.publisher.put(encode(&pending_orders.order))?;
             }
             return Ok(Some(LOOK));
         }

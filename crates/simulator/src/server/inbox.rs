@@ -24,17 +24,17 @@ pub(super) trait Work: Send {
 /// Where events are sent to.
 pub(super) struct Inbox<W: Work> {
     queue: SyncSender<W::Event>,
-    desk: Arc<Desk<W>>,
+    executor: Arc<Executor<W>>,
 }
 
 /// Where the worker takes its events from.
 pub(super) struct Events<W: Work> {
     queue: Receiver<W::Event>,
-    desk: Arc<Desk<W>>,
+    executor: Arc<Executor<W>>,
 }
 
 /// What those that send events share with the worker's own thread.
-struct Desk<W: Work> {
+struct Executor<W: Work> {
     working: Mutex<Option<Working<W>>>,
     /// Events that are sent and not handled.
     queued: AtomicUsize,
@@ -61,7 +61,7 @@ struct Sleep {
 /// connected while it works there.
 pub(super) fn inbox<W: Work>() -> (Inbox<W>, Events<W>) {
     let (sender, receiver) = std::sync::mpsc::sync_channel(QUEUE);
-    let desk = Arc::new(Desk {
+    let executor = Arc::new(Executor {
         working: Mutex::new(None),
         queued: AtomicUsize::new(0),
         sleep: Mutex::default(),
@@ -70,11 +70,11 @@ pub(super) fn inbox<W: Work>() -> (Inbox<W>, Events<W>) {
     });
     let inbox = Inbox {
         queue: sender,
-        desk: desk.clone(),
+        executor: executor.clone(),
     };
     let events = Events {
         queue: receiver,
-        desk,
+        executor,
     };
     (inbox, events)
 }
@@ -83,7 +83,7 @@ impl<W: Work> Clone for Inbox<W> {
     fn clone(&self) -> Self {
         Self {
             queue: self.queue.clone(),
-            desk: self.desk.clone(),
+            executor: self.executor.clone(),
         }
     }
 }
@@ -93,7 +93,7 @@ impl<W: Work> Inbox<W> {
     /// back about tokens and matching in the middle of its own work.
     pub(super) fn send(&self, event: W::Event) {
         if self.enqueue(event) {
-            self.desk.wake();
+            self.executor.wake();
         }
     }
 
@@ -103,30 +103,32 @@ impl<W: Work> Inbox<W> {
             return;
         }
 
-        if self.desk.works_on_arrival {
-            self.desk.work_here();
+        if self.executor.works_on_arrival {
+            self.executor.work_here();
         } else {
-            self.desk.wake();
+            self.executor.wake();
         }
     }
 
     /// Returns whether events are still taken: otherwise the process ends, and no event matters any more.
     fn enqueue(&self, event: W::Event) -> bool {
-        self.desk.queued.fetch_add(1, Ordering::SeqCst);
+        // Counted before it is queued: the thread at work looks at the count after it has given the work up, and then either it sees
+        // this event or this thread finds the work free. Counted afterwards, an event could be seen by neither.
+        self.executor.queued.fetch_add(1, Ordering::SeqCst);
         self.queue.send(event).is_ok()
     }
 
     /// Works on this thread and on those on which events arrive, until the work is over. Returns the worker and the reason.
     pub(super) fn run(&self, worker: W) -> (W, W::Interrupt) {
-        let desk = &self.desk;
-        *lock(&desk.working) = Some(Working {
+        let executor = &self.executor;
+        *lock(&executor.working) = Some(Working {
             worker,
             interrupt: None,
         });
         loop {
-            let mut slot = lock(&desk.working);
+            let mut slot = lock(&executor.working);
             if let Some(working) = slot.as_mut() {
-                desk.work(working);
+                executor.work(working);
             }
             if let Some(Working {
                 worker,
@@ -137,7 +139,7 @@ impl<W: Work> Inbox<W> {
             }
             drop(slot);
 
-            desk.sleep();
+            executor.sleep();
         }
     }
 }
@@ -147,7 +149,7 @@ impl<W: Work> Events<W> {
     pub(super) fn try_next(&self) -> Option<W::Event> {
         let event = self.queue.try_recv().ok()?;
 
-        self.desk.queued.fetch_sub(1, Ordering::SeqCst);
+        self.executor.queued.fetch_sub(1, Ordering::SeqCst);
         Some(event)
     }
 
@@ -155,12 +157,12 @@ impl<W: Work> Events<W> {
     pub(super) fn wait(&self, patience: Duration) -> Option<W::Event> {
         let event = self.queue.recv_timeout(patience).ok()?;
 
-        self.desk.queued.fetch_sub(1, Ordering::SeqCst);
+        self.executor.queued.fetch_sub(1, Ordering::SeqCst);
         Some(event)
     }
 }
 
-impl<W: Work> Desk<W> {
+impl<W: Work> Executor<W> {
     /// Does all that can be done now.
     fn work(&self, working: &mut Working<W>) {
         if working.interrupt.is_some() {
@@ -184,10 +186,10 @@ impl<W: Work> Desk<W> {
     /// Works until no event is left, unless another thread does.
     fn work_here(&self) {
         loop {
-            let alarm = scopeguard::guard(self, |desk| {
+            let alarm = scopeguard::guard(self, |executor| {
                 // The worker's own thread finds out that this one panicked, and the process ends.
                 if std::thread::panicking() {
-                    desk.wake();
+                    executor.wake();
                 }
             });
             // Another thread that works looks for further events when it is done.

@@ -73,7 +73,7 @@ impl Orders {
 }
 
 /// An order that is being carried out.
-pub(super) struct Underway {
+pub(super) struct PendingOrders {
     pub(super) order: FaultOrder,
     /// What is ordered when it has been carried out.
     pub(super) then: Vec<ProcessOrder>,

@@ -15,7 +15,7 @@ use record::difference::{Difference, between};
 use record::{Entry, Record};
 
 /// What is left of the record of a run that is resumed.
-pub struct Past {
+pub struct ReplayLog {
     epoch: Epoch,
     record: Option<Record>,
     /// The tick that is executed next; `None` if no tick was completed.
@@ -25,7 +25,7 @@ pub struct Past {
 }
 
 /// The robots for which the clock is held until they have joined again.
-pub(super) struct Returning {
+pub(super) struct RejoinWait {
     pub(super) robots: BTreeSet<RobotName>,
     pub(super) begun: Instant,
     /// When they were asked last; `None` if they have not been.
@@ -33,7 +33,7 @@ pub(super) struct Returning {
 }
 
 /// How a tick that was executed again compares with the record.
-pub(super) enum Repeated {
+pub(super) enum Comparison {
     /// It is the same, and there are more.
     Same,
     /// It is the same, and the last one of the record.
@@ -42,7 +42,7 @@ pub(super) enum Repeated {
     Different(Box<Difference>),
 }
 
-impl Past {
+impl ReplayLog {
     /// The record of an epoch.
     ///
     /// # Errors
@@ -119,7 +119,7 @@ impl Past {
     ///
     /// # Errors
     /// [`FileError`] if the record cannot be read on.
-    pub(super) fn compare(&mut self, executed: &TickRecord) -> Result<Repeated, FileError> {
+    pub(super) fn compare(&mut self, executed: &TickRecord) -> Result<Comparison, FileError> {
         let executed = Entry {
             tick: executed.tick,
             events: executed.events.to_vec(),
@@ -127,16 +127,16 @@ impl Past {
         };
         let recorded = self.next.take().unwrap_or_default();
         if let Some(difference) = between(&recorded, &executed) {
-            return Ok(Repeated::Different(Box::new(difference)));
+            return Ok(Comparison::Different(Box::new(difference)));
         }
 
         if let Some(record) = &mut self.record {
             self.next = next_tick(record)?;
         }
         if self.is_empty() {
-            Ok(Repeated::Last)
+            Ok(Comparison::Last)
         } else {
-            Ok(Repeated::Same)
+            Ok(Comparison::Same)
         }
     }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bus::{Bus, BusError, Declared, Publisher, Query};
-use lockstep::{Barrier, Naming, Outcome, Output, Sent, Stamp, Timing};
+use lockstep::{Barrier, IncarnationNotice, Outcome, Output, Sent, Stamp, Timing};
 use protocol::keys::{Keys, STATE};
 use protocol::messages::{
     Awaited, Clock, Command, CommandText, Control, End, LogKind, LogRecord, MAX_ENTRIES, Panel,
@@ -25,12 +25,12 @@ use super::answer::refuse;
 use super::departed::{Departed, Wait};
 use super::inbox::{Events, Inbox, Work, inbox};
 use super::observers::Observers;
-use super::orders::{Orders, Underway};
+use super::orders::{Orders, PendingOrders};
 use super::pace::Pace;
-use super::past::{Past, Repeated, Returning};
+use super::past::{Comparison, RejoinWait, ReplayLog};
 use super::timers::Timers;
 use super::viewers::Viewers;
-use super::watchdog::{Doing, Watchdog};
+use super::watchdog::{Activity, Watchdog};
 
 /// While the clock is held it is repeated this often: what was lost on the wire is then sent again.
 pub const REPEAT_AFTER: Duration = Duration::from_secs(2);
@@ -179,11 +179,11 @@ pub(super) enum Stage {
     /// The robots: to join, or to report.
     Robots,
     /// Robots that have to join again, before or after the last tick of a run that is executed again.
-    Returns(Returning),
+    Returns(RejoinWait),
     /// The next tick to be due.
     Grant,
     /// The launcher, to carry out the faults that are due before the next tick.
-    Faults(Underway),
+    Faults(PendingOrders),
 }
 
 /// A simulator process.
@@ -218,7 +218,7 @@ pub struct Server {
     /// Requests that wait until the next tick has begun.
     pub(super) deferred: Vec<Query>,
     /// The record of a run that is resumed, until it has been executed again.
-    pub(super) past: Option<Past>,
+    pub(super) past: Option<ReplayLog>,
     /// The subscriber to panels, while they are recorded: robots put them only if there is one.
     panel_subscriber: Option<Declared>,
     observing: Observing,
@@ -407,9 +407,9 @@ impl Server {
         mut self,
         mut scenario: Scenario,
         folder: &RunFolder,
-        past: Option<Past>,
+        past: Option<ReplayLog>,
     ) -> Result<Summary, ServerError> {
-        let mut epoch = past.as_ref().map_or(1, Past::epoch);
+        let mut epoch = past.as_ref().map_or(1, ReplayLog::epoch);
         self.past = past;
         loop {
             let mut simulation = Simulation::new(scenario, epoch)?;
@@ -500,8 +500,8 @@ impl Server {
 
         self.pace.gather();
         self.gather(simulation);
-        if let Some(underway) = self.order_end_of_faults(simulation.epoch()) {
-            self.stage = Stage::Faults(underway);
+        if let Some(pending_orders) = self.order_end_of_faults(simulation.epoch()) {
+            self.stage = Stage::Faults(pending_orders);
         }
     }
 
@@ -572,13 +572,13 @@ impl Server {
                 }
                 self.repeat_changes(simulation);
                 self.follow_lateness(simulation);
-                if let Some(underway) = self.order_faults(simulation)? {
-                    self.stage = Stage::Faults(underway);
+                if let Some(pending_orders) = self.order_faults(simulation)? {
+                    self.stage = Stage::Faults(pending_orders);
                     return Ok(Next::Opened);
                 }
             }
-            Stage::Faults(underway) => {
-                let is_before_tick_zero = underway.order.tick == 0;
+            Stage::Faults(pending_orders) => {
+                let is_before_tick_zero = pending_orders.order.tick == 0;
                 if let Some(patience) = self.await_faults()? {
                     return Ok(Next::Wait(Some(patience)));
                 }
@@ -685,12 +685,12 @@ impl Server {
     fn put(
         &mut self,
         simulation: &Simulation,
-        news: &[(RobotName, Naming)],
+        news: &[(RobotName, IncarnationNotice)],
         clock: Clock,
     ) -> Result<(), BusError> {
-        for (name, naming) in news {
+        for (name, notice) in news {
             if let Some(publisher) = self.news.get(name) {
-                publisher.put(encode(&simulation.news(name, *naming)))?;
+                publisher.put(encode(&simulation.news(name, *notice)))?;
             }
         }
 
@@ -704,11 +704,11 @@ impl Server {
         simulation: &mut Simulation,
         recorder: &mut Recorder,
     ) -> Result<(), Interrupt> {
-        self.blame_culprits();
+        self.record_stragglers();
         self.take_late(&mut outcome, simulation);
         let record = simulation.end_tick(outcome);
         self.observers.note(record.tick, &record.events);
-        self.watchdog.note(Some(Doing::Record));
+        self.watchdog.note(Some(Activity::Record));
         if self.observing.is_on {
             recorder.observe(self.observing.take(record.tick, self.waiting_since));
         }
@@ -717,7 +717,7 @@ impl Server {
         if !self.pace.is_at_full_speed() {
             recorder.write_noted()?;
         }
-        self.watchdog.note(Some(Doing::Work));
+        self.watchdog.note(Some(Activity::Work));
         self.observers.log(&lines);
         self.stage = Stage::Grant;
         if self.past.is_some() {
@@ -740,7 +740,7 @@ impl Server {
         if !recorder.has_noted() {
             return Ok(());
         }
-        self.watchdog.note(Some(Doing::Record));
+        self.watchdog.note(Some(Activity::Record));
         recorder.write_noted()
     }
 
@@ -788,11 +788,11 @@ impl Server {
         };
 
         match past.compare(record)? {
-            Repeated::Same => {}
-            Repeated::Different(difference) => {
+            Comparison::Same => {}
+            Comparison::Different(difference) => {
                 return Err(Interrupt::Failed(ServerError::NotRepeated(difference)));
             }
-            Repeated::Last => {
+            Comparison::Last => {
                 self.past = None;
                 recorder.supersede_record()?;
                 self.pace.ready();
@@ -824,7 +824,7 @@ impl Server {
         }
     }
 
-    fn blame_culprits(&mut self) {
+    fn record_stragglers(&mut self) {
         let held_s = self.waiting_since.elapsed().as_secs_f64();
         for name in std::mem::take(&mut self.culprits) {
             let held = self.wall.held_up_by.entry(name).or_default();
@@ -868,7 +868,7 @@ impl Server {
         }
     }
 
-    fn say_that_it_stays(&mut self, simulation: &Simulation) {
+    fn log_keep_alive(&mut self, simulation: &Simulation) {
         let tick = simulation.tick();
         self.observers.log(&[LogRecord {
             epoch: simulation.epoch(),
@@ -1136,7 +1136,7 @@ impl Work for Running {
     type Interrupt = Interrupt;
 
     fn work(&mut self) -> Result<Option<Duration>, Interrupt> {
-        self.server.watchdog.note(Some(Doing::Work));
+        self.server.watchdog.note(Some(Activity::Work));
         let outcome = match &mut self.recorder {
             Recording::On(recorder) => {
                 let outcome = self.server.work(&mut self.simulation, recorder);
@@ -1164,7 +1164,7 @@ impl Running {
         if let Recording::On(recorder) = &mut self.recorder {
             let summary = self.server.end(end, &mut self.simulation, recorder)?;
             self.recorder = Recording::Over(Box::new(summary));
-            self.server.say_that_it_stays(&self.simulation);
+            self.server.log_keep_alive(&self.simulation);
         }
         Ok(())
     }

@@ -12,14 +12,14 @@ use protocol::RobotName;
 use protocol::messages::{CommandText, Report};
 
 use super::faults::{LOOK, NUDGE, PATIENCE};
-use super::past::{Past, Returning};
+use super::past::{RejoinWait, ReplayLog};
 use super::process::{Server, Stage};
 use crate::simulation::Simulation;
 
 impl Server {
     /// Says who takes part in the tick that is opened next, while the run is executed again.
     pub(super) fn recall(&mut self) {
-        let attendance = self.past.as_ref().map(Past::attendance);
+        let attendance = self.past.as_ref().map(ReplayLog::attendance);
         self.barrier.recall(attendance);
     }
 
@@ -55,7 +55,7 @@ impl Server {
             }
         }
 
-        self.stage = Stage::Returns(Returning {
+        self.stage = Stage::Returns(RejoinWait {
             robots,
             begun: Instant::now(),
             asked: None,

@@ -15,7 +15,7 @@ const NAME_EVERY: Duration = Duration::from_secs(10);
 
 /// What the simulator does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Doing {
+pub(super) enum Activity {
     /// It handles messages and ticks.
     Work,
     /// It writes the record.
@@ -32,9 +32,9 @@ pub(super) struct Watchdog {
 /// What is done, and since when.
 #[derive(Debug, Default)]
 struct Activity {
-    present: Option<(Doing, Instant)>,
+    present: Option<(Activity, Instant)>,
     /// When each was named last.
-    named_at: BTreeMap<Doing, Instant>,
+    named_at: BTreeMap<Activity, Instant>,
 }
 
 impl Watchdog {
@@ -68,7 +68,7 @@ impl Watchdog {
     }
 
     /// Notes what is done from now on, until the next call; `None` if there is nothing to do.
-    pub(super) fn note(&self, doing: Option<Doing>) {
+    pub(super) fn note(&self, doing: Option<Activity>) {
         let mut activity = self.activity.lock().unwrap_or_else(PoisonError::into_inner);
         activity.present = doing.map(|doing| (doing, Instant::now()));
     }
@@ -93,10 +93,10 @@ fn look(activity: &Mutex<Activity>, slept: Duration) -> Option<String> {
     }
     activity.named_at.insert(doing, Instant::now());
     let line = match doing {
-        Doing::Record => {
+        Activity::Record => {
             "the disk stalls: to write the record takes more than 0.5 s, and the clock is held"
         }
-        Doing::Work => {
+        Activity::Work => {
             "the simulator is busy for more than 0.5 s with one piece of work, and the clock is held"
         }
     };
@@ -117,13 +117,13 @@ mod tests {
             // The receiver is gone when the test is over.
             let _unread = sender.send(line);
         });
-        watchdog.note(Some(Doing::Record));
+        watchdog.note(Some(Activity::Record));
 
         let first = std::iter::repeat_with(|| lines.recv_timeout(LONG).unwrap())
             .find(|line| !line.contains("did not run"));
         assert!(first.unwrap().contains("the disk stalls"));
 
-        watchdog.note(Some(Doing::Work));
+        watchdog.note(Some(Activity::Work));
         let second = std::iter::repeat_with(|| lines.recv_timeout(LONG).unwrap())
             .find(|line| !line.contains("did not run"));
         assert!(second.unwrap().contains("busy"), "named twice");

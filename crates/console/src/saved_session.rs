@@ -15,13 +15,13 @@ const OWN: u32 = 0o600;
 
 /// Address and secrets of a console.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Kept {
+pub(crate) struct SavedSession {
     pub(crate) address: SocketAddr,
     pub(crate) token: String,
     pub(crate) path: String,
 }
 
-impl Kept {
+impl SavedSession {
     /// What a console leaves.
     pub(crate) fn of(guard: &Guard) -> Self {
         Self {
@@ -92,18 +92,21 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("console.kept");
         let guard = Guard::new("127.0.0.1:7007".parse().unwrap()).unwrap();
-        let kept = Kept::of(&guard);
+        let kept = SavedSession::of(&guard);
         kept.write(&file).unwrap();
-        assert_eq!(Kept::read(&file), Some(kept));
+        assert_eq!(SavedSession::read(&file), Some(kept));
 
         fs::set_permissions(&file, fs::Permissions::from_mode(0o644)).unwrap();
-        assert_eq!(Kept::read(&file), None);
-        assert_eq!(Kept::read(&folder.path().join("none")), None);
-        assert_eq!(Kept::check_replaceable(&file), Ok(()));
-        assert_eq!(Kept::check_replaceable(&folder.path().join("none")), Ok(()));
+        assert_eq!(SavedSession::read(&file), None);
+        assert_eq!(SavedSession::read(&folder.path().join("none")), None);
+        assert_eq!(SavedSession::check_replaceable(&file), Ok(()));
+        assert_eq!(
+            SavedSession::check_replaceable(&folder.path().join("none")),
+            Ok(())
+        );
 
         fs::write(&file, "{\"tick\":0}\n").unwrap();
-        let refused = Kept::check_replaceable(&file).unwrap_err();
+        let refused = SavedSession::check_replaceable(&file).unwrap_err();
         assert!(refused.contains("is not what a console keeps"), "{refused}");
     }
 
@@ -112,13 +115,13 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("console.kept");
         for path in ["/", "//", "/{*x}/", "/assets/", "0123456789abcdef"] {
-            let kept = Kept {
+            let kept = SavedSession {
                 address: "127.0.0.1:7007".parse().unwrap(),
                 token: "0123456789abcdef".to_owned(),
                 path: path.to_owned(),
             };
             kept.write(&file).unwrap();
-            assert_eq!(Kept::read(&file), None, "{path}");
+            assert_eq!(SavedSession::read(&file), None, "{path}");
         }
     }
 }

@@ -4,10 +4,10 @@ use bus::Reply;
 use protocol::keys::STATE;
 use protocol::{Epoch, Tick};
 
-use super::Stage;
+use super::Harness;
 use crate::report::Failure;
 
-impl Stage<'_> {
+impl Harness<'_> {
     /// Queries the robot; `None` if there is no reply.
     pub(crate) fn ask(&self, what: &str, parameters: &str) -> Result<Option<Reply>, Failure> {
         let key = self.keys.query(&self.kit.subject(), what);

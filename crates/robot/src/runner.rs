@@ -37,7 +37,7 @@ pub struct Done {
 }
 
 /// A robot that takes part in an epoch.
-pub struct Seat {
+pub struct Runner {
     robot: Box<dyn Robot>,
     welcome: Arc<Welcome>,
     random: Stream,
@@ -50,8 +50,8 @@ pub struct Seat {
     gave_up: Option<String>,
 }
 
-impl Seat {
-    /// Seats a robot that has been welcomed.
+impl Runner {
+    /// The runner of a robot that has been welcomed.
     #[must_use]
     pub fn new(robot: Box<dyn Robot>, welcome: Welcome) -> Self {
         Self {

@@ -6,8 +6,8 @@ use lockstep::{Admission, Refused, Stamp};
 use protocol::messages::{JoinAnswer, News, Refusal};
 use protocol::{Epoch, RobotName, Tick};
 
-use super::{Stage, barrier, patient};
-use crate::cast::Cast;
+use super::{Harness, barrier, patient};
+use crate::fake_peers::FakePeers;
 use crate::patience::{PATIENCE, START_PATIENCE};
 use crate::report::Failure;
 use crate::wire::Joining;
@@ -15,23 +15,23 @@ use crate::wire::Joining;
 /// The instance of robots that the kit plays.
 const OWN_INSTANCE: &str = "conformance kit";
 
-impl Stage<'_> {
+impl Harness<'_> {
     /// Sets the other robots up and begins the first epoch, so that the robot can be admitted.
     pub(crate) fn prepare(&mut self) -> Result<(), Failure> {
         let kit = self.kit;
         let subject = kit.subject();
         self.template = kit.template(&self.run);
-        self.cast = Cast::new(
+        self.fake_peers = FakePeers::new(
             kit.others(),
             self.options.has_extras,
             self.options.writes_integers,
         );
-        self.wire.keep(self.cast.serve(&kit.bus, &self.keys)?);
+        self.wire.keep(self.fake_peers.serve(&kit.bus, &self.keys)?);
         if self.options.is_followed {
             self.wire.follow(&subject)?;
         }
 
-        let others: Vec<RobotName> = self.cast.names().cloned().collect();
+        let others: Vec<RobotName> = self.fake_peers.names().cloned().collect();
         let roster = others.iter().cloned().chain([subject.clone()]);
         self.barrier = barrier(roster);
         for name in &others {
@@ -95,8 +95,8 @@ impl Stage<'_> {
 
     /// The next request to join.
     pub(crate) fn next_join(&mut self, patience: Duration) -> Result<Joining, Failure> {
-        self.until("a request to join", patience, |stage| {
-            stage.joins.pop_front()
+        self.until("a request to join", patience, |harness| {
+            harness.joins.pop_front()
         })
     }
 
@@ -162,7 +162,9 @@ impl Stage<'_> {
 
     /// Answers a request to join.
     fn answer_join(&self, joining: &Joining, answer: &JoinAnswer) {
-        joining.query.reply(&joining.key, self.cast.dress(answer));
+        joining
+            .query
+            .reply(&joining.key, self.fake_peers.dress(answer));
     }
 
     /// Refuses a request to join.
@@ -179,7 +181,7 @@ impl Stage<'_> {
         self.until(
             "its liveliness token after the welcome",
             PATIENCE,
-            |stage| stage.is_present().then_some(()),
+            |harness| harness.is_present().then_some(()),
         )
     }
 

@@ -7,7 +7,7 @@ use lockstep::Lateness;
 use protocol::Tick;
 use protocol::messages::{Clock, End, News, OnLate, Report};
 
-use super::{Done, Stage, patient};
+use super::{Done, Harness, patient};
 use crate::flushing;
 use crate::patience::PATIENCE;
 use crate::report::Failure;
@@ -16,7 +16,7 @@ use crate::seen::Sent;
 /// A robot that has put its report so often without all commands that it states does not put them at all.
 const INCOMPLETE: usize = 3;
 
-impl Stage<'_> {
+impl Harness<'_> {
     /// Whether the tick that was granted last is open.
     pub(crate) fn is_open(&self) -> bool {
         self.barrier.is_open()
@@ -32,7 +32,7 @@ impl Stage<'_> {
 
     /// Puts a clock.
     pub(crate) fn put_clock(&self, clock: &Clock) -> Result<(), Failure> {
-        self.put_as_clock(&self.cast.dress(clock))
+        self.put_as_clock(&self.fake_peers.dress(clock))
     }
 
     /// Puts something else on the key of clocks.
@@ -42,7 +42,7 @@ impl Stage<'_> {
 
     /// Puts news for the robot.
     pub(crate) fn put_news(&self, news: &News) -> Result<(), Failure> {
-        self.put_as_news(&self.cast.dress(news))
+        self.put_as_news(&self.fake_peers.dress(news))
     }
 
     /// Puts something else on the key of its news.
@@ -66,8 +66,8 @@ impl Stage<'_> {
 
     /// Grants the next tick with these news.
     pub(crate) fn open(&mut self, news: &News) -> Result<(), Failure> {
-        self.until("all robots are connected", PATIENCE, |stage| {
-            stage.is_gathered.then_some(())
+        self.until("all robots are connected", PATIENCE, |harness| {
+            harness.is_gathered.then_some(())
         })?;
 
         let tick = self.next;
@@ -88,11 +88,11 @@ impl Stage<'_> {
     pub(crate) fn complete(&mut self) -> Result<Done, Failure> {
         let tick = self.next.saturating_sub(1);
         let expected = format!("a report for tick {tick} of epoch {}", self.epoch);
-        let came = self.until(&expected, PATIENCE, |stage| {
-            if let Some(outcome) = stage.outcome.take() {
+        let came = self.until(&expected, PATIENCE, |harness| {
+            if let Some(outcome) = harness.outcome.take() {
                 return Some(Ok(outcome));
             }
-            stage.hopeless(tick).map(Err)
+            harness.hopeless(tick).map(Err)
         });
         let mut outcome = match came {
             Ok(came) => came?,
@@ -195,7 +195,9 @@ impl Stage<'_> {
         self.is_cut_off = true;
         self.drive(|barrier, out| barrier.set_lateness(impatient, out));
         self.open(&News::default())?;
-        self.until("the clock goes on", PATIENCE, |stage| stage.outcome.take())?;
+        self.until("the clock goes on", PATIENCE, |harness| {
+            harness.outcome.take()
+        })?;
 
         self.drive(|barrier, out| barrier.set_lateness(patient(), out));
         self.is_cut_off = false;

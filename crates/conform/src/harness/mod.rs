@@ -9,13 +9,15 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::process::ExitStatus;
 use std::time::{Duration, Instant};
 
-use lockstep::{Barrier, Lateness, Naming, Outcome, Output, Sent as Put, Stamp, Timer, Timing};
+use lockstep::{
+    Barrier, IncarnationNotice, Lateness, Outcome, Output, Sent as Put, Stamp, Timer, Timing,
+};
 use protocol::keys::Keys;
 use protocol::messages::{Clock, MAX_ENTRIES, News, OnLate, Report, Waiting, Welcome};
 use protocol::{Epoch, RobotName, RunName, Tick, decode};
 
 use crate::body::Body;
-use crate::cast::Cast;
+use crate::fake_peers::FakePeers;
 use crate::kit::Kit;
 use crate::patience::{Limit, PATIENCE};
 use crate::process::Process;
@@ -42,7 +44,7 @@ pub(crate) struct Done {
     pub(crate) took: Duration,
 }
 
-/// How a stage differs from the usual one.
+/// How a harness differs from the usual one.
 pub(crate) struct Options {
     /// How long the robot is to try to join, seconds.
     pub(crate) patience_s: u32,
@@ -72,11 +74,11 @@ impl Default for Options {
 }
 
 /// A robot's process on a run of its own.
-pub(crate) struct Stage<'k> {
+pub(crate) struct Harness<'k> {
     pub(crate) kit: &'k Kit,
     pub(crate) run: RunName,
     pub(crate) keys: Keys,
-    pub(crate) cast: Cast,
+    pub(crate) fake_peers: FakePeers,
     pub(crate) seen: Seen,
     pub(crate) process: Process,
     pub(crate) body: Body,
@@ -123,7 +125,7 @@ fn patient() -> Lateness {
     }
 }
 
-impl<'k> Stage<'k> {
+impl<'k> Harness<'k> {
     /// Opens a run and starts the robot's program on it.
     pub(crate) fn open_run(kit: &'k Kit, options: Options) -> Result<Self, Failure> {
         let run = kit.next_run();
@@ -141,7 +143,7 @@ impl<'k> Stage<'k> {
         Ok(Self {
             kit,
             keys,
-            cast: Cast::default(),
+            fake_peers: FakePeers::default(),
             seen: Seen::default(),
             process,
             body: Body::default(),
@@ -322,20 +324,20 @@ impl<'k> Stage<'k> {
     }
 
     /// Puts news and clock, and reports for the robots that the kit plays.
-    fn grant(&mut self, news: &[(RobotName, Naming)], clock: &Clock) {
+    fn grant(&mut self, news: &[(RobotName, IncarnationNotice)], clock: &Clock) {
         let at = (clock.epoch, clock.tick);
         if self.granted == Some(at) {
             self.repeated.insert(at);
         }
         self.granted = Some(at);
 
-        self.cast.begin(clock.epoch, clock.tick);
+        self.fake_peers.begin(clock.epoch, clock.tick);
         if !self.is_cut_off {
             // Where nothing can be put any more, the wait for the report ends by itself.
             let _ = self.put_tick(news, clock);
         }
 
-        let others: Vec<RobotName> = self.cast.names().cloned().collect();
+        let others: Vec<RobotName> = self.fake_peers.names().cloned().collect();
         for name in others {
             let (generation, _) = self.barrier.presence(&name);
             let stamp = Stamp {
@@ -347,21 +349,25 @@ impl<'k> Stage<'k> {
         }
     }
 
-    fn put_tick(&self, news: &[(RobotName, Naming)], clock: &Clock) -> Result<(), Failure> {
+    fn put_tick(
+        &self,
+        news: &[(RobotName, IncarnationNotice)],
+        clock: &Clock,
+    ) -> Result<(), Failure> {
         if self.options.puts_states {
-            self.cast.put_states(&self.kit.bus, &self.keys)?;
+            self.fake_peers.put_states(&self.kit.bus, &self.keys)?;
         }
 
         let subject = self.kit.subject();
         let own = news.iter().find(|(name, _)| *name == subject);
-        if let Some((_, naming)) = own
+        if let Some((_, notice)) = own
             && !self.withholds_news
         {
             self.put_news(&News {
                 epoch: clock.epoch,
                 tick: clock.tick,
-                joined: naming.joined,
-                rejoin: naming.rejoin,
+                joined: notice.joined,
+                rejoin: notice.rejoin,
                 ..self.news.clone()
             })?;
         }

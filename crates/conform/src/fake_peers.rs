@@ -36,7 +36,7 @@ struct State {
 
 /// The others, and the tick that they are in.
 #[derive(Clone, Default)]
-pub(crate) struct Cast {
+pub(crate) struct FakePeers {
     others: Arc<BTreeMap<RobotName, Role>>,
     state: Arc<Mutex<State>>,
     /// Whether everything that is put carries unknown fields.
@@ -45,7 +45,7 @@ pub(crate) struct Cast {
     writes_integers: bool,
 }
 
-impl Cast {
+impl FakePeers {
     pub(crate) fn new(
         others: BTreeMap<RobotName, Role>,
         has_extras: bool,
@@ -166,10 +166,12 @@ impl Cast {
         let mut declared = Vec::new();
         for name in self.names() {
             for what in QUERIES.iter().chain([&STATE]) {
-                let cast = self.clone();
+                let fake_peers = self.clone();
                 let name = name.clone();
                 let key = keys.query(&name, what);
-                declared.push(bus.queryable(&key, move |query| cast.receive(&name, what, query))?);
+                declared.push(
+                    bus.queryable(&key, move |query| fake_peers.receive(&name, what, query))?,
+                );
             }
         }
         for name in self.names() {

@@ -6,7 +6,7 @@ use std::process::{Command, ExitCode};
 
 /// Goes on as the `cars` beside this program, under the name of this program: the process, its arguments and its environment stay.
 /// So what the programs share is compiled once and stored once. Returns only if that `cars` cannot be run.
-pub(crate) fn open(program: &str) -> ExitCode {
+pub(crate) fn exec_cars(program: &str) -> ExitCode {
     let own = std::env::current_exe().unwrap_or_else(|_| program.into());
     let cars = own.with_file_name("cars");
 

@@ -4,11 +4,11 @@ use pyo3::PyResult;
 use pyo3::exceptions::PyRuntimeError;
 
 /// The simulation as a robot sees it, whatever its lifetime.
-trait Lent {
+trait ScopedBorrow {
     fn lend(&mut self, borrow: &mut dyn FnMut(&mut robot::Cars<'_>));
 }
 
-impl Lent for robot::Cars<'_> {
+impl ScopedBorrow for robot::Cars<'_> {
     fn lend(&mut self, borrow: &mut dyn FnMut(&mut robot::Cars<'_>)) {
         borrow(self);
     }
@@ -16,7 +16,7 @@ impl Lent for robot::Cars<'_> {
 
 scoped_tls_hkt::scoped_thread_local!(
     /// What is lent on this thread, while a robot's tick runs on it.
-    static mut LENT: for<'a> &'a mut (dyn Lent + 'a)
+    static mut LENT: for<'a> &'a mut (dyn ScopedBorrow + 'a)
 );
 
 /// Lends the simulation to what is called.
@@ -37,8 +37,8 @@ pub(crate) fn with_cars<T>(using: impl FnOnce(&mut robot::Cars<'_>) -> T) -> PyR
 
     let mut using = Some(using);
     let mut result = None;
-    LENT.with(|lent| {
-        lent.lend(&mut |cars| result = using.take().map(|using| using(cars)));
+    LENT.with(|scoped_borrow| {
+        scoped_borrow.lend(&mut |cars| result = using.take().map(|using| using(cars)));
     });
     result.ok_or_else(outside)
 }

@@ -9,7 +9,7 @@ use robot::{Action, BadParameters, Panel, Robot, StateVariables};
 
 use crate::cars::Cars;
 use crate::error::Interrupted;
-use crate::lent::lend;
+use crate::scoped_borrow::lend;
 use crate::values::{read_action, variables};
 
 /// The first exception that a robot of this process raised, or that ended what it takes part in.
