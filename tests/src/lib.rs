@@ -435,3 +435,18 @@ pub fn is_within(limit: Duration, mut holds: impl FnMut() -> bool) -> bool {
 
     true
 }
+
+/// The subcommands that the help of `cars` lists, in all of its groups.
+#[must_use]
+pub fn subcommands_in(help: &str) -> Vec<String> {
+    let (listed, _) = help.split_once("\nOptions:\n").unwrap();
+    let mut names = Vec::new();
+    for line in listed.lines() {
+        if line.starts_with("  ") {
+            names.push(line.split_whitespace().next().unwrap().to_owned());
+        }
+    }
+
+    assert!(names.len() > 20, "{names:?}");
+    names
+}

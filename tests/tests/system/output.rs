@@ -4,7 +4,7 @@ use std::fs::File;
 use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
 
-use system_tests::{Lab, programs, root};
+use system_tests::{Lab, programs, root, subcommands_in};
 
 /// A pipe whose reader has gone.
 fn closed() -> Stdio {
@@ -53,18 +53,7 @@ fn check_output(name: &str, args: &[&str]) {
 fn subcommands() -> Vec<String> {
     let output = program("cars", &["--help"]).output().unwrap();
     let help = String::from_utf8(output.stdout).unwrap();
-    let (_, listed) = help.split_once("Commands:\n").unwrap();
-    let (listed, _) = listed.split_once("\n\n").unwrap();
-
-    let mut names = Vec::new();
-    for line in listed.lines() {
-        // Further lines of a description are indented more.
-        if line.starts_with("  ") && !line.starts_with("   ") {
-            names.push(line.split_whitespace().next().unwrap().to_owned());
-        }
-    }
-    assert!(names.len() > 15, "{names:?}");
-    names
+    subcommands_in(&help)
 }
 
 #[test]
