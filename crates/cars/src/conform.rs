@@ -105,7 +105,7 @@ fn setting(args: &ConformArgs) -> miette::Result<Setting> {
     }
 
     // Commands of the command line come before those of the scenario.
-    for role in setting.cast.values_mut() {
+    for role in setting.fake_peers.values_mut() {
         role.understands.splice(0..0, args.says.iter().cloned());
     }
 
@@ -123,19 +123,19 @@ fn take_scenario(setting: &mut Setting, file: &Path) -> miette::Result<()> {
     setting.body_m = scenario.body_m;
     setting.sensing_range_m = scenario.sensing_range_m;
 
-    setting.cast.clear();
+    setting.fake_peers.clear();
     for (name, spec) in &scenario.robots {
         let role = Role {
             location: spec.at,
             parameters: spec.parameters.clone(),
             ..Role::default()
         };
-        setting.cast.insert(name.clone(), role);
+        setting.fake_peers.insert(name.clone(), role);
     }
 
     let performances = lab::performances(scenario, setting.ticks)?;
     for (name, performance) in performances.into_iter().flatten() {
-        if let Some(role) = setting.cast.get_mut(&name) {
+        if let Some(role) = setting.fake_peers.get_mut(&name) {
             role.understands = performance.commands;
             role.states = performance.states;
         }

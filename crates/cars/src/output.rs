@@ -36,6 +36,7 @@ impl Output {
             return Ok(Self::Standard(BufWriter::new(std::io::stdout())));
         };
 
+        check_not_record(path)?;
         let is_special = path
             .metadata()
             .is_ok_and(|found| !found.is_file() && !found.is_dir());
@@ -46,22 +47,7 @@ impl Output {
             let file = file.map_err(|error| unwritable(path, &error))?;
             return Ok(Self::Stream(BufWriter::new(file)));
         }
-        let draft = Draft::follow(path)?;
-        let target = draft.path();
-        let folder = target
-            .parent()
-            .and_then(|parent| parent.canonicalize().ok());
-        let full = folder
-            .zip(target.file_name())
-            .map(|(folder, name)| folder.join(name));
-        if full.is_some_and(|full| RunFolder::is_of_run(&full) || is_of_experiment(&full)) {
-            return Err(miette!(
-                help = "choose another --output",
-                "{} is part of the record of a run or an experiment",
-                target.display()
-            ));
-        }
-        Ok(Self::File(draft))
+        Ok(Self::File(Draft::follow(path)?))
     }
 
     /// Completes it. Returns whether everything was written: a reader may have seen enough.
@@ -78,6 +64,35 @@ impl Output {
         }
         Ok(())
     }
+}
+
+/// Checks that a path is not that of a part of the record of a run or an experiment: as it is given, with its folder's links
+/// resolved, and with all links resolved.
+fn check_not_record(path: &Path) -> miette::Result<()> {
+    let absolute = std::path::absolute(path).ok();
+    let in_folder = path
+        .parent()
+        .map(|parent| {
+            if parent == Path::new("") {
+                Path::new(".")
+            } else {
+                parent
+            }
+        })
+        .and_then(|parent| parent.canonicalize().ok())
+        .zip(path.file_name())
+        .map(|(folder, name)| folder.join(name));
+    let resolved = path.canonicalize().ok();
+
+    let mut places = [absolute, in_folder, resolved].into_iter().flatten();
+    if places.any(|place| RunFolder::is_of_run(&place) || is_of_experiment(&place)) {
+        return Err(miette!(
+            help = "choose another --output",
+            "{} is part of the record of a run or an experiment",
+            path.display()
+        ));
+    }
+    Ok(())
 }
 
 impl Write for Output {

@@ -137,13 +137,22 @@ impl Override {
         parts.all(|(own, others)| own == others || is_index(own) != is_index(others))
     }
 
+    /// Whether its value is a table that replaces single keys of the one that is there: so it is among the parameters of robots, which
+    /// a scenario may have from a file.
+    #[must_use]
+    pub fn merges(&self) -> bool {
+        let is_among_parameters =
+            self.top() == "robot" && self.path.get(2).is_some_and(|part| part == "params");
+        is_among_parameters && self.value.is_table()
+    }
+
     /// The content of a file with the change.
     ///
     /// # Errors
     /// The path, and why there is no place for it.
     pub fn apply(&self, table: toml::Table) -> Result<toml::Table, String> {
         let mut root = toml::Value::Table(table);
-        set(&mut root, &self.path, &self.value)
+        set(&mut root, &self.path, &self.value, self.merges())
             .map_err(|reason| format!("{}: {reason}", self.path.join(".")))?;
         match root {
             toml::Value::Table(table) => Ok(table),
@@ -152,7 +161,27 @@ impl Override {
     }
 }
 
-fn set(at: &mut toml::Value, path: &[String], value: &toml::Value) -> Result<(), String> {
+/// Replaces a value. Of a table only the keys that the other table has.
+fn merge(existing: &mut toml::Value, by: &toml::Value) {
+    match (existing, by) {
+        (toml::Value::Table(table), toml::Value::Table(by)) => {
+            for (key, value) in by {
+                match table.get_mut(key) {
+                    Some(existing) => merge(existing, value),
+                    None => drop(table.insert(key.clone(), value.clone())),
+                }
+            }
+        }
+        (existing, by) => *existing = by.clone(),
+    }
+}
+
+fn set(
+    at: &mut toml::Value,
+    path: &[String],
+    value: &toml::Value,
+    merges: bool,
+) -> Result<(), String> {
     let Some((first, rest)) = path.split_first() else {
         *at = value.clone();
         return Ok(());
@@ -160,7 +189,10 @@ fn set(at: &mut toml::Value, path: &[String], value: &toml::Value) -> Result<(),
 
     let next = match at {
         toml::Value::Table(table) if rest.is_empty() => {
-            table.insert(first.clone(), value.clone());
+            match table.get_mut(first) {
+                Some(existing) if merges => merge(existing, value),
+                _ => drop(table.insert(first.clone(), value.clone())),
+            }
             return Ok(());
         }
         toml::Value::Table(table) => table
@@ -174,7 +206,7 @@ fn set(at: &mut toml::Value, path: &[String], value: &toml::Value) -> Result<(),
         }
     };
 
-    set(next, rest, value)
+    set(next, rest, value, merges)
 }
 
 fn element<'a>(list: &'a mut [toml::Value], which: &str) -> Result<&'a mut toml::Value, String> {
@@ -192,6 +224,38 @@ fn element<'a>(list: &'a mut [toml::Value], which: &str) -> Result<&'a mut toml:
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_table_replaces_single_keys_of_parameters_and_all_of_other_tables() {
+        let file = "[network]\ncommands = { loss = 0.1 }\n[[robot]]\nname = \"A\"\nparams = { a = 1, b = { c = 2, d = 3 } }\n";
+        for (change, expected) in [
+            (
+                "robot.A.params.b={c=9}",
+                "params = { a = 1, b = { c = 9, d = 3 } }",
+            ),
+            (
+                "robot.A.params={b={d=9}, e=4}",
+                "params = { a = 1, b = { c = 2, d = 9 }, e = 4 }",
+            ),
+            (
+                "robot.0.params.b.c=9",
+                "params = { a = 1, b = { c = 9, d = 3 } }",
+            ),
+            ("robot.A.params.b=9", "params = { a = 1, b = 9 }"),
+        ] {
+            let change: Override = change.parse().unwrap();
+            let changed = change.apply(file.parse().unwrap()).unwrap();
+            let expected: toml::Table = expected.parse().unwrap();
+            assert_eq!(
+                changed["robot"][0]["params"], expected["params"],
+                "{change}"
+            );
+        }
+
+        let change: Override = "network.commands={ delay = 1 }".parse().unwrap();
+        let changed = change.apply(file.parse().unwrap()).unwrap();
+        assert_eq!(changed["network"]["commands"].as_table().unwrap().len(), 1);
+    }
 
     #[test]
     fn changes_overlap_where_one_may_set_what_the_other_sets() {

@@ -15,7 +15,7 @@ struct Hint {
     hint: &'static str,
 }
 
-const REMEDIES: [Hint; 8] = [
+const HINTS: [Hint; 8] = [
     Hint {
         interpreters: &["python"],
         endings: &["py"],
@@ -106,7 +106,7 @@ fn by_interpreter(line: &str) -> Option<&'static str> {
         .map(|word| word.trim_end_matches(|c: char| c.is_ascii_digit() || c == '.'))
         .collect();
 
-    let found = REMEDIES.iter().find(|hint| {
+    let found = HINTS.iter().find(|hint| {
         hint.interpreters
             .iter()
             .any(|interpreter| names.contains(interpreter))
@@ -115,7 +115,7 @@ fn by_interpreter(line: &str) -> Option<&'static str> {
 }
 
 fn by_ending(ending: &str) -> Option<&'static str> {
-    let found = REMEDIES.iter().find(|hint| hint.endings.contains(&ending));
+    let found = HINTS.iter().find(|hint| hint.endings.contains(&ending));
     found.map(|hint| hint.hint)
 }
 

@@ -33,8 +33,8 @@ impl SavedSession {
 
     /// What the console before has left; `None` if there was none, or others could have read or written it.
     pub(crate) fn read(file: &Path) -> Option<Self> {
-        let mode = fs::metadata(file).ok()?.permissions().mode();
-        if mode & 0o077 != 0 {
+        let found = fs::symlink_metadata(file).ok()?;
+        if !found.is_file() || found.permissions().mode() & 0o077 != 0 {
             return None;
         }
         let kept: Self = serde_json::from_slice(&fs::read(file).ok()?).ok()?;
@@ -49,17 +49,22 @@ impl SavedSession {
         is_hex(&self.token) && path.is_some_and(is_hex)
     }
 
-    /// Checks that a file which is not what a console has left for this one may be replaced: it has to be empty, or to be what a console
-    /// leaves and others could read.
+    /// Checks that a file which is not what a console has left for this one may be replaced: it has to be what a console leaves and
+    /// others could read.
     pub(crate) fn check_replaceable(file: &Path) -> Result<(), String> {
-        let bytes = match fs::read(file) {
-            Ok(bytes) => bytes,
+        let failed = |error| format!("cannot read {}: {error}", file.display());
+        match file.symlink_metadata() {
+            // A link, a device and a pipe are not even read.
+            Ok(found) if found.is_file() => {
+                let bytes = fs::read(file).map_err(failed)?;
+                let kept = serde_json::from_slice::<Self>(&bytes);
+                if kept.is_ok_and(|kept| kept.is_sound()) {
+                    return Ok(());
+                }
+            }
+            Ok(_) => {}
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
-            Err(error) => return Err(format!("cannot read {}: {error}", file.display())),
-        };
-        let is_kept = serde_json::from_slice::<Self>(&bytes).is_ok_and(|kept| kept.is_sound());
-        if bytes.is_empty() || is_kept {
-            return Ok(());
+            Err(error) => return Err(failed(error)),
         }
         Err(format!(
             "{} is there, and is not what a console keeps: name another file by --keep",
@@ -70,8 +75,9 @@ impl SavedSession {
     /// Leaves it for the console after this one.
     pub(crate) fn write(&self, file: &Path) -> std::io::Result<()> {
         let text = serde_json::to_vec(self)?;
-        let unfinished = file.with_extension("new");
-        let _is_new = fs::remove_file(&unfinished);
+        // Nobody else's: two consoles are two processes.
+        let mut unfinished = file.as_os_str().to_owned();
+        unfinished.push(format!(".{}.new", std::process::id()));
         let mut options = OpenOptions::new();
         let mut to = options
             .write(true)
@@ -79,7 +85,9 @@ impl SavedSession {
             .mode(OWN)
             .open(&unfinished)?;
         to.write_all(&text)?;
-        fs::rename(&unfinished, file)
+        fs::rename(&unfinished, file).inspect_err(|_| {
+            let _is_not_there = fs::remove_file(&unfinished);
+        })
     }
 }
 
@@ -105,6 +113,9 @@ mod tests {
             Ok(())
         );
 
+        assert!(SavedSession::check_replaceable(Path::new("/dev/null")).is_err());
+        fs::write(&file, "").unwrap();
+        assert!(SavedSession::check_replaceable(&file).is_err());
         fs::write(&file, "{\"tick\":0}\n").unwrap();
         let refused = SavedSession::check_replaceable(&file).unwrap_err();
         assert!(refused.contains("is not what a console keeps"), "{refused}");

@@ -328,14 +328,20 @@ impl RunFolder {
         Ok(())
     }
 
-    /// Whether a file, whose path has no links, is one that a run has made in its folder.
+    /// Whether a path is that of a file which a run makes in its folder.
     #[must_use]
     pub fn is_of_run(file: &Path) -> bool {
         // Those of processes are one folder deeper.
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
         file.ancestors().skip(1).take(2).any(|folder| {
             let folder = Self::at(folder.to_owned());
+            // Also of a run that has lost its scenario, and of epochs that are to come.
+            let is_run = folder.file(LOCK).exists() || folder.file(EVENTS).exists();
+            let mut prefixes = PER_EPOCH.iter().map(|file| superseded_prefix(file));
+            let is_of_epoch = file.parent() == Some(folder.path())
+                && prefixes.any(|prefix| name.starts_with(&prefix));
             let is_lock = file == folder.file(LOCK);
-            folder.has_record() && (is_lock || folder.files().iter().any(|own| own == file))
+            is_run && (is_lock || is_of_epoch || folder.files().iter().any(|own| own == file))
         })
     }
 

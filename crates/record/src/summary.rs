@@ -94,14 +94,6 @@ pub struct RobotSummary {
     pub state_variables: StateVariables,
 }
 
-/// The keys of a part of a summary in its file.
-fn keys_of(part: &impl Serialize) -> Vec<String> {
-    match serde_json::to_value(part) {
-        Ok(serde_json::Value::Object(table)) => table.into_iter().map(|(key, _)| key).collect(),
-        _ => Vec::new(),
-    }
-}
-
 /// Wall-clock times and counts.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Wall {
@@ -127,16 +119,34 @@ pub struct HeldUp {
     pub longest_s: f64,
 }
 
-/// Keys of a summary that are numbers, or have numbers below them.
-const WITH_NUMBERS: [&str; 8] = [
-    "expectations",
-    "guests",
-    "network",
-    "robots",
+/// Paths of the numbers of a summary; `*` is any name or word.
+const NUMBERS: [&str; 26] = [
     "seed",
     "ticks",
     "time_s",
-    "wall",
+    "guests",
+    "robots.*.emotions_s.*",
+    "robots.*.behaviors_s.*",
+    "robots.*.entered.*",
+    "robots.*.blocked",
+    "robots.*.sent.*",
+    "robots.*.received",
+    "robots.*.dropped",
+    "robots.*.missed",
+    "robots.*.returns",
+    "robots.*.state_variables.*",
+    "network.links.*.sent",
+    "network.links.*.delivered",
+    "network.links.*.dropped.*",
+    "network.links.*.delayed",
+    "network.links.*.duplicated",
+    "network.links.*.unreachable_ticks",
+    "network.links.*.longest_stale_s",
+    "expectations.*.tick",
+    "wall.elapsed_s",
+    "wall.held_up_by.*.ticks",
+    "wall.held_up_by.*.waited_s",
+    "wall.held_up_by.*.longest_s",
 ];
 
 impl Summary {
@@ -145,18 +155,30 @@ impl Summary {
     /// # Errors
     /// What there is instead.
     pub fn check_path(path: &str) -> Result<(), String> {
-        let parts: Vec<&str> = path.split('.').collect();
-        let (part, known) = match parts[..] {
-            ["robots", _, part, ..] => (part, keys_of(&RobotSummary::default())),
-            ["network", part, ..] => (part, keys_of(&NetworkSummary::default())),
-            [part, ..] => (part, WITH_NUMBERS.map(str::to_owned).to_vec()),
-            [] => return Ok(()),
+        let is_of = |number: &&str| {
+            let wanted: Vec<&str> = number.split('.').collect();
+            let given: Vec<&str> = path.split('.').collect();
+            let mut parts = wanted.iter().zip(&given);
+            wanted.len() == given.len()
+                && parts.all(|(wanted, given)| *wanted == "*" || wanted == given)
         };
-        if known.iter().any(|key| key == part) {
+        if NUMBERS.iter().any(|number| is_of(&number)) {
             return Ok(());
         }
+
+        // Those that begin alike are the nearest ones.
+        let top = path.split('.').next().unwrap_or_default();
+        let near: Vec<&str> = NUMBERS
+            .into_iter()
+            .filter(|one| one.split('.').next() == Some(top))
+            .collect();
+        let known = if near.is_empty() {
+            NUMBERS.to_vec()
+        } else {
+            near
+        };
         Err(format!(
-            "a summary has no number `{path}`: in the place of `{part}` there is one of {}",
+            "a summary has no number `{path}`; it has {}",
             known.join(", ")
         ))
     }

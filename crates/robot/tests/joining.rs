@@ -46,7 +46,7 @@ fn give_up(connect: String) -> (HostError, Duration) {
     let options = HostOptions {
         run: run(),
         connect,
-        timeouts: PATIENCE,
+        patience: PATIENCE,
         gone_patience: Duration::from_secs(60),
         zenoh_config: None,
     };

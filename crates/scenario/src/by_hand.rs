@@ -296,7 +296,7 @@ impl Scenario {
             return Err(FileError::new(format!("more than {MAX_CHANGES} changes")));
         }
         for one in set {
-            all.retain(|earlier| !earlier.has_path_of(one));
+            all.retain(|earlier| !earlier.has_path_of(one) || one.merges());
             all.push(one.clone());
         }
 

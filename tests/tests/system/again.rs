@@ -910,3 +910,50 @@ fn a_run_that_lost_a_robot_in_each_of_two_epochs_is_resumed() {
     let kept = std::fs::read(hall.lab.file(run, "events-epoch1.jsonl")).unwrap();
     assert_same(("kept", &kept), ("first", &first));
 }
+
+#[test]
+fn a_table_of_parameters_means_the_same_in_a_scenario_and_in_its_record() {
+    let lab = Lab::new();
+    let shipped = std::fs::read_to_string(root().join("configs/robots/butler.toml")).unwrap();
+    let own = shipped.replacen("th_concerned = 0.45", "th_concerned = 0.6", 1);
+    assert_ne!(own, shipped);
+    lab.write("own.toml", &own);
+    let hall = std::fs::read_to_string(root().join("configs/hors_doeuvres.toml")).unwrap();
+    let hall = hall.replacen("robots/butler.toml", "own.toml", 1).replacen(
+        "\"robots/leguin.toml\"",
+        &format!("{:?}", root().join("configs/robots/leguin.toml")),
+        1,
+    );
+    let changes = "\n[[change]]\nat = \"15 s\"\n\
+                   set = ['robot.Butler.params.dynamics={ rho_max = 3.0 }', 'robot.Butler.params={ caution = 0.9 }']\n";
+    let file = lab.write("changed.toml", &format!("{hall}{changes}"));
+    let file = file.to_str().unwrap();
+
+    lab.ok(&[
+        "run",
+        file,
+        "--duration",
+        "60 s",
+        "-q",
+        "--run",
+        "as-written",
+    ]);
+    let printed = lab.ok(&["verify", "as-written"]);
+    assert!(printed.contains("the same"), "{printed}");
+
+    // Its record names no file any more.
+    let recorded = lab.file("as-written", "scenario.toml");
+    let text = std::fs::read_to_string(&recorded).unwrap();
+    assert!(
+        !text.contains("params_from") && text.contains("th_concerned = 0.6"),
+        "{text}"
+    );
+    lab.ok(&[
+        "run",
+        recorded.to_str().unwrap(),
+        "-q",
+        "--run",
+        "as-recorded",
+    ]);
+    assert_eq!(lab.bytes("as-written"), lab.bytes("as-recorded"));
+}

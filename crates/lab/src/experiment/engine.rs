@@ -285,14 +285,20 @@ impl Shared<'_> {
     }
 }
 
-/// Whether a file, whose path has no links, is one that an experiment has made in its folder.
+/// Whether a path is that of a file which an experiment makes in its folder.
 #[must_use]
 pub fn is_of_experiment(file: &Path) -> bool {
     let Some(folder) = file.parent() else {
         return false;
     };
+    // Also of one whose plan is lost, which is made again from its file.
+    let is_experiment = |folder: &Path| {
+        [PLAN, FILE, LOCK]
+            .iter()
+            .any(|name| folder.join(name).exists())
+    };
     let is_unit = folder.file_name().is_some_and(|name| name == UNITS)
-        && folder.with_file_name(PLAN).exists();
+        && folder.parent().is_some_and(is_experiment);
     let is_named = file.file_name().is_some_and(|name| {
         let own = [
             PLAN,
@@ -306,5 +312,5 @@ pub fn is_of_experiment(file: &Path) -> bool {
         own.iter().any(|own| name == *own)
     });
 
-    is_unit || (is_named && folder.join(PLAN).exists())
+    is_unit || (is_named && is_experiment(folder))
 }

@@ -25,13 +25,13 @@ pub(super) enum Activity {
 /// Looks at the simulator's loop from a thread of its own, which ends when this is dropped.
 #[derive(Debug)]
 pub(super) struct Watchdog {
-    activity: Arc<Mutex<Activity>>,
+    activity: Arc<Mutex<ActivityLog>>,
     _ends_thread: SyncSender<()>,
 }
 
 /// What is done, and since when.
 #[derive(Debug, Default)]
-struct Activity {
+struct ActivityLog {
     present: Option<(Activity, Instant)>,
     /// When each was named last.
     named_at: BTreeMap<Activity, Instant>,
@@ -40,7 +40,7 @@ struct Activity {
 impl Watchdog {
     /// Begins to look. `report` is called with a line for people.
     pub(super) fn start(report: impl Fn(String) + Send + 'static) -> Self {
-        let activity = Arc::new(Mutex::new(Activity::default()));
+        let activity = Arc::new(Mutex::new(ActivityLog::default()));
         let watched = activity.clone();
         let (ends_thread, end) = std::sync::mpsc::sync_channel(0);
         let watch = move || {
@@ -75,7 +75,7 @@ impl Watchdog {
 }
 
 /// What takes too long, once in a while. `slept` is how long the thread that looks was asleep.
-fn look(activity: &Mutex<Activity>, slept: Duration) -> Option<String> {
+fn look(activity: &Mutex<ActivityLog>, slept: Duration) -> Option<String> {
     let oversleep = slept.saturating_sub(LOOK_EVERY);
     if oversleep > PATIENCE {
         let seconds = oversleep.as_secs_f64();

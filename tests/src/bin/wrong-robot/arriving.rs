@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use lockstep::{Admission, Leave, Naming};
+use lockstep::{Admission, IncarnationNotice, Leave};
 use protocol::messages::{Clock, End, JoinAnswer, JoinRequest, News, Refusal, Welcome};
 use protocol::{PROTOCOL_VERSION, encode};
 
@@ -59,7 +59,7 @@ impl Host {
             && own == 1;
         if is_early {
             self.drive(|machine, out| {
-                let naming = Naming {
+                let naming = IncarnationNotice {
                     joined: Some(generation),
                     rejoin: None,
                 };
@@ -114,7 +114,7 @@ impl Host {
         if self.wrong.is("epoch.init:received") {
             self.strays.push(news.clone());
         }
-        let naming = Naming::from(&news);
+        let naming = IncarnationNotice::from(&news);
         self.drive(|machine, out| machine.news(epoch, tick, naming, news, out))
     }
 
@@ -179,7 +179,7 @@ impl Host {
         self.drive(|machine, out| machine.admitted(admission, states, out))?;
         if is_early {
             let clock = self.last_clock;
-            let naming = Naming {
+            let naming = IncarnationNotice {
                 joined: Some(admission.generation),
                 rejoin: None,
             };

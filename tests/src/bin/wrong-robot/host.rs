@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use bus::{Bus, BusError, Declared, Publisher, Reply, Role};
-use lockstep::{Action, Leave, Patience, RobotTimer};
+use lockstep::{Action, Leave, RobotTimer, Timeouts};
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{Clock, CommandText, News, PublicState, Report, Waiting, Welcome};
 use protocol::{Epoch, RobotName, RunName, Tick, encode};
@@ -72,7 +72,7 @@ impl Host {
     pub(crate) fn connect(name: &str, wrong: Wrong) -> Result<Self, Failure> {
         let name = RobotName::new(name)?;
         let run = RunName::new(&variable("CARS_RUN", "default"))?;
-        let patience = Patience {
+        let patience = Timeouts {
             join: seconds("CARS_PATIENCE_S", "20")?,
             gone: seconds("CARS_GONE_PATIENCE_S", "600")?,
         };

@@ -578,7 +578,7 @@ fn robots_that_the_scenario_does_not_have_are_shown() {
         (
             "variable = {",
             "summary = \"robots.*.emotion_s.HAPPY\" #",
-            "a summary has no number `robots.*.emotion_s.HAPPY`: in the place of `emotion_s` there is one of ",
+            "a summary has no number `robots.*.emotion_s.HAPPY`; it has robots.*.emotions_s.*, ",
         ),
     ] {
         let text = GOOD.replacen(from, to, 1).replacen(
