@@ -123,7 +123,7 @@ fn summary_difference(
     record: &Record,
     executed: &Summary,
 ) -> miette::Result<Option<Difference>> {
-    let Some((path, written)) = read_summary(files)? else {
+    let Some((path, mut written)) = read_summary(files)? else {
         return Ok(None);
     };
     if written.get("wall").is_none_or(|wall| !wall.is_object()) {
@@ -136,6 +136,18 @@ fn summary_difference(
     };
     if version != executed.version {
         return Ok(None);
+    }
+    // Before summaries had seals, a robot that was lost stayed in its last state.
+    if written["wall"].get("seal").is_none() {
+        for (name, robot) in &executed.robots {
+            let recorded = &mut written["robots"][name.as_str()];
+            if recorded.is_object() {
+                recorded["emotions_s"] =
+                    serde_json::to_value(&robot.emotions_s).into_diagnostic()?;
+                recorded["behaviors_s"] =
+                    serde_json::to_value(&robot.behaviors_s).into_diagnostic()?;
+            }
+        }
     }
     Ok(between_summaries(&written, executed))
 }

@@ -89,6 +89,35 @@ fn damage_in_any_file_of_a_run_is_found_and_the_file_named() {
 }
 
 #[test]
+fn a_summary_from_before_seals_counts_lost_robots_otherwise() {
+    let lab = Lab::new();
+    lab.ok(&[
+        "run",
+        "launch/hors_doeuvres.toml",
+        "--duration",
+        "20 s",
+        "--run",
+        "earlier",
+    ]);
+    let file = lab.file("earlier", "summary.json");
+    let text = std::fs::read_to_string(&file).unwrap();
+    let mut summary: serde_json::Value = serde_json::from_str(&text).unwrap();
+    summary["wall"].as_object_mut().unwrap().remove("seal");
+
+    summary["robots"]["Leguin"]["behaviors_s"]["WAIT"] = 123.0.into();
+    std::fs::write(&file, summary.to_string()).unwrap();
+    lab.ok(&["verify", "earlier"]);
+
+    summary["robots"]["Leguin"]["blocked"] = 123.into();
+    std::fs::write(&file, summary.to_string()).unwrap();
+    let (_, printed) = lab.fails(&["verify", "earlier"]);
+    assert!(
+        printed.contains("summary.robots.Leguin.blocked"),
+        "{printed}"
+    );
+}
+
+#[test]
 fn a_summary_that_does_not_follow_from_its_record_is_found() {
     let lab = Lab::new();
     lab.ok(&["run", HALL, "--duration", "60 s", "-q", "--run", "whole"]);
