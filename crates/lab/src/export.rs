@@ -10,7 +10,7 @@ mod tables;
 use std::path::{Path, PathBuf};
 
 use config::FileError;
-use record::EpochFiles;
+use record::{EpochFiles, RunFolder};
 
 use sheet::Format;
 
@@ -74,6 +74,14 @@ fn write(epochs: &[EpochFiles], folder: &Path, wanted: &Wanted) -> Result<Export
         drafts.push(shiviz::write(epochs, &folder.join(SHIVIZ))?);
     }
 
+    // A log may be called what a table is called.
+    for draft in &drafts {
+        let path = draft.path();
+        let resolved = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        if RunFolder::is_of_run(&resolved) {
+            return Err(draft::unwritable(path, &"a run keeps its record there"));
+        }
+    }
     for draft in drafts {
         exported.files.push(draft.publish()?);
     }

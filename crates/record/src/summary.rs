@@ -155,14 +155,14 @@ impl Summary {
     /// # Errors
     /// What there is instead.
     pub fn check_path(path: &str) -> Result<(), String> {
-        let is_of = |number: &&str| {
+        let is_of = |number: &str| {
             let wanted: Vec<&str> = number.split('.').collect();
             let given: Vec<&str> = path.split('.').collect();
             let mut parts = wanted.iter().zip(&given);
             wanted.len() == given.len()
                 && parts.all(|(wanted, given)| *wanted == "*" || wanted == given)
         };
-        if NUMBERS.iter().any(|number| is_of(&number)) {
+        if NUMBERS.iter().any(|number| is_of(number)) {
             return Ok(());
         }
 

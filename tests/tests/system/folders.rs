@@ -935,6 +935,29 @@ fn no_output_replaces_a_part_of_a_record() {
         "{}",
         said(&output)
     );
+
+    // A log may be called what an export is called.
+    let name = "record.log_name=shiviz.log";
+    place.lab.ok(&[
+        "run",
+        HALL,
+        "--duration",
+        "2 s",
+        "-q",
+        "--run",
+        "logged",
+        "--set",
+        name,
+    ]);
+    let logged = place.lab.out().join("logged");
+    let before = tree(&logged);
+    let into = logged.to_str().unwrap();
+    let (_, printed) = place
+        .lab
+        .fails(&["export", "logged", "--shiviz", "-o", into]);
+    let printed = in_one_line(&printed);
+    assert!(printed.contains("keeps its record there"), "{printed}");
+    assert!(tree(&logged) == before, "something has changed");
 }
 
 #[test]

@@ -38,7 +38,7 @@ pub struct Results {
     pub damages: Vec<String>,
     /// Numbers of units that were played several times and gave different runs.
     pub conflicts: Vec<usize>,
-    /// Words of the measures and expectations that occurred in none of the units, for people.
+    /// Words of the measures and expectations that occurred in none of the units, and measures that all of them miss, for people.
     pub never_occurred: Vec<String>,
 }
 
@@ -106,12 +106,14 @@ impl Results {
         let mut missing = Vec::new();
         let mut conflicts = Vec::new();
         let mut unheard = Unheard::default();
+        let mut all_played = Vec::new();
         for number in 0..plan.units() {
             let unit = plan.unit(number);
             match store.get(unit.key) {
                 None => missing.push(number),
                 Some(Ok(played)) => {
                     unheard.add(played);
+                    all_played.push(played);
                     outcomes.push(Outcome::of(&unit, played));
                 }
                 Some(Err(reason)) => failures.push(Failure {
@@ -127,6 +129,11 @@ impl Results {
             }
         }
 
+        let mut never_occurred = unheard.in_all();
+        for missing in plan.missing_in_all(&all_played) {
+            never_occurred.push(format!("{missing}, in any run"));
+        }
+
         let damages = store.damages_of(&plan, &missing);
         Self {
             plan,
@@ -135,7 +142,7 @@ impl Results {
             missing,
             damages,
             conflicts,
-            never_occurred: unheard.in_all(),
+            never_occurred,
         }
     }
 

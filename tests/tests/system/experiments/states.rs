@@ -30,6 +30,11 @@ fn what_is_not_a_number_has_a_state() {
          [[measure]]\nname = 'never sent'\nsummary = 'robots.Butler.sent.fly'\n",
     );
     let out = lab.out().join("states");
+    let printed = ok(&["run", &file, "-o", out.to_str().unwrap()]);
+    assert!(
+        printed.contains("the measure \"gone\": the summary of the run has no number `robots.Butler.state_variables.nothing`, in any run"),
+        "{printed}"
+    );
     let all = json(&["run", &file, "-o", out.to_str().unwrap()]);
     for run in all["runs"].as_array().unwrap() {
         let state = |measure: &str| run["measures"][measure]["state"].as_str().unwrap();
