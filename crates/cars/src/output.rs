@@ -4,10 +4,9 @@ use std::fs::File;
 use std::io::{BufWriter, ErrorKind, Stdout, Write};
 use std::path::Path;
 
-use lab::experiment::is_of_experiment;
 use lab::export::draft::{Draft, unwritable};
+use lab::is_part_of_record;
 use miette::miette;
-use record::RunFolder;
 
 /// Paths of the standard output.
 const STANDARD: [&str; 3] = ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"];
@@ -36,7 +35,13 @@ impl Output {
             return Ok(Self::Standard(BufWriter::new(std::io::stdout())));
         };
 
-        check_not_record(path)?;
+        if is_part_of_record(path) {
+            return Err(miette!(
+                help = "choose another --output",
+                "{} is part of the record of a run or an experiment",
+                path.display()
+            ));
+        }
         let is_special = path
             .metadata()
             .is_ok_and(|found| !found.is_file() && !found.is_dir());
@@ -64,35 +69,6 @@ impl Output {
         }
         Ok(())
     }
-}
-
-/// Checks that a path is not that of a part of the record of a run or an experiment: as it is given, with its folder's links
-/// resolved, and with all links resolved.
-fn check_not_record(path: &Path) -> miette::Result<()> {
-    let absolute = std::path::absolute(path).ok();
-    let in_folder = path
-        .parent()
-        .map(|parent| {
-            if parent == Path::new("") {
-                Path::new(".")
-            } else {
-                parent
-            }
-        })
-        .and_then(|parent| parent.canonicalize().ok())
-        .zip(path.file_name())
-        .map(|(folder, name)| folder.join(name));
-    let resolved = path.canonicalize().ok();
-
-    let mut places = [absolute, in_folder, resolved].into_iter().flatten();
-    if places.any(|place| RunFolder::is_of_run(&place) || is_of_experiment(&place)) {
-        return Err(miette!(
-            help = "choose another --output",
-            "{} is part of the record of a run or an experiment",
-            path.display()
-        ));
-    }
-    Ok(())
 }
 
 impl Write for Output {

@@ -161,18 +161,13 @@ impl Override {
     }
 }
 
-/// Replaces a value. Of a table only the keys that the other table has.
-fn merge(existing: &mut toml::Value, by: &toml::Value) {
-    match (existing, by) {
-        (toml::Value::Table(table), toml::Value::Table(by)) => {
-            for (key, value) in by {
-                match table.get_mut(key) {
-                    Some(existing) => merge(existing, value),
-                    None => drop(table.insert(key.clone(), value.clone())),
-                }
-            }
+/// Replaces the values of a table that another one has, key by key, also within tables.
+pub fn merge(table: &mut toml::Table, by: &toml::Table) {
+    for (key, value) in by {
+        match (table.get_mut(key), value) {
+            (Some(toml::Value::Table(inner)), toml::Value::Table(by)) => merge(inner, by),
+            _ => drop(table.insert(key.clone(), value.clone())),
         }
-        (existing, by) => *existing = by.clone(),
     }
 }
 
@@ -189,8 +184,10 @@ fn set(
 
     let next = match at {
         toml::Value::Table(table) if rest.is_empty() => {
-            match table.get_mut(first) {
-                Some(existing) if merges => merge(existing, value),
+            match (table.get_mut(first), value) {
+                (Some(toml::Value::Table(inner)), toml::Value::Table(by)) if merges => {
+                    merge(inner, by);
+                }
                 _ => drop(table.insert(first.clone(), value.clone())),
             }
             return Ok(());

@@ -37,7 +37,11 @@ impl SavedSession {
         if !found.is_file() || found.permissions().mode() & 0o077 != 0 {
             return None;
         }
-        let kept: Self = serde_json::from_slice(&fs::read(file).ok()?).ok()?;
+        Self::parse(&fs::read(file).ok()?)
+    }
+
+    fn parse(bytes: &[u8]) -> Option<Self> {
+        let kept: Self = serde_json::from_slice(bytes).ok()?;
         kept.is_sound().then_some(kept)
     }
 
@@ -57,8 +61,7 @@ impl SavedSession {
             // A link, a device and a pipe are not even read.
             Ok(found) if found.is_file() => {
                 let bytes = fs::read(file).map_err(failed)?;
-                let kept = serde_json::from_slice::<Self>(&bytes);
-                if kept.is_ok_and(|kept| kept.is_sound()) {
+                if Self::parse(&bytes).is_some() {
                     return Ok(());
                 }
             }

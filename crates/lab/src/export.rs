@@ -10,8 +10,9 @@ mod tables;
 use std::path::{Path, PathBuf};
 
 use config::FileError;
-use record::{EpochFiles, RunFolder};
+use record::EpochFiles;
 
+use crate::parts::is_part_of_record;
 use sheet::Format;
 
 /// Name of the log for ShiViz.
@@ -77,8 +78,7 @@ fn write(epochs: &[EpochFiles], folder: &Path, wanted: &Wanted) -> Result<Export
     // A log may be called what a table is called.
     for draft in &drafts {
         let path = draft.path();
-        let resolved = path.canonicalize().unwrap_or_else(|_| path.to_owned());
-        if RunFolder::is_of_run(&resolved) {
+        if is_part_of_record(path) {
             return Err(draft::unwritable(path, &"a run keeps its record there"));
         }
     }

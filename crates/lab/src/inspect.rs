@@ -63,7 +63,7 @@ pub fn inspect(folder: &RunFolder) -> Result<Inspection, FileError> {
     }
 
     let are_events_good = inspection.epochs.len() == epochs.len();
-    inspection.note(inspect_summary(folder, epochs.last(), end.as_ref()));
+    inspection.note(inspect_summary(folder, end.as_ref()));
     inspection.note(inspect_launched(folder));
     if are_events_good {
         inspection.note(inspect_log(folder, &epochs, end.as_ref()));
@@ -157,18 +157,6 @@ fn has_ended(events: Option<&Checked>) -> bool {
     events.is_some_and(|events| events.end.is_some())
 }
 
-/// The digest with which a run has ended.
-fn digest_of(files: &EpochFiles) -> miette::Result<Option<String>> {
-    let mut record = Record::of_events(&files.events)?;
-    let mut found = None;
-    while let Some(entry) = record.next_entry()? {
-        if let Some(Event::End { digest, .. }) = entry.events.last() {
-            found = Some(digest.clone());
-        }
-    }
-    Ok(found)
-}
-
 /// Checks that nothing in a folder is a pipe, a socket or a device. There may be no such folder.
 fn check_files(folder: &Path) -> Result<(), FileError> {
     let entries = std::fs::read_dir(folder).into_iter().flatten();
@@ -185,11 +173,7 @@ fn check_files(folder: &Path) -> Result<(), FileError> {
 }
 
 /// Compares the summary with its seal, and with the end of the run. What it counts is compared by [`crate::verify`].
-fn inspect_summary(
-    folder: &RunFolder,
-    last: Option<&EpochFiles>,
-    events: Option<&Checked>,
-) -> miette::Result<()> {
+fn inspect_summary(folder: &RunFolder, events: Option<&Checked>) -> miette::Result<()> {
     let path = folder.file(SUMMARY);
     if !path.exists() {
         if has_ended(events) {
@@ -215,11 +199,10 @@ fn inspect_summary(
             summary.ticks,
             events.tick
         )),
-        Some(events) if events.end.is_some() => {
-            let digest = last.map(digest_of).transpose()?.flatten();
-            if digest.is_none_or(|digest| digest == summary.digest) {
-                return Ok(());
-            }
+        Some(Checked {
+            digest: Some(digest),
+            ..
+        }) if *digest != summary.digest => {
             Err(miette!("{} is that of another run", path.display()))
         }
         _ => Ok(()),

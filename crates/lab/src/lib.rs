@@ -16,6 +16,7 @@ pub mod hunt;
 pub mod inspect;
 pub mod judge;
 pub mod moment;
+mod parts;
 mod performance;
 mod reexecution;
 pub mod replayed;
@@ -28,5 +29,6 @@ pub mod table;
 pub mod trace;
 pub mod verify;
 
+pub use parts::is_part_of_record;
 pub use performance::{Performance, performances};
 pub use reexecution::{digest_from, first_difference};

@@ -336,19 +336,22 @@ impl RunFolder {
         file.ancestors().skip(1).take(2).any(|folder| {
             let folder = Self::at(folder.to_owned());
             // Also of a run that has lost its scenario, and of epochs that are to come.
-            let is_run = folder.file(LOCK).exists() || folder.file(EVENTS).exists();
             let mut prefixes = PER_EPOCH.iter().map(|file| superseded_prefix(file));
             let is_of_epoch = file.parent() == Some(folder.path())
                 && prefixes.any(|prefix| name.starts_with(&prefix));
             let is_lock = file == folder.file(LOCK);
-            is_run && (is_lock || is_of_epoch || folder.files().iter().any(|own| own == file))
+            folder.is_begun()
+                && (is_lock || is_of_epoch || folder.files().iter().any(|own| own == file))
         })
     }
 
     /// Whether it is the folder of a run. A robot's folder has a scenario, too.
     fn has_record(&self) -> bool {
-        let has_events = self.file(LOCK).exists() || self.file(EVENTS).exists();
-        has_events && self.file(SCENARIO).exists()
+        self.is_begun() && self.file(SCENARIO).exists()
+    }
+
+    fn is_begun(&self) -> bool {
+        self.file(LOCK).exists() || self.file(EVENTS).exists()
     }
 
     /// All files that runs make, whether they are there or not. The scenario has the name of the log, and makes the folder that of a

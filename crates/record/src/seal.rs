@@ -111,6 +111,8 @@ pub struct Checked {
     pub tick: Tick,
     /// How the run has ended, if it has ended in order.
     pub end: Option<End>,
+    /// The digest with which it has ended.
+    pub digest: Option<String>,
     /// Lines after the last seal, of a tick that was never completed: the simulator was killed, or the run is in progress.
     pub incomplete_lines: usize,
 }
@@ -178,6 +180,7 @@ pub fn check(path: &Path) -> Result<Checked, FileError> {
         lines: 0,
         tick: 0,
         end: None,
+        digest: None,
         incomplete_lines: 0,
     };
     let mut seal = Seal::default();
@@ -206,8 +209,9 @@ pub fn check(path: &Path) -> Result<Checked, FileError> {
             }
             checked.lines += std::mem::take(&mut checked.incomplete_lines);
             checked.tick = line.tick;
-            if let Event::End { reason, .. } = line.event {
+            if let Event::End { reason, digest, .. } = line.event {
                 checked.end = Some(reason);
+                checked.digest = Some(digest);
             }
         }
         seal.add(&raw.bytes);

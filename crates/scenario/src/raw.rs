@@ -13,6 +13,7 @@ use std::collections::BTreeMap;
 use std::ops::Range as Span;
 use std::path::{Path, PathBuf};
 
+use config::overrides::merge;
 use config::units::{Length, Speed, Time, quantity};
 use config::{FileError, FixedList, Source, seed, shipped};
 use observe::Expectation;
@@ -407,32 +408,18 @@ fn robots(
 
 /// The specification of a robot. Its own parameters replace those of the file that it names, key by key, also within tables.
 fn spec(robot: Robot, source: &Source, folder: Option<&Path>) -> Result<RobotSpec, FileError> {
-    let mut parameters = Parameters::new();
+    let mut parameters = toml::Table::new();
     if let Some(file) = &robot.params_from {
-        parameters.extend(to_parameters(&named_parameters(file, source, folder)?));
+        parameters = named_parameters(file, source, folder)?;
     }
-    for (name, value) in to_parameters(&robot.params) {
-        replace(parameters.entry(name).or_default(), value);
-    }
+    merge(&mut parameters, &robot.params);
 
     let class = robot.class;
     Ok(RobotSpec {
         class: class.unwrap_or_else(|| robot.name.as_str().to_owned()),
         at: point(robot.at),
-        parameters,
+        parameters: to_parameters(&parameters),
     })
-}
-
-/// Replaces a parameter. Of a table only the keys that the other table has.
-fn replace(parameter: &mut serde_json::Value, by: serde_json::Value) {
-    match (parameter, by) {
-        (serde_json::Value::Object(table), serde_json::Value::Object(by)) => {
-            for (key, value) in by {
-                replace(table.entry(key).or_insert(serde_json::Value::Null), value);
-            }
-        }
-        (parameter, by) => *parameter = by,
-    }
 }
 
 /// The parameters of a file that a robot names. In a text from outside they are those of the files that come with the programs.

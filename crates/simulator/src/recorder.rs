@@ -23,11 +23,8 @@ use record::seal::Seal;
 use record::summary::Summary;
 use scenario::SyncPoint;
 
-pub use record::folder::{RunFolder, RunLock};
-pub use scenario::files::{
-    ENDPOINT, EVENTS, LATEST, LAUNCHED, LOCK, LOG, LOGS, OPERATOR_CONFIG, RECORDING, SCENARIO,
-    SUMMARY,
-};
+use record::RunFolder;
+use record::names::{EVENTS, RECORDING, SUMMARY};
 
 /// How often [`SyncPoint::Second`] synchronizes.
 const SYNC_INTERVAL: Duration = Duration::from_secs(1);

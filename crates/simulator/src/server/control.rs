@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use bus::Query;
 use protocol::messages::{
-    Awaited, Control, ControlAnswer, End, Intervention, Phase, RobotStatus, Setup, SetupAnswer,
-    Status,
+    Awaited, Control, ControlAnswer, End, FaultKind, Intervention, Phase, RobotStatus, Setup,
+    SetupAnswer, Status,
 };
 use protocol::{Epoch, RobotName, decode, encode};
 
@@ -235,20 +235,28 @@ impl Server {
         }
 
         if let Intervention::Recover { robot } = what
-            && self.barrier.awaited().iter().any(|(name, _)| name == robot)
-            && let Some(kind) = simulation.held_by_wall_clock(robot)
+            && let Some(kind) = self.fault_that_holds_clock(robot, simulation)
         {
             let order = self.recover_now(robot, kind, simulation);
             return order.map_err(|error| error.to_string());
         }
         if let Intervention::Fault { robot, .. } = what
-            && self.barrier.awaited().iter().any(|(name, _)| name == robot)
-            && let Some(kind) = simulation.held_by_wall_clock(robot)
+            && let Some(kind) = self.fault_that_holds_clock(robot, simulation)
         {
             let kind = kind_in_words(kind);
             return Err(format!("{robot} {kind} already: let it go on first"));
         }
         simulation.intervene(what)
+    }
+
+    /// The fault of a robot because of which the clock waits for it: only the wall clock, or a person, ends that.
+    fn fault_that_holds_clock(
+        &self,
+        robot: &RobotName,
+        simulation: &Simulation,
+    ) -> Option<FaultKind> {
+        let is_awaited = self.barrier.awaited().iter().any(|(name, _)| name == robot);
+        simulation.held_by_wall_clock(robot).filter(|_| is_awaited)
     }
 
     /// Refuses what is done by hand while the run is executed again, and after its last tick.
