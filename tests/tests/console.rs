@@ -730,3 +730,31 @@ fn only_the_token_gives_control_of_a_secured_launch() {
 
     assert_controlled_by_the_owner_only(&lab, &mut run);
 }
+
+/// What a launch needs does not depend on what it prints: the page opens, and its buttons work.
+#[test]
+fn a_quiet_launch_opens_the_page_too() {
+    let lab = Lab::new();
+    let browser = lasting_browser(&lab);
+    let run = Run::start_opening(&lab, "con-quiet", Some(&browser), &["--quiet"], None);
+
+    let started = lab.out().join("browser.started");
+    let file = eventually("the browser", || {
+        let text = std::fs::read_to_string(&started).ok()?;
+        text.ends_with('\n').then(|| text.trim().to_owned())
+    });
+    let page = eventually("the file for the browser", || {
+        std::fs::read_to_string(lab.out().join(file.trim_start_matches("file://"))).ok()
+    });
+    let (_, address) = page.split_once("http://").unwrap();
+    let (address, rest) = address.split_once("/?token=").unwrap();
+    let (token, _) = rest.split_once('"').unwrap();
+    let entered = Entered::new(Printed {
+        address: address.to_owned(),
+        token: token.to_owned(),
+    });
+
+    let mut page = Page::open(&entered);
+    let stepped = page.control(r#"{"do":"step","n":3}"#);
+    run.reaches(&stepped, 3);
+}

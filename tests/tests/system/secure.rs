@@ -1,6 +1,8 @@
 //! A secured run and intruders: what is refused, what is harmless, and that the record does not change.
 
+use std::fs::Permissions;
 use std::net::TcpStream;
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -667,6 +669,59 @@ fn a_session_id_belongs_to_the_certificate_that_used_it_first() {
     other.close();
     castle.step(60);
     castle.finish_unharmed();
+}
+
+#[test]
+fn certificates_of_another_run_are_refused_before_a_process_starts() {
+    let lab = Lab::new();
+    let folder = lab.out().join("certificates").display().to_string();
+    let robots = ["--robots", "Butler,Leguin,Vonda", "--run", "monday"];
+    let (code, text) =
+        lab.cars_without_out(&[&["secure", "init", &folder][..], &robots[..]].concat());
+    assert_eq!(code, 0, "{text}");
+
+    let launch = |run: &str| {
+        let brief = ["--secure", &folder, "--no-console", "--duration", "1 s"];
+        lab.cars(&["launch", HALL, "--run", run])
+            .args(brief)
+            .output()
+            .unwrap()
+    };
+    let refused = launch("tuesday");
+    let text = flat(&String::from_utf8_lossy(&refused.stderr));
+    assert!(!refused.status.success(), "{text}");
+    assert!(
+        text.contains("for run monday, and this is run tuesday"),
+        "{text}"
+    );
+    assert!(!lab.file("tuesday", "events.jsonl").exists(), "{text}");
+    let admitted = launch("monday");
+    assert!(admitted.status.success(), "{admitted:?}");
+}
+
+#[test]
+fn a_key_that_others_can_read_is_named() {
+    let lab = Lab::new();
+    let folder = certificates(&lab, "certificates");
+    let launch = |run: &str| {
+        let mut command = lab.cars(&["launch", HALL, "--no-console", "--duration", "1 s"]);
+        command.arg("--secure").arg(&folder).args(["--run", run]);
+        let output = command.output().unwrap();
+        assert!(output.status.success(), "{output:?}");
+        flat(&String::from_utf8_lossy(&output.stderr))
+    };
+    let warning = "others than its owner can read it (mode 644)";
+    let text = launch("closed");
+    assert!(!text.contains("others than its owner"), "{text}");
+
+    let key = folder.join("simulator/key.pem");
+    std::fs::set_permissions(&key, Permissions::from_mode(0o644)).unwrap();
+    let text = launch("open");
+    assert!(
+        text.contains(warning) && text.contains("chmod 600"),
+        "{text}"
+    );
+    assert!(text.contains("simulator/key.pem"), "{text}");
 }
 
 /// The published TLS link corrupts memory when two threads use it: 2 of 8 runs ended so.
