@@ -59,7 +59,8 @@ impl Chance {
         (self.stream.next_u64() >> 11) as f64 * (1.0 / 9_007_199_254_740_992.0)
     }
 
-    /// Exponential with this mean, by inversion.
+    /// Exponential with this mean, by inversion. Not `rand_distr::Exp`: it takes the platform's logarithm and exponential function
+    /// as soon as any dependency turns `num-traits/std` on, and a number of draws that differs.
     pub fn exponential(&mut self, mean: f64) -> f64 {
         -libm::log(1.0 - self.uniform()) * mean
     }

@@ -331,16 +331,19 @@ impl Medium {
         // A stream for this command alone: that another robot sends more, or less, changes nothing of its fate.
         let mut chance = stream(self.seed, &format!("medium/{}/{from}/{to}/{seq}", tick - 1));
 
-        // Always three draws in the same order, so that each decision is independent of the other settings.
-        let [loss, duplication, delay] = std::array::from_fn(|_| unit(&mut chance));
+        // Always in the same order, and the delay last, so that each decision is independent of the other settings.
+        let [loss, duplication] = std::array::from_fn(|_| unit(&mut chance));
+        let delay_s = match &channel.delay_s {
+            Some(delay_s) => delay_s.sample(&mut chance),
+            None => 0.0,
+        };
         let pair = (from.clone(), to.clone());
         if let Some(because) = self.loss(Kind::Commands, &channel, &pair, loss) {
             events.push(command.dropped(because));
             return;
         }
 
-        let delay_s = channel.delay_s.map(|delay_s| delay_s.quantile(delay));
-        let late = delay_s.map_or(0, |delay_s| ticks(delay_s, self.tick_s));
+        let late = ticks(delay_s, self.tick_s);
         let until = tick + late;
         if late > 0 {
             events.push(Event::CommandDelayed {

@@ -1,13 +1,16 @@
 //! The triangular distribution, from which the guests' speeds and durations are drawn.
 
+use rand::Rng;
+use rand_distr::Distribution;
+
 use crate::error::TriangularError;
-use rand::{Rng, RngExt};
 
 /// A triangular distribution of a non-negative quantity (paper, "Obstacles": speed and duration).
 ///
 /// Values have the unit of the quantity. `min == max` is allowed and gives a constant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Triangular {
+    distribution: rand_distr::Triangular<f64>,
     min: f64,
     mode: f64,
     max: f64,
@@ -20,11 +23,18 @@ impl Triangular {
     ///
     /// Returns a [`TriangularError`] unless all three are finite and `0 <= min <= mode <= max`.
     pub fn new(min: f64, mode: f64, max: f64) -> Result<Self, TriangularError> {
-        if 0.0 <= min && min <= mode && mode <= max && max.is_finite() {
-            Ok(Self { min, mode, max })
-        } else {
-            Err(TriangularError { min, mode, max })
+        let refused = TriangularError { min, mode, max };
+        if min < 0.0 || !max.is_finite() {
+            return Err(refused);
         }
+
+        let distribution = rand_distr::Triangular::new(min, max, mode).map_err(|_| refused)?;
+        Ok(Self {
+            distribution,
+            min,
+            mode,
+            max,
+        })
     }
 
     /// The lower end of the distribution.
@@ -47,27 +57,13 @@ impl Triangular {
 
     /// Draws one value.
     ///
-    /// Takes exactly one number from the stream, even for a constant, so that halls that differ only in a parameter
-    /// consume the stream in the same way.
-    pub(crate) fn sample(&self, rng: &mut impl Rng) -> f64 {
-        self.quantile(rng.random())
-    }
-
-    /// The quantile function: the value below which a fraction `p` of all draws lies, with `p` from 0 to 1.
+    /// Takes exactly one number from the stream, even for a constant, so that runs that differ only in a parameter
+    /// consume the stream in the same way. It is the same on every platform: of what differs, it takes square roots only,
+    /// which are exact.
     #[must_use]
-    pub fn quantile(&self, p: f64) -> f64 {
-        let range = self.max - self.min;
-        let rise = self.mode - self.min;
-        let fall = self.max - self.mode;
-
-        let value = if p * range < rise {
-            self.min + (p * range * rise).sqrt()
-        } else {
-            self.max - ((range - p * range) * fall).sqrt()
-        };
-
+    pub fn sample(&self, rng: &mut impl Rng) -> f64 {
         // Rounding can leave the interval by a few units in the last place.
-        value.clamp(self.min, self.max)
+        self.distribution.sample(rng).clamp(self.min, self.max)
     }
 }
 
