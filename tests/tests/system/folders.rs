@@ -777,6 +777,7 @@ fn no_command_panics_where_a_path_is_not_utf8() {
     let scenario = odd.join(OsStr::from_bytes(b"\xfe.toml"));
     std::fs::copy(root().join("configs/three_robots.toml"), &scenario).unwrap();
 
+    let played = odd.join("played");
     let odd = odd.as_os_str();
     let commands: &[&[&OsStr]] = &[
         &[
@@ -830,6 +831,17 @@ fn no_command_panics_where_a_path_is_not_utf8() {
             "--plan-only".as_ref(),
             "-o".as_ref(),
             odd,
+        ],
+        &[
+            "experiment".as_ref(),
+            "run".as_ref(),
+            "deadlock".as_ref(),
+            "--seeds".as_ref(),
+            "2".as_ref(),
+            "--duration".as_ref(),
+            "1 s".as_ref(),
+            "-o".as_ref(),
+            played.as_os_str(),
         ],
         &["experiment".as_ref(), "run".as_ref(), scenario.as_ref()],
         &["man".as_ref(), odd],

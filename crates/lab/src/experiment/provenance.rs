@@ -45,9 +45,11 @@ impl Provenance {
     #[must_use]
     pub fn here() -> Self {
         let written = SystemTime::now().duration_since(UNIX_EPOCH);
+        // A path need not be UTF-8, and JSON has no other texts.
+        let command = std::env::args_os().skip(1);
         Self {
             program: Program::this(),
-            command: std::env::args().skip(1).collect(),
+            command: command.map(|arg| arg.to_string_lossy().into_owned()).collect(),
             written_unix_s: written.map_or(0, |since| since.as_secs()),
             machine: Machine::this(),
         }
