@@ -3,14 +3,15 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use diagram::{Diagram, Options, State, TooMuch};
+use diagram::{Diagram, Options, TooMuch};
 use protocol::{Epoch, Tick};
 use recording::{Recording, RecordingError};
 use serde::Deserialize;
+use timeline::Timeline;
 
 /// Most ticks in a diagram.
 pub(crate) const MAX_WINDOW_TICKS: u64 = 4096;
-/// Ticks from one state that is kept to the next.
+/// Ticks from one timeline that is kept to the next.
 const KEPT_TICKS: Tick = 512;
 /// Least and most width of a diagram, pixels.
 const WIDTHS_PX: std::ops::RangeInclusive<f64> = 300.0..=4800.0;
@@ -49,18 +50,18 @@ pub(crate) enum DiagramError {
     TooMuch(#[from] TooMuch),
 }
 
-/// The states that are kept: before tick 0, before tick [`KEPT_TICKS`] and so on, as far as was needed.
+/// The timelines that are kept: before tick 0, before tick [`KEPT_TICKS`] and so on, as far as was needed.
 #[derive(Debug)]
 pub(crate) struct Diagrams {
-    states: Mutex<Vec<State>>,
+    timelines: Mutex<Vec<Timeline>>,
 }
 
 impl Diagrams {
     /// Those of a recording that has not been read yet.
     pub(crate) fn of(file: &Recording) -> Self {
-        let first = State::new(&file.header().robots);
+        let first = Timeline::new(&file.header().robots);
         Self {
-            states: Mutex::new(vec![first]),
+            timelines: Mutex::new(vec![first]),
         }
     }
 
@@ -78,8 +79,8 @@ impl Diagrams {
             ..Options::default()
         };
 
-        let state = self.state_before(file, from)?;
-        let mut diagram = Diagram::new(state, file.header().tick_s, from, options);
+        let timeline = self.before(file, from)?;
+        let mut diagram = Diagram::new(timeline, file.header().tick_s, from, options);
         file.for_events(from, to, |tick| {
             diagram.tick(tick.tick, &tick.events, &tick.awaited);
         })?;
@@ -87,18 +88,21 @@ impl Diagrams {
     }
 
     /// What is in progress before a tick of the recording.
-    fn state_before(&self, file: &Recording, tick: Tick) -> Result<State, RecordingError> {
-        let mut states = self.states.lock().unwrap_or_else(PoisonError::into_inner);
+    fn before(&self, file: &Recording, tick: Tick) -> Result<Timeline, RecordingError> {
+        let mut timelines = self
+            .timelines
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
         let kept = usize::try_from(tick / KEPT_TICKS).unwrap_or(usize::MAX);
-        let index = kept.min(states.len() - 1);
-        let mut state = states[index].clone();
+        let index = kept.min(timelines.len() - 1);
+        let mut timeline = timelines[index].clone();
 
         file.for_events(index as Tick * KEPT_TICKS, tick, |tick| {
-            state.skip(tick.tick, &tick.events);
-            if tick.tick + 1 == states.len() as Tick * KEPT_TICKS {
-                states.push(state.clone());
+            timeline.tick(tick.tick, &tick.events);
+            if tick.tick + 1 == timelines.len() as Tick * KEPT_TICKS {
+                timelines.push(timeline.clone());
             }
         })?;
-        Ok(state)
+        Ok(timeline)
     }
 }

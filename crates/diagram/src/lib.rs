@@ -1,7 +1,7 @@
 //! The space-time diagram of a run, as one SVG text: robots are lanes, time is to scale in ticks, commands are slanted lines.
 //!
 //! Pure: events of ticks go in ([`Diagram::tick`]), text comes out ([`Diagram::to_svg`]). The same events give the same bytes.
-//! What was in progress when the window began is known from the events before it ([`State`]).
+//! What was in progress when the window began is known from the events before it ([`Timeline`]).
 
 mod axis;
 mod bands;
@@ -18,19 +18,18 @@ pub mod palette;
 mod picture;
 mod scale;
 mod shading;
-mod state;
 mod style;
 mod words;
 
 use protocol::messages::Awaited;
-use protocol::{Event, Tick};
+use protocol::{Event, RobotName, Tick};
+use timeline::{Span, Timeline};
 
 use draw::draw;
 use items::{HeldUp, Items};
 use picture::Window;
 
 pub use options::Options;
-pub use state::State;
 pub use style::style;
 pub use words::{shortened, width_px};
 
@@ -48,7 +47,7 @@ pub struct TooMuch {
 /// The diagram of a window of ticks.
 #[derive(Debug, Clone)]
 pub struct Diagram {
-    state: State,
+    timeline: Timeline,
     tick_s: f64,
     from: Tick,
     /// The last tick of the window so far.
@@ -62,11 +61,11 @@ pub struct Diagram {
 }
 
 impl Diagram {
-    /// A diagram of no tick yet. `state` is that after the tick before `from`; a tick lasts `tick_s` simulated seconds.
+    /// A diagram of no tick yet. `timeline` is that after the tick before `from`; a tick lasts `tick_s` simulated seconds.
     #[must_use]
-    pub fn new(state: State, tick_s: f64, from: Tick, options: Options) -> Self {
+    pub fn new(timeline: Timeline, tick_s: f64, from: Tick, options: Options) -> Self {
         Self {
-            state,
+            timeline,
             tick_s,
             from,
             to: from,
@@ -83,9 +82,8 @@ impl Diagram {
         let mut items = Items::default();
 
         for event in events {
-            let is_shown = self.options.queries || !matches!(event, Event::QueryLost { .. });
-            if is_shown {
-                self.state.apply(tick, event, &mut items);
+            for span in self.timeline.apply(tick, event) {
+                self.add(span, &mut items);
             }
             self.has_end |= matches!(event, Event::End { .. });
         }
@@ -109,7 +107,9 @@ impl Diagram {
     /// [`TooMuch`] if the window has more than [`MAX_ITEMS`] things.
     pub fn to_svg(&self) -> Result<String, TooMuch> {
         let mut items = self.items.clone();
-        self.state.add_unfinished(&mut items);
+        for span in self.timeline.in_progress() {
+            self.add(span, &mut items);
+        }
         let count = items.count() + self.beyond;
         if count > MAX_ITEMS {
             return Err(TooMuch { items: count });
@@ -121,6 +121,14 @@ impl Diagram {
             tick_s: self.tick_s,
             has_end: self.has_end,
         };
-        Ok(draw(self.state.robots(), &items, window, &self.options))
+        let robots: Vec<RobotName> = self.timeline.robots().cloned().collect();
+        Ok(draw(robots, &items, window, &self.options))
+    }
+
+    /// Adds what is shown.
+    fn add(&self, span: Span, items: &mut Items) {
+        if self.options.queries || !matches!(span, Span::QueriesLost(_)) {
+            items.push(span);
+        }
     }
 }

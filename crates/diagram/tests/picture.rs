@@ -5,11 +5,12 @@
     reason = "a test that cannot set up its subject fails"
 )]
 
-use diagram::{Diagram, MAX_ITEMS, Options, State, TooMuch, width_px};
+use diagram::{Diagram, MAX_ITEMS, Options, TooMuch, width_px};
 use protocol::event::Cause;
 use protocol::messages::{Awaited, FaultKind, Performative, Point, Reason};
 use protocol::{Event, RobotName, Tick};
 use roxmltree::{Document, Node};
+use timeline::Timeline;
 
 fn name(text: &str) -> RobotName {
     RobotName::new(text).unwrap()
@@ -137,11 +138,11 @@ fn draw_with(
         all
     };
 
-    let mut state = State::new(&[name("Butler"), name("Leguin")]);
+    let mut timeline = Timeline::new(&[name("Butler"), name("Leguin")]);
     for tick in 0..from {
-        state.skip(tick, &of_tick(tick));
+        timeline.tick(tick, &of_tick(tick));
     }
-    let mut diagram = Diagram::new(state, 0.5, from, options);
+    let mut diagram = Diagram::new(timeline, 0.5, from, options);
     for tick in from..=to {
         diagram.tick(tick, &of_tick(tick), &[]);
     }
@@ -493,7 +494,7 @@ fn what_was_over_before_the_window_is_not_in_it() {
 
 #[test]
 fn a_tick_that_was_held_up_names_the_robot_and_that_it_is_not_reproducible() {
-    let mut diagram = Diagram::new(State::default(), 0.5, 0, Options::default());
+    let mut diagram = Diagram::new(Timeline::default(), 0.5, 0, Options::default());
     diagram.tick(0, &start(), &[]);
     let awaited = Awaited {
         name: name("Leguin"),

@@ -3,13 +3,14 @@
 
 use std::collections::BTreeMap;
 
-use diagram::{Diagram, State};
+use diagram::Diagram;
 use miette::miette;
 use protocol::messages::Awaited;
 use protocol::{Event, Tick};
 use record::EpochFiles;
 use record::{Entry, Record};
 use recording::{Recording, RecordingError};
+use timeline::Timeline;
 
 pub use diagram::Options;
 
@@ -53,9 +54,9 @@ pub fn draw(files: &EpochFiles, window: Window, mut options: Options) -> miette:
         ));
     }
 
-    let mut state = State::default();
+    let mut timeline = Timeline::default();
     while let Some(entry) = next.take_if(|entry| entry.tick < from) {
-        state.skip(entry.tick, &entry.events);
+        timeline.tick(entry.tick, &entry.events);
         next = record.next_entry()?;
         if next.is_none() {
             let last = entry.tick;
@@ -70,7 +71,7 @@ pub fn draw(files: &EpochFiles, window: Window, mut options: Options) -> miette:
         notes.push(format!("{error}: ticks that were held up are not marked"));
         HeldUp::default()
     });
-    let mut diagram = Diagram::new(state, tick_s, from, options);
+    let mut diagram = Diagram::new(timeline, tick_s, from, options);
     let mut has_end = false;
     let mut last = from;
     while let Some(entry) = next.take_if(|entry| entry.tick <= to) {

@@ -3,7 +3,7 @@
 use protocol::time::time_s;
 use protocol::{RobotName, Tick};
 use serde_json::Value;
-use timeline::{Kind as StateKind, Stay};
+use timeline::{Kind as StateKind, Span, Timeline};
 
 use crate::Observation;
 use crate::measure::{
@@ -57,7 +57,7 @@ impl<'a> Probe<'a> {
             }),
             Kind::Share(share) => Tally::Share(ShareTally {
                 definition: share,
-                robots: timeline::States::default(),
+                timeline: Timeline::default(),
                 ticks: 0,
             }),
             Kind::Variable(variable) => Tally::Variable(VariableTally {
@@ -302,7 +302,7 @@ impl BetweenTally<'_> {
 #[derive(Debug)]
 struct ShareTally<'a> {
     definition: &'a Share,
-    robots: timeline::States,
+    timeline: Timeline,
     /// Ticks in the states before.
     ticks: Tick,
 }
@@ -310,21 +310,28 @@ struct ShareTally<'a> {
 impl ShareTally<'_> {
     fn observe(&mut self, observation: &Observation<'_>) {
         for event in observation.events {
-            for stay in self.robots.apply(observation.tick, event) {
-                self.ticks += self.counted(&stay);
+            for span in self.timeline.apply(observation.tick, event) {
+                self.ticks += self.counted(&span, observation.tick);
             }
         }
     }
 
-    /// How many ticks of a stay count.
-    fn counted(&self, stay: &Stay) -> Tick {
+    /// How many ticks of a span count, up to this tick.
+    fn counted(&self, span: &Span, now: Tick) -> Tick {
         let (kind, states) = match &self.definition.states {
             States::Emotions(states) => (StateKind::Emotion, states),
             States::Behaviors(states) => (StateKind::Behavior, states),
         };
-        let is_of_robot = stay.robot == self.definition.robot && stay.kind == kind;
-        let is_counted = is_of_robot && states.contains(&stay.state);
-        if is_counted { stay.ticks() } else { 0 }
+        match span {
+            Span::Stay(stay)
+                if stay.robot == self.definition.robot
+                    && stay.kind == kind
+                    && states.contains(&stay.name) =>
+            {
+                stay.period.ticks(now)
+            }
+            _ => 0,
+        }
     }
 
     fn measured(&self, now: Tick) -> Measured {
@@ -333,8 +340,8 @@ impl ShareTally<'_> {
             return Measured::Missing { reason };
         }
 
-        let lasting = self.robots.lasting(now);
-        let lasting: Tick = lasting.iter().map(|stay| self.counted(stay)).sum();
+        let lasting = self.timeline.in_progress();
+        let lasting: Tick = lasting.iter().map(|span| self.counted(span, now)).sum();
         Measured::from((self.ticks + lasting) as f64 / now as f64)
     }
 }

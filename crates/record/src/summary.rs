@@ -11,7 +11,7 @@ use protocol::time::time_s;
 use protocol::{Event, RobotName, RunName, Tick};
 use scenario::Scenario;
 use serde::{Deserialize, Serialize};
-use timeline::{Kind, States, Stay};
+use timeline::{Counts, Kind, Span, Timeline};
 
 pub use network::{CutSummary, LinkSummary, NetworkSummary};
 
@@ -52,9 +52,15 @@ pub struct Summary {
     #[serde(skip)]
     begun: Option<Instant>,
     #[serde(skip)]
-    states: States,
+    tally: Tally,
+}
+
+/// What is counted during an epoch.
+#[derive(Debug, Clone, PartialEq, Default)]
+struct Tally {
+    timeline: Timeline,
+    counts: Counts,
     /// Ticks in each state: sums of seconds would not be exact.
-    #[serde(skip)]
     ticks_in: BTreeMap<(RobotName, Kind, String), Tick>,
 }
 
@@ -204,8 +210,7 @@ impl Summary {
             expectations: BTreeMap::new(),
             wall: Wall::default(),
             begun: None,
-            states: States::default(),
-            ticks_in: BTreeMap::new(),
+            tally: Tally::default(),
         }
     }
 
@@ -218,26 +223,12 @@ impl Summary {
         event: &Event,
     ) {
         self.network.count(tick_s, unreachable, tick, event);
-        for stay in self.states.apply(tick, event) {
-            self.add(stay, tick_s);
+        self.tally.counts.add(event);
+        for span in self.tally.timeline.apply(tick, event) {
+            self.tally.add(span, tick);
         }
 
         match event {
-            Event::Behavior { robot, to, .. } => {
-                *self.robot(robot).entered.entry(to.clone()).or_default() += 1;
-            }
-            Event::Blocked { robot, .. } => self.robot(robot).blocked += 1,
-            Event::CommandSent { from, command, .. } => {
-                *self.robot(from).sent.entry(command.clone()).or_default() += 1;
-            }
-            Event::CommandDelivered { to, .. } => self.robot(to).received += 1,
-            Event::CommandDropped { to, .. } => self.robot(to).dropped += 1,
-            Event::Missed { robot } => self.robot(robot).missed += 1,
-            Event::Joined {
-                robot,
-                generation: Some(_),
-                ..
-            } => self.robot(robot).returns += 1,
             Event::Judged {
                 expectation,
                 verdict,
@@ -264,25 +255,6 @@ impl Summary {
             Event::Init { .. } => self.begun = Some(Instant::now()),
             _ => {}
         }
-    }
-
-    fn robot(&mut self, name: &RobotName) -> &mut RobotSummary {
-        self.robots.entry(name.clone()).or_default()
-    }
-
-    /// Adds the time in a state that is over.
-    fn add(&mut self, stay: Stay, tick_s: f64) {
-        let key = (stay.robot.clone(), stay.kind, stay.state.clone());
-        let total = self.ticks_in.entry(key).or_default();
-        *total += stay.ticks();
-        let total_s = time_s(*total, tick_s);
-
-        let robot = self.robot(&stay.robot);
-        let times_s = match stay.kind {
-            Kind::Emotion => &mut robot.emotions_s,
-            Kind::Behavior => &mut robot.behaviors_s,
-        };
-        times_s.insert(stay.state, total_s);
     }
 
     /// The verdict on the run: the worst of its expectations. A run of which nothing is expected passes.
@@ -326,14 +298,55 @@ impl Summary {
         self.time_s = time_s(ticks, tick_s);
         self.digest = digest;
 
-        for stay in std::mem::take(&mut self.states).lasting(ticks) {
-            self.add(stay, tick_s);
+        let Tally {
+            counts, ticks_in, ..
+        } = std::mem::take(&mut self.tally).ended(ticks);
+        for ((name, kind, state), ticks) in ticks_in {
+            let robot = self.robots.entry(name).or_default();
+            let times_s = match kind {
+                Kind::Emotion => &mut robot.emotions_s,
+                Kind::Behavior => &mut robot.behaviors_s,
+            };
+            times_s.insert(state, time_s(ticks, tick_s));
         }
+        for (name, counts) in counts.robots {
+            let robot = self.robots.entry(name).or_default();
+            robot.entered = counts.behaviors.entered;
+            robot.blocked = counts.blocked;
+            robot.sent = counts.sent;
+            robot.received = counts.received;
+            robot.dropped = counts.dropped;
+            robot.missed = counts.missed;
+            robot.returns = counts.returns;
+        }
+        self.network.add_counts(counts.links);
         for (name, robot) in &mut self.robots {
             robot.state_variables = state_variables(name).unwrap_or_default();
         }
 
         let elapsed = self.begun.map(|begun| begun.elapsed());
         self.wall.elapsed_s = elapsed.unwrap_or_default().as_secs_f64();
+    }
+}
+
+impl Tally {
+    /// Adds the time in a state, up to this tick at the latest.
+    fn add(&mut self, span: Span, now: Tick) {
+        if let Span::Stay(stay) = span {
+            let ticks = stay.period.ticks(now);
+            // A state that began in the last tick has lasted for no time.
+            if ticks > 0 {
+                let key = (stay.robot, stay.kind, stay.name);
+                *self.ticks_in.entry(key).or_default() += ticks;
+            }
+        }
+    }
+
+    /// The tally at the end of the epoch, which is this tick.
+    fn ended(mut self, last: Tick) -> Self {
+        for span in self.timeline.in_progress() {
+            self.add(span, last);
+        }
+        self
     }
 }

@@ -60,7 +60,14 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ),
     (
         "console",
-        &["bus", "diagram", "protocol", "recording", "terminal"],
+        &[
+            "bus",
+            "diagram",
+            "protocol",
+            "recording",
+            "terminal",
+            "timeline",
+        ],
     ),
     ("conform", &["bus", "lockstep", "protocol"]),
     (

@@ -13,7 +13,7 @@ use record::RunFolder;
 use record::names::{EVENTS, RECORDING, SCENARIO};
 use recording::{Recording, Ticks};
 use scenario::Scenario;
-use timeline::States;
+use timeline::Timeline;
 
 use super::episode::{Presence, RobotState};
 use crate::folder::run_name;
@@ -69,7 +69,7 @@ struct Playback {
     /// The last report of each robot.
     reports: BTreeMap<RobotName, Report>,
     /// Who takes part.
-    states: States,
+    timeline: Timeline,
 }
 
 impl Reader {
@@ -118,7 +118,7 @@ impl Reader {
         let playback = Playback {
             ticks: Ticks::of(recording),
             reports: BTreeMap::new(),
-            states: States::default(),
+            timeline: Timeline::default(),
         };
 
         let source = Source::Recording(Box::new(playback));
@@ -234,7 +234,7 @@ impl Playback {
         };
 
         for event in &tick.events {
-            self.states.apply(tick.frame.tick, event);
+            self.timeline.apply(tick.frame.tick, event);
         }
         self.reports.append(&mut tick.reports);
         let mut robots = Vec::new();
@@ -243,7 +243,7 @@ impl Playback {
             if let Some(report) = self.reports.get(&robot.name) {
                 robots.push(RobotState {
                     name: robot.name.clone(),
-                    presence: presence(&self.states, &robot.name, robot.missed.is_some()),
+                    presence: presence(&self.timeline, &robot.name, robot.missed.is_some()),
                     emotion: report.emotion_state.clone(),
                     behavior: report.behavior_state.clone(),
                     variables: Some(report.state_variables.clone()),
@@ -270,8 +270,8 @@ fn next_of(lines: &mut Lines, replay: &mut Replay) -> miette::Result<Option<Snap
 }
 
 /// Whether a robot has reported in a tick, and else why not.
-fn presence(states: &States, robot: &RobotName, has_missed: bool) -> Presence {
-    if states.lost_since(robot).is_some() {
+fn presence(timeline: &Timeline, robot: &RobotName, has_missed: bool) -> Presence {
+    if timeline.lost_since(robot).is_some() {
         return Presence::Absent;
     }
     if has_missed {
@@ -284,13 +284,13 @@ fn presence(states: &States, robot: &RobotName, has_missed: bool) -> Presence {
 #[derive(Debug, Default)]
 struct Replay {
     robots: BTreeMap<RobotName, RobotState>,
-    states: States,
+    timeline: Timeline,
 }
 
 impl Replay {
     /// Applies an event. Returns the robots if the event completes a tick.
     fn apply(&mut self, tick: Tick, event: Event) -> Option<Vec<RobotState>> {
-        self.states.apply(tick, &event);
+        self.timeline.apply(tick, &event);
         match event {
             Event::Joined { robot, .. } => _ = self.state_of(robot),
             Event::Missed { robot } => self.state_of(robot).presence = Presence::Missed,
@@ -309,7 +309,7 @@ impl Replay {
         for robot in self.robots.values_mut() {
             let mut shown = robot.clone();
             let has_missed = robot.presence == Presence::Missed;
-            shown.presence = presence(&self.states, &robot.name, has_missed);
+            shown.presence = presence(&self.timeline, &robot.name, has_missed);
             robots.push(shown);
             robot.presence = Presence::Reported;
         }

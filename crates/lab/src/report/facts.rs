@@ -11,7 +11,7 @@ use record::EpochFiles;
 use record::{Entry, Record};
 use recording::{Recording, RecordingError};
 use report::{Band, Floor};
-use timeline::{Kind, Stay};
+use timeline::{Counts, Kind, LinkCounts, Period, Span, StateCounts, Stay, Timeline};
 
 /// Parts of the floor along its longer side.
 const PARTS: f64 = 50.0;
@@ -47,8 +47,13 @@ pub(super) struct RunFacts {
     pub(super) floors: BTreeMap<RobotName, Floor>,
     /// What is missing, a sentence each.
     pub(super) notes: Vec<String>,
-    /// The states of the robots after the last event.
-    states: timeline::States,
+}
+
+/// What is folded while events are read.
+#[derive(Debug, Default)]
+struct Folded {
+    timeline: Timeline,
+    counts: Counts,
 }
 
 /// The facts about a robot.
@@ -114,10 +119,11 @@ impl RunFacts {
     pub(super) fn read(files: &EpochFiles) -> Result<Self, FileError> {
         let mut facts = Self::default();
         let mut record = Record::of_events(&files.events)?;
+        let mut folded = Folded::default();
         let mut is_empty = true;
         while let Some(entry) = record.next_entry()? {
             is_empty = false;
-            facts.add(&entry);
+            facts.add(&entry, &mut folded);
         }
         if is_empty {
             let path = files.events.display();
@@ -125,7 +131,7 @@ impl RunFacts {
                 .with_help("a run that has just begun has nothing to report yet"));
         }
 
-        facts.finish();
+        facts.finish(folded);
         if facts.end.is_none() {
             facts.notes.push(format!(
                 "The record has no end: the run is in progress, or its simulator was killed. Numbers go up to tick {}.",
@@ -154,25 +160,20 @@ impl RunFacts {
         sum
     }
 
-    fn add(&mut self, entry: &Entry) {
+    fn add(&mut self, entry: &Entry, folded: &mut Folded) {
         self.last_tick = entry.tick;
         for event in &entry.events {
+            folded.counts.add(event);
             self.add_event(entry.tick, event);
+        }
+        for span in folded.timeline.tick(entry.tick, &entry.events) {
+            self.add_span(span);
         }
     }
 
+    /// Adds what is of the run as a whole.
     fn add_event(&mut self, tick: Tick, event: &Event) {
-        let was_lost =
-            matches!(event, Event::Joined { robot, .. } if self.states.lost_since(robot).is_some());
-        for stay in self.states.apply(tick, event) {
-            self.add_stay(stay);
-        }
-
         match event {
-            Event::Joined { robot, .. } if was_lost => {
-                self.disturb(tick, "takes no part", robot.as_str(), false);
-                self.add_of_robot(tick, event);
-            }
             Event::Init {
                 seed,
                 version,
@@ -185,42 +186,6 @@ impl RunFacts {
             }
             Event::Tick { digest, .. } => self.digest.clone_from(digest),
             Event::End { reason, .. } => self.end = Some(*reason),
-            Event::Joined { .. }
-            | Event::Lost { .. }
-            | Event::Missed { .. }
-            | Event::Blocked { .. }
-            | Event::Emotion { .. }
-            | Event::Behavior { .. } => self.add_of_robot(tick, event),
-            Event::CommandSent { .. }
-            | Event::CommandDelivered { .. }
-            | Event::CommandDropped { .. }
-            | Event::CommandDelayed { .. }
-            | Event::CommandDuplicated { .. } => self.add_of_link(event),
-            Event::Fault {
-                robot,
-                kind,
-                begins,
-            } => {
-                let what = format!("{kind:?}").to_lowercase();
-                self.disturb(tick, &what, robot.as_str(), *begins);
-            }
-            Event::LinkCut {
-                from,
-                to,
-                commands,
-                queries,
-            } => {
-                let what = match (commands, queries) {
-                    (true, true) => "cut",
-                    (true, false) => "commands cut",
-                    _ => "queries cut",
-                };
-                let whom = format!("{from} → {to}");
-
-                self.heal(tick, &whom);
-                self.disturb(tick, what, &whom, true);
-            }
-            Event::LinkHealed { from, to } => self.heal(tick, &format!("{from} → {to}")),
             Event::Judged {
                 expectation,
                 verdict,
@@ -231,102 +196,84 @@ impl RunFacts {
                 tick,
                 because: because.clone(),
             }),
-            Event::Changed { set, .. } => self.disturb(tick, "change of the scenario", set, true),
             _ => {}
         }
     }
 
-    /// Adds a stay of a robot in a state.
-    fn add_stay(&mut self, stay: Stay) {
-        let tick_s = self.tick_s;
-        let robot = self.robots.entry(stay.robot).or_default();
-        let states = match stay.kind {
-            Kind::Emotion => &mut robot.emotions,
-            Kind::Behavior => &mut robot.behaviors,
+    /// Adds a span that is over, or in progress at the end.
+    fn add_span(&mut self, span: Span) {
+        let (what, whom, period) = match span {
+            Span::Stay(stay) => return self.add_stay(stay),
+            Span::Absence(absence) => (
+                "takes no part".to_owned(),
+                absence.robot.to_string(),
+                absence.period,
+            ),
+            Span::Fault(fault) => (
+                format!("{:?}", fault.kind).to_lowercase(),
+                fault.robot.to_string(),
+                fault.period,
+            ),
+            Span::Cut(cut) => {
+                let what = match (cut.commands, cut.queries) {
+                    (true, true) => "cut",
+                    (true, false) => "commands cut",
+                    _ => "queries cut",
+                };
+                let whom = format!("{} → {}", cut.from, cut.to);
+                (what.to_owned(), whom, cut.period)
+            }
+            Span::Change(change) => (
+                "change of the scenario".to_owned(),
+                change.set,
+                Period::since(change.tick),
+            ),
+            Span::Missed(_) | Span::QueriesLost(_) | Span::Command(_) | Span::Joined(_) => return,
         };
-        states.bands.push(Band {
-            name: stay.state,
-            begin_s: stay.begin as f64 * tick_s,
-            end_s: stay.end as f64 * tick_s,
+
+        self.disturbances.push(Disturbance {
+            what,
+            whom,
+            begin: period.begin,
+            end: period.end,
         });
     }
 
-    fn add_of_robot(&mut self, tick: Tick, event: &Event) {
-        match event {
-            Event::Joined {
-                robot, generation, ..
-            } => {
-                let facts = self.robots.entry(robot.clone()).or_default();
-                facts.returns += u64::from(generation.is_some());
-            }
-            Event::Lost { robot } => {
-                self.disturb(tick, "takes no part", robot.as_str(), true);
-            }
-            Event::Missed { robot } => {
-                self.robots.entry(robot.clone()).or_default().missed += 1;
-            }
-            Event::Blocked { robot, .. } => {
-                self.robots.entry(robot.clone()).or_default().blocked += 1;
-            }
-            Event::Emotion { robot, from, to } => {
-                let facts = self.robots.entry(robot.clone()).or_default();
-                facts.emotions.enter(from.as_deref(), to);
-            }
-            Event::Behavior { robot, from, to } => {
-                let facts = self.robots.entry(robot.clone()).or_default();
-                facts.behaviors.enter(from.as_deref(), to);
-            }
-            _ => {}
-        }
-    }
-
-    fn add_of_link(&mut self, event: &Event) {
-        match event {
-            Event::CommandSent { from, to, .. } => self.link(from, to).sent += 1,
-            Event::CommandDelivered { from, to, .. } => self.link(from, to).delivered += 1,
-            Event::CommandDropped { from, to, .. } => self.link(from, to).dropped += 1,
-            Event::CommandDelayed { from, to, .. } => self.link(from, to).delayed += 1,
-            Event::CommandDuplicated { from, to, .. } => self.link(from, to).duplicated += 1,
-            _ => {}
-        }
-    }
-
-    fn link(&mut self, from: &RobotName, to: &RobotName) -> &mut LinkFacts {
-        self.links.entry((from.clone(), to.clone())).or_default()
-    }
-
-    /// Something begins, or what has begun last of its kind is over.
-    fn disturb(&mut self, tick: Tick, what: &str, whom: &str, begins: bool) {
-        if begins {
-            self.disturbances.push(Disturbance {
-                what: what.to_owned(),
-                whom: whom.to_owned(),
-                begin: tick,
-                end: None,
-            });
+    /// Adds a stay of a robot in a state. States last until the last tick.
+    fn add_stay(&mut self, stay: Stay) {
+        let ticks = stay.period.ticks(self.last_tick);
+        if ticks == 0 {
             return;
         }
 
-        let mut open = self.disturbances.iter_mut().rev();
-        let last = open.find(|one| one.what == what && one.whom == whom && one.end.is_none());
-        if let Some(last) = last {
-            last.end = Some(tick);
-        }
+        let begin = stay.period.begin;
+        let band = Band {
+            name: stay.name,
+            begin_s: begin as f64 * self.tick_s,
+            end_s: (begin + ticks) as f64 * self.tick_s,
+        };
+        let robot = self.robots.entry(stay.robot).or_default();
+        robot.states(stay.kind).bands.push(band);
     }
 
-    /// The cut of a link is over, whatever it cut.
-    fn heal(&mut self, tick: Tick, link: &str) {
-        for one in &mut self.disturbances {
-            if one.whom == link && one.end.is_none() {
-                one.end = Some(tick);
-            }
+    fn finish(&mut self, folded: Folded) {
+        for span in folded.timeline.in_progress() {
+            self.add_span(span);
         }
-    }
+        self.disturbances.sort_by_key(|one| one.begin);
 
-    /// States last until the last tick.
-    fn finish(&mut self) {
-        for stay in std::mem::take(&mut self.states).lasting(self.last_tick) {
-            self.add_stay(stay);
+        let mut counts = folded.counts;
+        for name in folded.timeline.robots() {
+            let counts = counts.robots.remove(name).unwrap_or_default();
+            let robot = self.robots.entry(name.clone()).or_default();
+            robot.blocked = counts.blocked;
+            robot.missed = counts.missed;
+            robot.returns = counts.returns;
+            robot.emotions.set_counts(counts.emotions);
+            robot.behaviors.set_counts(counts.behaviors);
+        }
+        for (link, counts) in counts.links {
+            self.links.insert(link, LinkFacts::from(counts));
         }
     }
 
@@ -391,11 +338,29 @@ impl States {
         times
     }
 
-    fn enter(&mut self, from: Option<&str>, to: &str) {
-        *self.entered.entry(to.to_owned()).or_insert(0) += 1;
-        if let Some(from) = from {
-            let transition = (from.to_owned(), to.to_owned());
-            *self.transitions.entry(transition).or_insert(0) += 1;
+    fn set_counts(&mut self, counts: StateCounts) {
+        self.entered = counts.entered;
+        self.transitions = counts.transitions;
+    }
+}
+
+impl RobotFacts {
+    fn states(&mut self, kind: Kind) -> &mut States {
+        match kind {
+            Kind::Emotion => &mut self.emotions,
+            Kind::Behavior => &mut self.behaviors,
+        }
+    }
+}
+
+impl From<LinkCounts> for LinkFacts {
+    fn from(counts: LinkCounts) -> Self {
+        Self {
+            sent: counts.sent,
+            delivered: counts.delivered,
+            dropped: counts.lost(),
+            delayed: counts.delayed,
+            duplicated: counts.duplicated,
         }
     }
 }

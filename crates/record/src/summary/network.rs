@@ -6,6 +6,7 @@ use protocol::event::Cause;
 use protocol::time::{between_s, time_s};
 use protocol::{Event, RobotName, Tick};
 use serde::{Deserialize, Serialize};
+use timeline::LinkCounts;
 
 /// Metrics of the network of a run.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -19,16 +20,9 @@ pub struct NetworkSummary {
 /// Metrics of one directed link.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct LinkSummary {
-    /// Commands that were sent.
-    pub sent: u64,
-    /// Commands that arrived; a duplicated command counts twice.
-    pub delivered: u64,
-    /// Commands that were lost, by cause.
-    pub dropped: BTreeMap<Cause, u64>,
-    /// Commands that were delayed.
-    pub delayed: u64,
-    /// Commands that were duplicated.
-    pub duplicated: u64,
+    /// Counts of its commands.
+    #[serde(flatten)]
+    pub counts: LinkCounts,
     /// Ticks in which the sender could not query the target.
     pub unreachable_ticks: u64,
     /// Longest time for which the sender could not query the target, simulated seconds.
@@ -67,13 +61,13 @@ impl NetworkSummary {
         let now_s = time_s(tick, tick_s);
 
         match event {
-            Event::CommandSent { from, to, .. } => self.link(from, to).sent += 1,
-            Event::CommandDelivered { from, to, .. } => self.count_delivered(from, to, now_s),
+            Event::CommandDelivered { from, to, .. } => self.notice_healed(from, to, now_s),
             Event::CommandDropped {
-                from, to, because, ..
-            } => self.count_dropped(from, to, *because, now_s),
-            Event::CommandDelayed { from, to, .. } => self.link(from, to).delayed += 1,
-            Event::CommandDuplicated { from, to, .. } => self.link(from, to).duplicated += 1,
+                from,
+                to,
+                because: Cause::Partition,
+                ..
+            } => self.notice_cut(from, to, now_s),
             Event::LinkCut {
                 from, to, queries, ..
             } => self.begin_cut(from, to, now_s, *queries),
@@ -87,23 +81,25 @@ impl NetworkSummary {
         }
     }
 
-    fn count_delivered(&mut self, from: &RobotName, to: &RobotName, now_s: f64) {
-        self.link(from, to).delivered += 1;
+    /// Adds the counts of commands.
+    pub(super) fn add_counts(&mut self, links: BTreeMap<(RobotName, RobotName), LinkCounts>) {
+        for ((from, to), counts) in links {
+            self.link(&from, &to).counts = counts;
+        }
+    }
 
-        let last_first = self.cuts.iter_mut().rev();
-        if let Some(cut) = last_first.into_iter().find(|cut| cut.is_of(from, to))
+    /// A command has arrived.
+    fn notice_healed(&mut self, from: &RobotName, to: &RobotName, now_s: f64) {
+        if let Some(cut) = self.last_cut(from, to)
             && let Some(until_s) = cut.until_s
         {
             cut.healed_after_s.get_or_insert(between_s(until_s, now_s));
         }
     }
 
-    fn count_dropped(&mut self, from: &RobotName, to: &RobotName, because: Cause, now_s: f64) {
-        *self.link(from, to).dropped.entry(because).or_default() += 1;
-
-        if because == Cause::Partition
-            && let Some(cut) = self.open_cut(from, to)
-        {
+    /// A message is lost in a cut.
+    fn notice_cut(&mut self, from: &RobotName, to: &RobotName, now_s: f64) {
+        if let Some(cut) = self.open_cut(from, to) {
             cut.detected_after_s
                 .get_or_insert(between_s(cut.from_s, now_s));
         }
@@ -120,10 +116,8 @@ impl NetworkSummary {
                 healed_after_s: None,
             });
         }
-
-        if queries && let Some(cut) = self.open_cut(from, to) {
-            cut.detected_after_s
-                .get_or_insert(between_s(cut.from_s, now_s));
+        if queries {
+            self.notice_cut(from, to, now_s);
         }
     }
 
@@ -151,15 +145,14 @@ impl NetworkSummary {
         self.links.entry(key(from, to)).or_default()
     }
 
-    fn open_cut(&mut self, from: &RobotName, to: &RobotName) -> Option<&mut CutSummary> {
+    fn last_cut(&mut self, from: &RobotName, to: &RobotName) -> Option<&mut CutSummary> {
         let mut last_first = self.cuts.iter_mut().rev();
-        last_first.find(|cut| cut.is_of(from, to) && cut.until_s.is_none())
+        last_first.find(|cut| cut.from == *from && cut.to == *to)
     }
-}
 
-impl CutSummary {
-    fn is_of(&self, from: &RobotName, to: &RobotName) -> bool {
-        self.from == *from && self.to == *to
+    /// A link has one cut at a time.
+    fn open_cut(&mut self, from: &RobotName, to: &RobotName) -> Option<&mut CutSummary> {
+        self.last_cut(from, to).filter(|cut| cut.until_s.is_none())
     }
 }
 

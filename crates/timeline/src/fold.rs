@@ -1,0 +1,425 @@
+//! The fold over the events of a run.
+
+use std::collections::BTreeMap;
+
+use protocol::event::Cause;
+use protocol::messages::FaultKind;
+use protocol::{Event, RobotName, Seq, Tick};
+
+use crate::span::{
+    Absence, Change, Command, CommandEnd, Cut, Fault, Joined, Kind, Missed, Period, QueriesLost,
+    Span, Stay,
+};
+
+/// What is in progress after an event of a run. Memory is bounded by what is in progress, whatever the length of the run.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Timeline {
+    robots: BTreeMap<RobotName, Robot>,
+    /// Commands under way, by sender and number.
+    commands: BTreeMap<(RobotName, Seq), Command>,
+    cuts: BTreeMap<(RobotName, RobotName), Cut>,
+    /// The last lost queries of each pair.
+    queries: BTreeMap<(RobotName, RobotName), QueriesLost>,
+    /// The last change of each part of the scenario, by its path.
+    set: BTreeMap<String, String>,
+}
+
+/// What is in progress at a robot.
+#[derive(Debug, Clone, PartialEq, Default)]
+struct Robot {
+    emotion: Option<State>,
+    behavior: Option<State>,
+    /// Since when it takes no part.
+    lost: Option<Tick>,
+    /// The last ticks that it missed.
+    missed: Option<Period>,
+    /// In the order of their beginnings.
+    faults: Vec<(FaultKind, Tick)>,
+}
+
+/// A state, and the tick in which it began or the robot took part again.
+#[derive(Debug, Clone, PartialEq)]
+struct State {
+    name: String,
+    begin: Tick,
+}
+
+impl Timeline {
+    /// The timeline before tick 0 of a run of these robots. Others are added when they first occur in an event.
+    #[must_use]
+    pub fn new(robots: &[RobotName]) -> Self {
+        let mut timeline = Self::default();
+        for name in robots {
+            timeline.robot(name);
+        }
+        timeline
+    }
+
+    /// Applies the events of a tick. Returns what is over with them.
+    pub fn tick(&mut self, tick: Tick, events: &[Event]) -> Vec<Span> {
+        let mut over = Vec::new();
+        for event in events {
+            over.extend(self.apply(tick, event));
+        }
+        over
+    }
+
+    /// Applies an event of a tick. Returns what is over with it.
+    pub fn apply(&mut self, tick: Tick, event: &Event) -> Vec<Span> {
+        match event {
+            Event::Emotion { robot, to, .. } => self.enter(robot, Kind::Emotion, to, tick),
+            Event::Behavior { robot, to, .. } => self.enter(robot, Kind::Behavior, to, tick),
+            Event::Joined {
+                robot, generation, ..
+            } => {
+                let mut over = self.join(robot, tick);
+                if tick > 0 || generation.is_some() {
+                    over.push(Span::Joined(Joined {
+                        robot: robot.clone(),
+                        generation: *generation,
+                        tick,
+                    }));
+                }
+                over
+            }
+            Event::Lost { robot } => self.lose(robot, tick),
+            Event::Missed { robot } => self.miss(robot, tick),
+            Event::Fault {
+                robot,
+                kind,
+                begins,
+            } => self.fault(robot, *kind, *begins, tick),
+            Event::LinkCut {
+                from,
+                to,
+                commands,
+                queries,
+            } => {
+                let over = self.heal(from, to, tick);
+                let cut = Cut {
+                    from: from.clone(),
+                    to: to.clone(),
+                    commands: *commands,
+                    queries: *queries,
+                    period: Period::since(tick),
+                };
+                self.cuts.insert((from.clone(), to.clone()), cut);
+                over
+            }
+            Event::LinkHealed { from, to } => self.heal(from, to, tick),
+            Event::QueryLost { from, to, because } => self.lose_query(from, to, *because, tick),
+            Event::CommandSent {
+                from,
+                to,
+                seq,
+                performative,
+                command,
+            } => {
+                let sent = Command {
+                    from: from.clone(),
+                    to: to.clone(),
+                    seq: *seq,
+                    performative: *performative,
+                    text: command.clone(),
+                    sent: tick,
+                    until: None,
+                    is_doubled: false,
+                    ends: Vec::new(),
+                };
+                let before = self.commands.insert((from.clone(), *seq), sent);
+                before.map(Span::Command).into_iter().collect()
+            }
+            Event::CommandDelayed {
+                from, seq, until, ..
+            } => self.change_command(from, *seq, |command| command.until = Some(*until)),
+            Event::CommandDuplicated { from, seq, .. } => {
+                self.change_command(from, *seq, |command| command.is_doubled = true)
+            }
+            Event::CommandDelivered { from, seq, .. } => {
+                let end = CommandEnd { tick, lost: None };
+                self.change_command(from, *seq, |command| command.ends.push(end))
+            }
+            Event::CommandDropped {
+                from, seq, because, ..
+            } => {
+                let lost = Some(*because);
+                let end = CommandEnd { tick, lost };
+                self.change_command(from, *seq, |command| command.ends.push(end))
+            }
+            Event::Changed { set, .. } => vec![Span::Change(Change {
+                tick,
+                before: self.replace_setting(set),
+                set: set.clone(),
+            })],
+            Event::Init { .. }
+            | Event::DoneLate { .. }
+            | Event::Blocked { .. }
+            | Event::Say { .. }
+            | Event::Warned { .. }
+            | Event::Judged { .. }
+            | Event::Tick { .. }
+            | Event::End { .. } => Vec::new(),
+        }
+    }
+
+    /// What is in progress, without an end. Ticks that a robot missed one after the other have one: they are over when it has not
+    /// missed the next tick, which is known only then. Lost queries as well.
+    #[must_use]
+    pub fn in_progress(&self) -> Vec<Span> {
+        let mut spans = Vec::new();
+        for (name, robot) in &self.robots {
+            spans.extend(robot.in_progress(name));
+        }
+        spans.extend(self.commands.values().cloned().map(Span::Command));
+        spans.extend(self.cuts.values().cloned().map(Span::Cut));
+        spans.extend(self.queries.values().cloned().map(Span::QueriesLost));
+        spans
+    }
+
+    /// The robots, in the order of their names.
+    pub fn robots(&self) -> impl Iterator<Item = &RobotName> {
+        self.robots.keys()
+    }
+
+    /// The emotion or behavior that a robot has reported last, whether it takes part or not.
+    #[must_use]
+    pub fn state(&self, robot: &RobotName, kind: Kind) -> Option<&str> {
+        let state = self.robots.get(robot)?.state(kind);
+        state.map(|state| state.name.as_str())
+    }
+
+    /// Since when a robot takes no part; `None` if it does.
+    #[must_use]
+    pub fn lost_since(&self, robot: &RobotName) -> Option<Tick> {
+        self.robots.get(robot)?.lost
+    }
+
+    /// Whether a robot missed the tick, which is the last one of which events were applied.
+    #[must_use]
+    pub fn has_missed(&self, robot: &RobotName, tick: Tick) -> bool {
+        let missed = self.robots.get(robot).and_then(|robot| robot.missed);
+        missed.is_some_and(|period| period.end == Some(tick + 1))
+    }
+
+    /// A command of which a copy is under way, by its sender and number.
+    #[must_use]
+    pub fn command(&self, from: &RobotName, seq: Seq) -> Option<&Command> {
+        self.commands.get(&(from.clone(), seq))
+    }
+
+    fn robot(&mut self, name: &RobotName) -> &mut Robot {
+        self.robots.entry(name.clone()).or_default()
+    }
+
+    fn enter(&mut self, name: &RobotName, kind: Kind, to: &str, tick: Tick) -> Vec<Span> {
+        let robot = self.robot(name);
+        let state = match kind {
+            Kind::Emotion => &mut robot.emotion,
+            Kind::Behavior => &mut robot.behavior,
+        };
+        let before = state.replace(State {
+            name: to.to_owned(),
+            begin: tick,
+        });
+
+        let over = before.filter(|_| robot.lost.is_none());
+        let stay = over.and_then(|before| before.until(name, kind, tick));
+        stay.into_iter().collect()
+    }
+
+    fn lose(&mut self, name: &RobotName, tick: Tick) -> Vec<Span> {
+        let robot = self.robot(name);
+        if robot.lost.is_some() {
+            return Vec::new();
+        }
+
+        robot.lost = Some(tick);
+        let mut over = Vec::new();
+        for kind in [Kind::Emotion, Kind::Behavior] {
+            let state = robot.state(kind).cloned();
+            over.extend(state.and_then(|state| state.until(name, kind, tick)));
+        }
+        over
+    }
+
+    fn join(&mut self, name: &RobotName, tick: Tick) -> Vec<Span> {
+        let robot = self.robot(name);
+        let Some(begin) = robot.lost.take() else {
+            return Vec::new();
+        };
+
+        let states = [&mut robot.emotion, &mut robot.behavior];
+        for state in states.into_iter().flatten() {
+            state.begin = tick;
+        }
+        let period = Period {
+            begin,
+            end: Some(tick),
+        };
+        let robot = name.clone();
+        vec![Span::Absence(Absence { robot, period })]
+    }
+
+    fn miss(&mut self, name: &RobotName, tick: Tick) -> Vec<Span> {
+        let last = &mut self.robot(name).missed;
+        if extend(last.as_mut(), tick) {
+            return Vec::new();
+        }
+
+        let before = last.replace(Period::only(tick));
+        let robot = name.clone();
+        let over = before.map(|period| Span::Missed(Missed { robot, period }));
+        over.into_iter().collect()
+    }
+
+    fn fault(&mut self, name: &RobotName, kind: FaultKind, begins: bool, tick: Tick) -> Vec<Span> {
+        let faults = &mut self.robot(name).faults;
+        let mut over = Vec::new();
+        if let Some(index) = faults.iter().position(|(other, _)| *other == kind) {
+            let (_, begin) = faults.remove(index);
+            over.push(Span::Fault(Fault {
+                robot: name.clone(),
+                kind,
+                period: Period {
+                    begin,
+                    end: Some(tick),
+                },
+            }));
+        }
+
+        if begins {
+            faults.push((kind, tick));
+        }
+        over
+    }
+
+    fn heal(&mut self, from: &RobotName, to: &RobotName, tick: Tick) -> Vec<Span> {
+        let Some(mut cut) = self.cuts.remove(&(from.clone(), to.clone())) else {
+            return Vec::new();
+        };
+        cut.period.end = Some(tick);
+        vec![Span::Cut(cut)]
+    }
+
+    fn lose_query(
+        &mut self,
+        from: &RobotName,
+        to: &RobotName,
+        because: Cause,
+        tick: Tick,
+    ) -> Vec<Span> {
+        let pair = (from.clone(), to.clone());
+        let last = self.queries.get_mut(&pair);
+        let last = last.filter(|last| last.because == because);
+        if extend(last.map(|last| &mut last.period), tick) {
+            return Vec::new();
+        }
+
+        let lost = QueriesLost {
+            from: from.clone(),
+            to: to.clone(),
+            because,
+            period: Period::only(tick),
+        };
+        let before = self.queries.insert(pair, lost);
+        before.map(Span::QueriesLost).into_iter().collect()
+    }
+
+    /// Changes a command that is under way. Returns it if no copy is under way any more.
+    fn change_command(
+        &mut self,
+        from: &RobotName,
+        seq: Seq,
+        change: impl FnOnce(&mut Command),
+    ) -> Vec<Span> {
+        let key = (from.clone(), seq);
+        let Some(command) = self.commands.get_mut(&key) else {
+            return Vec::new();
+        };
+
+        change(command);
+        let over = command.is_over().then(|| self.commands.remove(&key));
+        over.flatten().map(Span::Command).into_iter().collect()
+    }
+
+    /// Notes a change; returns the last one of the same part of the scenario.
+    fn replace_setting(&mut self, set: &str) -> Option<String> {
+        let (path, _) = set.split_once('=')?;
+        let below = format!("{path}.");
+        self.set.retain(|other, _| !other.starts_with(&below));
+        self.set.insert(path.to_owned(), set.to_owned())
+    }
+}
+
+impl Robot {
+    fn state(&self, kind: Kind) -> Option<&State> {
+        match kind {
+            Kind::Emotion => self.emotion.as_ref(),
+            Kind::Behavior => self.behavior.as_ref(),
+        }
+    }
+
+    fn in_progress(&self, name: &RobotName) -> Vec<Span> {
+        let mut spans = Vec::new();
+        let robot = || name.clone();
+        match self.lost {
+            Some(begin) => spans.push(Span::Absence(Absence {
+                robot: robot(),
+                period: Period::since(begin),
+            })),
+            None => {
+                for kind in [Kind::Emotion, Kind::Behavior] {
+                    spans.extend(self.state(kind).map(|state| {
+                        Span::Stay(Stay {
+                            robot: robot(),
+                            kind,
+                            name: state.name.clone(),
+                            period: Period::since(state.begin),
+                        })
+                    }));
+                }
+            }
+        }
+
+        spans.extend(self.missed.map(|period| {
+            Span::Missed(Missed {
+                robot: robot(),
+                period,
+            })
+        }));
+        for (kind, begin) in &self.faults {
+            spans.push(Span::Fault(Fault {
+                robot: robot(),
+                kind: *kind,
+                period: Period::since(*begin),
+            }));
+        }
+        spans
+    }
+}
+
+impl State {
+    /// The stay that is over in a tick; `None` if it has lasted for no tick.
+    fn until(self, robot: &RobotName, kind: Kind, end: Tick) -> Option<Span> {
+        (self.begin < end).then(|| {
+            Span::Stay(Stay {
+                robot: robot.clone(),
+                kind,
+                name: self.name,
+                period: Period {
+                    begin: self.begin,
+                    end: Some(end),
+                },
+            })
+        })
+    }
+}
+
+/// Adds a tick to a period that ends before it. Returns whether there is one.
+fn extend(period: Option<&mut Period>, tick: Tick) -> bool {
+    let Some(period) = period.filter(|period| period.end == Some(tick)) else {
+        return false;
+    };
+    period.end = Some(tick + 1);
+    true
+}
