@@ -7,10 +7,11 @@ use std::path::{Path, PathBuf};
 use config::{Changes, Source};
 use miette::{IntoDiagnostic, miette};
 use protocol::messages::{End, Verdict};
-use protocol::{Event, RobotName, RunName, Seq, Tick};
+use protocol::{Event, RobotName, RunName, Tick};
 use robot::Robot;
 use scenario::Scenario;
 use simulator::TickRecord;
+use timeline::{Command, Counts, Kind, Span, Timeline};
 
 use super::case::Case;
 use super::coverage::{Fate, Feature};
@@ -200,7 +201,7 @@ impl Trial for Subject {
             self.go(&mut local, &run, wanted, &mut notes)
         }));
         let because = match gone {
-            Ok(Ok(())) => return Ok(notes.played),
+            Ok(Ok(())) => return Ok(notes.finish()),
             Ok(Err(error)) => error.to_string(),
             Err(_) => "a robot panicked".to_owned(),
         };
@@ -209,7 +210,7 @@ impl Trial for Subject {
             because,
         };
         notes.played.failed.insert(RUNS.to_owned(), failure);
-        Ok(notes.played)
+        Ok(notes.finish())
     }
 }
 
@@ -217,10 +218,10 @@ impl Trial for Subject {
 #[derive(Default)]
 struct Notes {
     played: Played,
-    /// Number of commands on each link.
-    counts: BTreeMap<Link, u64>,
-    /// Places of the commands in the list of those sent, by sender and number in the record.
-    places: BTreeMap<(RobotName, Seq), usize>,
+    timeline: Timeline,
+    counts: Counts,
+    /// Commands between robots.
+    commands: Vec<Command>,
 }
 
 impl Notes {
@@ -232,110 +233,108 @@ impl Notes {
     fn note(&mut self, record: &TickRecord) {
         self.played.ticks = record.tick;
         for event in record.events.iter() {
-            self.note_event(record.tick, event);
+            self.counts.add(event);
+            if let Event::Judged {
+                expectation,
+                verdict,
+                because,
+            } = event
+            {
+                self.note_verdict(record.tick, expectation, *verdict, because);
+            }
+        }
+        for span in self.timeline.tick(record.tick, &record.events) {
+            self.note_span(span);
         }
     }
 
-    fn note_event(&mut self, tick: Tick, event: &Event) {
-        match event {
-            Event::CommandSent {
-                from,
-                to,
-                seq,
-                command,
-                ..
-            } if !from.is_operator() => {
-                let link = link(from, to);
-                let count = self.counts.entry(link.clone()).or_default();
-                *count += 1;
+    fn note_verdict(&mut self, tick: Tick, expectation: &str, verdict: Verdict, because: &str) {
+        let expectation = expectation.to_owned();
+        match verdict {
+            Verdict::NotAsked => _ = self.played.not_asked.insert(expectation),
+            Verdict::Fail => {
+                let because = because.to_owned();
+                let failed = self.played.failed.entry(expectation);
+                failed.or_insert(Failure { tick, because });
+            }
+            Verdict::Pass | Verdict::Undecided => {}
+        }
+    }
 
-                let place = self.played.sent.len();
-                self.places.insert((from.clone(), *seq), place);
-                self.played.sent.push(SentMessage {
-                    tick,
-                    link,
-                    number: *count,
-                    text: command.clone(),
-                    is_lost: false,
-                });
-            }
-            Event::CommandDelivered { from, seq, .. } => {
-                self.note_fate(from, *seq, Fate::Delivered);
-            }
-            Event::CommandDelayed { from, seq, .. } => self.note_fate(from, *seq, Fate::Delayed),
-            Event::CommandDuplicated { from, seq, .. } => {
-                self.note_fate(from, *seq, Fate::Duplicated);
-            }
-            Event::CommandDropped {
-                from, seq, because, ..
-            } => self.note_fate(from, *seq, Fate::Dropped(*because)),
-            Event::QueryLost { from, to, .. } => {
-                let link = link(from, to);
+    fn note_span(&mut self, span: Span) {
+        match span {
+            Span::Command(command) if !command.from.is_operator() => self.commands.push(command),
+            Span::QueriesLost(lost) => {
+                let link = link(lost.from, lost.to);
                 self.played.features.insert(Feature::QueryLost { link });
-            }
-            Event::Behavior {
-                robot,
-                from: Some(from),
-                to,
-            } => {
-                self.played.features.insert(Feature::Behavior {
-                    robot: robot.clone(),
-                    from: from.clone(),
-                    to: to.clone(),
-                });
-            }
-            Event::Emotion {
-                robot,
-                from: Some(from),
-                to,
-            } => {
-                self.played.features.insert(Feature::Emotion {
-                    robot: robot.clone(),
-                    from: from.clone(),
-                    to: to.clone(),
-                });
-            }
-            Event::Judged {
-                expectation,
-                verdict: Verdict::NotAsked,
-                ..
-            } => {
-                self.played.not_asked.insert(expectation.clone());
-            }
-            Event::Judged {
-                expectation,
-                verdict: Verdict::Fail,
-                because,
-            } => {
-                let failure = Failure {
-                    tick,
-                    because: because.clone(),
-                };
-                let failed = &mut self.played.failed;
-                failed.entry(expectation.clone()).or_insert(failure);
             }
             _ => {}
         }
     }
 
-    fn note_fate(&mut self, from: &RobotName, seq: Seq, fate: Fate) {
-        let Some(place) = self.places.get(&(from.clone(), seq)) else {
-            return;
-        };
+    /// What came of the run, with what is in progress at its end.
+    fn finish(mut self) -> Played {
+        for span in self.timeline.in_progress() {
+            self.note_span(span);
+        }
+        for (robot, counts) in &self.counts.robots {
+            for kind in [Kind::Emotion, Kind::Behavior] {
+                let transitions = counts.states(kind).transitions.keys();
+                let features = transitions.map(|change| transition(robot, kind, change));
+                self.played.features.extend(features);
+            }
+        }
 
-        let message = &mut self.played.sent[*place];
-        message.is_lost |= matches!(fate, Fate::Dropped(_));
-        self.played.features.insert(Feature::Message {
-            link: message.link.clone(),
-            text: message.text.clone(),
-            fate,
-        });
+        let mut numbers: BTreeMap<Link, u64> = BTreeMap::new();
+        let mut commands = self.commands;
+        commands.sort_by(|a, b| (a.sent, &a.from, a.seq).cmp(&(b.sent, &b.from, b.seq)));
+        for command in commands {
+            let fates = fates(&command);
+            let is_lost = command.is_lost();
+            let link = link(command.from, command.to);
+            let number = numbers.entry(link.clone()).or_default();
+            *number += 1;
+
+            for fate in fates {
+                self.played.features.insert(Feature::Message {
+                    link: link.clone(),
+                    text: command.text.clone(),
+                    fate,
+                });
+            }
+            self.played.sent.push(SentMessage {
+                tick: command.sent,
+                link,
+                number: *number,
+                text: command.text,
+                is_lost,
+            });
+        }
+        self.played
     }
 }
 
-fn link(from: &RobotName, to: &RobotName) -> Link {
-    Link {
-        from: from.clone(),
-        to: to.clone(),
+fn transition(robot: &RobotName, kind: Kind, (from, to): &(String, String)) -> Feature {
+    let robot = robot.clone();
+    let from = from.clone();
+    let to = to.clone();
+    match kind {
+        Kind::Emotion => Feature::Emotion { robot, from, to },
+        Kind::Behavior => Feature::Behavior { robot, from, to },
     }
+}
+
+/// What became of a command and its copies so far.
+fn fates(command: &Command) -> Vec<Fate> {
+    let mut fates = Vec::new();
+    fates.extend(command.until.map(|_| Fate::Delayed));
+    fates.extend(command.is_doubled.then_some(Fate::Duplicated));
+    for end in &command.ends {
+        fates.push(end.lost.map_or(Fate::Delivered, Fate::Dropped));
+    }
+    fates
+}
+
+fn link(from: RobotName, to: RobotName) -> Link {
+    Link { from, to }
 }
