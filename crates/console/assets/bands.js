@@ -85,7 +85,7 @@ export class Bands {
 }
 
 /**
- * The spans of a window, without those that others of the same pixel would cover.
+ * The states of a window, without those that others of the same pixel would cover.
  * @param {Span[]} spans
  * @param {number} first_s
  * @param {number} last_s
@@ -93,8 +93,8 @@ export class Bands {
  */
 function visible(spans, first_s, last_s, x) {
   let end = -Infinity;
-  return spans.filter(({ from_s, to_s }) => {
-    if (to_s < first_s || from_s > last_s || x(to_s) - end < LEAST_PX) return false;
+  return spans.filter(({ state, from_s, to_s }) => {
+    if (state === "" || to_s < first_s || from_s > last_s || x(to_s) - end < LEAST_PX) return false;
     end = x(to_s);
     return true;
   });

@@ -4,7 +4,7 @@
 /** @typedef {import("./types/messages.js").WorldFrame} WorldFrame */
 /** @typedef {import("./types/messages.js").RobotFrame} RobotFrame */
 
-/** A period of time in one state. @typedef {{state: string, from_s: number, to_s: number}} Span */
+/** A period of time in one state, or in none, which is "". @typedef {{state: string, from_s: number, to_s: number}} Span */
 /** Places at the times of the history. @typedef {{x_m: (number | null)[], y_m: (number | null)[]}} Track */
 
 /** Most samples; beyond, older ones are dropped where they are close together, so that the whole run stays visible. */
@@ -52,7 +52,7 @@ export class History {
   /**
    * Adds a sample; one that is not later than the last is ignored.
    * @param {number} time_s
-   * @param {Pick<RobotFrame, "name" | "location" | "emotion_state" | "behavior_state" | "state_variables">[]} robots
+   * @param {Pick<RobotFrame, "name" | "location" | "presence" | "emotion_state" | "behavior_state" | "state_variables">[]} robots
    */
   add(time_s, robots) {
     const last_s = this.times_s.at(-1) ?? -Infinity;
@@ -113,16 +113,18 @@ export class History {
   }
 
   /**
-   * @param {Pick<RobotFrame, "name" | "emotion_state" | "behavior_state">} robot
+   * @param {Pick<RobotFrame, "name" | "presence" | "emotion_state" | "behavior_state">} robot
    * @param {number} time_s
    * @param {boolean} isBroken
    */
-  note({ name, emotion_state, behavior_state }, time_s, isBroken) {
+  note({ name, presence, emotion_state, behavior_state }, time_s, isBroken) {
     const states = this.states.get(name) ?? { emotion: [], behavior: [] };
     this.states.set(name, states);
     if (this.emotions.size < MOST_EMOTIONS) this.emotions.add(emotion_state);
-    extend(states.emotion, emotion_state, time_s, isBroken);
-    extend(states.behavior, behavior_state, time_s, isBroken);
+    // A robot that takes no part is in no state.
+    const isLost = presence === "lost";
+    extend(states.emotion, isLost ? "" : emotion_state, time_s, isBroken);
+    extend(states.behavior, isLost ? "" : behavior_state, time_s, isBroken);
   }
 
   /**

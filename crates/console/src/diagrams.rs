@@ -88,7 +88,10 @@ impl Diagrams {
     }
 
     /// What is in progress before a tick of the recording.
-    fn before(&self, file: &Recording, tick: Tick) -> Result<Timeline, RecordingError> {
+    ///
+    /// # Errors
+    /// [`RecordingError`] if the file is damaged.
+    pub(crate) fn before(&self, file: &Recording, tick: Tick) -> Result<Timeline, RecordingError> {
         let mut timelines = self
             .timelines
             .lock()

@@ -8,6 +8,7 @@ use protocol::messages::{Flight, LogRecord, Point, Presence};
 use protocol::{Epoch, Event, RobotName, Tick};
 use recording::{Header, Json, PlacedRobot, RawTick, RecordingError};
 use serde::Serialize;
+use timeline::Timeline;
 
 use crate::diagrams::{DiagramError, Diagrams, Window};
 
@@ -101,8 +102,8 @@ pub(crate) struct Wanted {
     pub(crate) from: Tick,
     /// Number of ticks.
     pub(crate) count: u64,
-    /// If set, samples for charts: of the ticks those that this number divides, and those in which a state of a robot changed,
-    /// without guests, panels and commands. The log is complete.
+    /// If set, samples for charts: of the ticks those that this number divides, and those in which a robot changed its state, was
+    /// lost or joined, without guests, panels and commands. The log is complete.
     pub(crate) every: Option<u64>,
 }
 
@@ -116,8 +117,15 @@ impl Wanted {
     }
 
     fn is_sampled(&self, recorded: &RawTick) -> bool {
-        let changes =
-            |event: &Event| matches!(event, Event::Emotion { .. } | Event::Behavior { .. });
+        let changes = |event: &Event| {
+            matches!(
+                event,
+                Event::Emotion { .. }
+                    | Event::Behavior { .. }
+                    | Event::Lost { .. }
+                    | Event::Joined { .. }
+            )
+        };
         self.every.is_none_or(|every| {
             recorded.tick().is_multiple_of(every) || recorded.events.iter().any(changes)
         })
@@ -202,9 +210,11 @@ impl Recording {
             end: to.min(file.len()).max(from),
             ..Range::default()
         };
+        let mut timeline = self.diagrams.before(&file, begin)?;
         let mut last_reports = BTreeMap::new();
         for mut recorded in file.read_raw(begin, to)? {
             let tick = recorded.tick();
+            timeline.tick(tick, &recorded.events);
             if every.is_some() {
                 recorded.panels.clear();
                 recorded.frame.guests_mm.clear();
@@ -223,7 +233,7 @@ impl Recording {
             }
             range.log.extend(recorded.log(&self.header));
             if wanted.is_sampled(&recorded) {
-                add_tick(&file, recorded, &mut last_reports, &mut range)?;
+                add_tick(&file, recorded, &timeline, &mut last_reports, &mut range)?;
             }
         }
         Ok(range.into_json())
@@ -243,6 +253,7 @@ impl Recording {
 fn add_tick(
     file: &recording::Recording,
     mut recorded: RawTick,
+    timeline: &Timeline,
     last_reports: &mut BTreeMap<RobotName, Json>,
     range: &mut Range,
 ) -> Result<(), RecordingError> {
@@ -260,7 +271,14 @@ fn add_tick(
         }
         // A robot is shown from its first report on.
         if let Some(report) = last_reports.get(&robot.name) {
-            robots.add_robot(robot, report);
+            let presence = if timeline.lost_since(&robot.name).is_some() {
+                Presence::Lost
+            } else if robot.missed.is_some() {
+                Presence::Gone
+            } else {
+                Presence::Here
+            };
+            robots.add_robot(robot, presence, report);
         }
     }
 
@@ -318,15 +336,12 @@ impl List {
 
     /// Adds a robot as a frame of a run in progress has it. The fields of such a frame that are not in its head have the same
     /// names in its report.
-    fn add_robot(&mut self, robot: &PlacedRobot, report: &Json) {
+    fn add_robot(&mut self, robot: &PlacedRobot, presence: Presence, report: &Json) {
         let head = to_json(&RobotHead {
             name: &robot.name,
             location: robot.location,
             blocked: robot.blocked,
-            presence: match robot.missed {
-                Some(_) => Presence::Gone,
-                None => Presence::Here,
-            },
+            presence,
         });
 
         self.separate();

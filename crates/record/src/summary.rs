@@ -11,7 +11,7 @@ use protocol::time::time_s;
 use protocol::{Event, RobotName, RunName, Tick};
 use scenario::Scenario;
 use serde::{Deserialize, Serialize};
-use timeline::{Counts, Kind, Span, Timeline};
+use timeline::{Counts, Timeline};
 
 pub use network::{CutSummary, LinkSummary, NetworkSummary};
 
@@ -52,16 +52,10 @@ pub struct Summary {
     #[serde(skip)]
     begun: Option<Instant>,
     #[serde(skip)]
-    tally: Tally,
-}
-
-/// What is counted during an epoch.
-#[derive(Debug, Clone, PartialEq, Default)]
-struct Tally {
     timeline: Timeline,
+    /// Times are counted in ticks: sums of seconds would not be exact.
+    #[serde(skip)]
     counts: Counts,
-    /// Ticks in each state: sums of seconds would not be exact.
-    ticks_in: BTreeMap<(RobotName, Kind, String), Tick>,
 }
 
 /// A verdict on an expectation.
@@ -210,7 +204,8 @@ impl Summary {
             expectations: BTreeMap::new(),
             wall: Wall::default(),
             begun: None,
-            tally: Tally::default(),
+            timeline: Timeline::default(),
+            counts: Counts::default(),
         }
     }
 
@@ -223,9 +218,9 @@ impl Summary {
         event: &Event,
     ) {
         self.network.count(tick_s, unreachable, tick, event);
-        self.tally.counts.add(event);
-        for span in self.tally.timeline.apply(tick, event) {
-            self.tally.add(span, tick);
+        self.counts.add(event);
+        for span in self.timeline.apply(tick, event) {
+            self.counts.add_span(&span, tick);
         }
 
         match event {
@@ -298,19 +293,20 @@ impl Summary {
         self.time_s = time_s(ticks, tick_s);
         self.digest = digest;
 
-        let Tally {
-            counts, ticks_in, ..
-        } = std::mem::take(&mut self.tally).ended(ticks);
-        for ((name, kind, state), ticks) in ticks_in {
-            let robot = self.robots.entry(name).or_default();
-            let times_s = match kind {
-                Kind::Emotion => &mut robot.emotions_s,
-                Kind::Behavior => &mut robot.behaviors_s,
-            };
-            times_s.insert(state, time_s(ticks, tick_s));
+        let mut counts = std::mem::take(&mut self.counts);
+        for span in std::mem::take(&mut self.timeline).in_progress() {
+            counts.add_span(&span, ticks);
         }
+        let times_s = |ticks: BTreeMap<String, Tick>| {
+            let states = ticks.into_iter();
+            states
+                .map(|(state, ticks)| (state, time_s(ticks, tick_s)))
+                .collect()
+        };
         for (name, counts) in counts.robots {
             let robot = self.robots.entry(name).or_default();
+            robot.emotions_s = times_s(counts.emotions.ticks);
+            robot.behaviors_s = times_s(counts.behaviors.ticks);
             robot.entered = counts.behaviors.entered;
             robot.blocked = counts.blocked;
             robot.sent = counts.sent;
@@ -326,27 +322,5 @@ impl Summary {
 
         let elapsed = self.begun.map(|begun| begun.elapsed());
         self.wall.elapsed_s = elapsed.unwrap_or_default().as_secs_f64();
-    }
-}
-
-impl Tally {
-    /// Adds the time in a state, up to this tick at the latest.
-    fn add(&mut self, span: Span, now: Tick) {
-        if let Span::Stay(stay) = span {
-            let ticks = stay.period.ticks(now);
-            // A state that began in the last tick has lasted for no time.
-            if ticks > 0 {
-                let key = (stay.robot, stay.kind, stay.name);
-                *self.ticks_in.entry(key).or_default() += ticks;
-            }
-        }
-    }
-
-    /// The tally at the end of the epoch, which is this tick.
-    fn ended(mut self, last: Tick) -> Self {
-        for span in self.timeline.in_progress() {
-            self.add(span, last);
-        }
-        self
     }
 }

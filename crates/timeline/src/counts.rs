@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 
 use protocol::event::Cause;
-use protocol::{Event, RobotName};
+use protocol::{Event, RobotName, Tick};
 use serde::{Deserialize, Serialize};
 
-use crate::span::Kind;
+use crate::span::{Kind, Span};
 
 /// Counts of the events of a run. Memory is bounded by the names of robots, states and the texts of commands.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -45,6 +45,8 @@ pub struct StateCounts {
     pub entered: BTreeMap<String, u64>,
     /// How often one state followed another.
     pub transitions: BTreeMap<(String, String), u64>,
+    /// Ticks in each state; one that began in the last tick of the run is left out.
+    pub ticks: BTreeMap<String, Tick>,
 }
 
 /// Counts of the commands from one robot to another.
@@ -108,6 +110,22 @@ impl Counts {
             | Event::Judged { .. }
             | Event::Tick { .. }
             | Event::End { .. } => {}
+        }
+    }
+
+    /// Adds the time in a state, if the span is one. One in progress is counted up to the tick `now`.
+    pub fn add_span(&mut self, span: &Span, now: Tick) {
+        let Span::Stay(stay) = span else {
+            return;
+        };
+        let ticks = stay.period.ticks(now);
+        if ticks > 0 {
+            let robot = self.robot(&stay.robot);
+            let states = match stay.kind {
+                Kind::Emotion => &mut robot.emotions,
+                Kind::Behavior => &mut robot.behaviors,
+            };
+            *states.ticks.entry(stay.name.clone()).or_default() += ticks;
         }
     }
 

@@ -306,12 +306,22 @@ fn a_robot_that_misses_ticks_is_shown_with_its_last_report() {
                 last_report: Some(2),
             });
         }
+        if tick == 700 {
+            let robot = robot("Butler");
+            recorded.events.push(Event::Lost { robot });
+        }
         recorded
     });
     write(&file(folder.path()), ticks);
     let console = open(folder.path());
 
-    for (tick, presence, treats) in [(2, "here", 2.0), (3, "gone", 2.0), (1999, "gone", 2.0)] {
+    for (tick, presence, treats) in [
+        (2, "here", 2.0),
+        (3, "gone", 2.0),
+        (1999, "lost", 2.0),
+        (699, "gone", 2.0),
+        (700, "lost", 2.0),
+    ] {
         let butler = &get_range(&console, tick, 1)["ticks"][0]["robots"][0];
         assert_eq!(butler["presence"], presence, "{tick}");
         assert_eq!(butler["state_variables"]["treats"], treats, "{tick}");

@@ -407,11 +407,15 @@ fn states_table(runs: &[Run], state: State) -> Table {
     for name in all_robots(runs) {
         let mut times: BTreeMap<String, (f64, u64)> = BTreeMap::new();
         let mut total_s = 0.0;
-        for robot in runs.iter().filter_map(|run| run.facts.robots.get(name)) {
+        for run in runs {
+            let Some(robot) = run.facts.robots.get(name) else {
+                continue;
+            };
+            // A share is one of the whole run, as in `runs.csv`: a robot that takes no part is in no state.
+            total_s += run.facts.time_s();
             let states = states_of(robot, state);
             for (name, time_s) in states.times_s() {
                 times.entry(name).or_default().0 += time_s;
-                total_s += time_s;
             }
 
             // A state that was entered in the last tick has lasted for no time.
