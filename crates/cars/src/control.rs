@@ -1,4 +1,4 @@
-//! Commands for a run in progress: `cars ctl`, `cars query`, `cars command` and `cars log`.
+//! Commands for a run in progress: `cars ctl` and `cars log`.
 
 use bus::{Bus, Reply, Role};
 use clap::{Args, Subcommand, ValueEnum};
@@ -123,6 +123,28 @@ pub(crate) struct CtlArgs {
 
 #[derive(Debug, Subcommand)]
 enum Request {
+    #[command(flatten)]
+    Control(CtlRequest),
+    /// Query a robot, for example `cars ctl query Leguin emotion_state`.
+    Query {
+        /// Name of the robot.
+        robot: RobotName,
+        /// The query; without it the whole state.
+        #[arg(value_parser = QUERIES, default_value = None)]
+        what: Option<String>,
+    },
+    /// Send a robot a command, for example `cars ctl command Leguin refill`.
+    Command {
+        /// Name of the robot that receives the command.
+        robot: RobotName,
+        /// Text of the command, for example `refill`.
+        command: String,
+    },
+}
+
+/// What the simulator is asked for.
+#[derive(Debug, Subcommand)]
+enum CtlRequest {
     /// Return to tick 0 with the same processes.
     Init {
         /// Another seed.
@@ -163,8 +185,34 @@ enum Request {
         #[arg(long, value_name = "TIME")]
         deadline: Option<Time>,
     },
+    #[command(flatten)]
+    Intervene(ByHand),
+    /// Print tick, phase and robots.
+    Status,
+    /// Return to tick 0 with another scenario for the same robots.
+    Load {
+        /// The scenario file.
+        file: PathBuf,
+    },
+    /// Print the scenario of the run as a file, with what was done by hand as `[[change]]`.
+    Scenario,
+}
+
+/// What is done to a run by hand.
+#[derive(Debug, Subcommand)]
+enum ByHand {
     /// Cut the links between two robots, or two groups of robots.
-    Cut(BetweenArgs),
+    Cut {
+        /// A robot, or several, separated by commas.
+        #[arg(required = true, value_delimiter = ',', num_args = 1)]
+        from: Vec<RobotName>,
+        /// Another one, or several.
+        #[arg(required = true, value_delimiter = ',', num_args = 1)]
+        to: Vec<RobotName>,
+        /// Cut only messages from the former to the latter.
+        #[arg(long)]
+        one_way: bool,
+    },
     /// Heal links that are cut: between two robots or groups, all of one, or without robots all.
     Heal {
         /// A robot, or several, separated by commas.
@@ -204,29 +252,6 @@ enum Request {
         #[arg(required = true, value_name = "PATH=VALUE")]
         set: Vec<String>,
     },
-    /// Print tick, phase and robots.
-    Status,
-    /// Return to tick 0 with another scenario for the same robots.
-    Load {
-        /// The scenario file.
-        file: PathBuf,
-    },
-    /// Print the scenario of the run as a file, with what was done by hand as `[[change]]`.
-    Scenario,
-}
-
-/// Two robots, or two groups of robots.
-#[derive(Debug, Args)]
-struct BetweenArgs {
-    /// A robot, or several, separated by commas.
-    #[arg(required = true, value_delimiter = ',', num_args = 1)]
-    from: Vec<RobotName>,
-    /// Another one, or several.
-    #[arg(required = true, value_delimiter = ',', num_args = 1)]
-    to: Vec<RobotName>,
-    /// Cut only messages from the former to the latter.
-    #[arg(long)]
-    one_way: bool,
 }
 
 /// A fault of a process.
@@ -240,9 +265,9 @@ struct FaultArgs {
 }
 
 impl FaultArgs {
-    fn intervention(&self, kind: FaultKind) -> Intervention {
+    fn intervention(self, kind: FaultKind) -> Intervention {
         Intervention::Fault {
-            robot: self.robot.clone(),
+            robot: self.robot,
             kind,
             for_s: self.lasting.map(|lasting| lasting.0),
         }
@@ -270,22 +295,18 @@ impl From<LateMode> for OnLate {
     }
 }
 
-impl Request {
-    fn control(&self) -> miette::Result<Control> {
-        if let Some(what) = self.intervention() {
-            return Ok(Control::Intervene { what });
-        }
-
+impl CtlRequest {
+    fn control(self) -> miette::Result<Control> {
         Ok(match self {
             Self::Init { seed } => Control::Init {
-                seed: *seed,
+                seed,
                 setup: None,
                 epoch: None,
             },
             Self::Start => Control::Start,
             Self::Pause => Control::Pause,
-            Self::Step { n } => Control::Step { n: *n },
-            Self::Seek { tick } => Control::Seek { tick: *tick },
+            Self::Step { n } => Control::Step { n },
+            Self::Seek { tick } => Control::Seek { tick },
             Self::Stop => Control::Stop,
             Self::Speed { factor } => Control::Speed { factor: factor.0 },
             Self::Late {
@@ -293,69 +314,62 @@ impl Request {
                 robot,
                 deadline,
             } => Control::Late {
-                robot: robot.clone(),
+                robot,
                 on_late: on_late.map(OnLate::from),
                 deadline_s: deadline.map(|deadline| deadline.0),
+            },
+            Self::Intervene(intervention) => Control::Intervene {
+                what: intervention.into(),
             },
             Self::Status => Control::Status,
             // The simulator cannot read the files that the scenario names, so they are read here.
             Self::Load { file } => Control::Load {
-                scenario: Scenario::load(file, &Changes::default())?.to_toml()?,
+                scenario: Scenario::load(&file, &Changes::default())?.to_toml()?,
             },
             Self::Scenario => Control::Setup,
-            Self::Cut(_)
-            | Self::Heal { .. }
-            | Self::Lose { .. }
-            | Self::Crash(_)
-            | Self::Hang(_)
-            | Self::Restart { .. }
-            | Self::Recover { .. }
-            | Self::Set { .. } => unreachable!("it is an intervention"),
-        })
-    }
-
-    /// What is done to the run by hand; `None` for any other request.
-    fn intervention(&self) -> Option<Intervention> {
-        Some(match self {
-            Self::Cut(BetweenArgs { from, to, one_way }) => Intervention::Cut {
-                from: from.clone(),
-                to: to.clone(),
-                one_way: *one_way,
-            },
-            Self::Heal { from, to, one_way } => Intervention::Heal {
-                from: from.clone(),
-                to: to.clone(),
-                one_way: *one_way,
-            },
-            Self::Lose { from, to } => Intervention::Lose {
-                from: from.clone(),
-                to: to.clone(),
-            },
-            Self::Crash(fault) => fault.intervention(FaultKind::Crash),
-            Self::Hang(fault) => fault.intervention(FaultKind::Hang),
-            Self::Restart { robot } => Intervention::Fault {
-                robot: robot.clone(),
-                kind: FaultKind::Restart,
-                for_s: None,
-            },
-            Self::Recover { robot } => Intervention::Recover {
-                robot: robot.clone(),
-            },
-            Self::Set { set } => Intervention::Set { set: set.clone() },
-            _ => return None,
         })
     }
 }
 
+impl From<ByHand> for Intervention {
+    fn from(by_hand: ByHand) -> Self {
+        match by_hand {
+            ByHand::Cut { from, to, one_way } => Self::Cut { from, to, one_way },
+            ByHand::Heal { from, to, one_way } => Self::Heal { from, to, one_way },
+            ByHand::Lose { from, to } => Self::Lose { from, to },
+            ByHand::Crash(fault) => fault.intervention(FaultKind::Crash),
+            ByHand::Hang(fault) => fault.intervention(FaultKind::Hang),
+            ByHand::Restart { robot } => Self::Fault {
+                robot,
+                kind: FaultKind::Restart,
+                for_s: None,
+            },
+            ByHand::Recover { robot } => Self::Recover { robot },
+            ByHand::Set { set } => Self::Set { set },
+        }
+    }
+}
+
+/// Carries out a request and prints its answer.
+pub(crate) fn ctl(args: CtlArgs) -> miette::Result<ExitCode> {
+    match args.request {
+        Request::Query { robot, what } => query(&args.run, &robot, what.as_deref()),
+        Request::Command { robot, command } => send_command(&args.run, &robot, command),
+        Request::Control(request) => {
+            let control = request.control()?;
+            print_answer(&args.run, &control, args.json)
+        }
+    }
+}
+
 /// Sends a request to the simulator of a run and prints its answer.
-pub(crate) fn ctl(args: &CtlArgs) -> miette::Result<ExitCode> {
-    let control = args.request.control()?;
-    let (bus, keys) = args.run.open()?;
-    let answer = ask(&bus, &keys, &args.run, &control);
+fn print_answer(run: &RunRef, control: &Control, is_json: bool) -> miette::Result<ExitCode> {
+    let (bus, keys) = run.open()?;
+    let answer = ask(&bus, &keys, run, control);
     bus.close();
 
     match answer? {
-        ControlAnswer::Done(status) if args.json => {
+        ControlAnswer::Done(status) if is_json => {
             let status = serde_json::to_string(&status).into_diagnostic()?;
             terminal::data(format_args!("{status}\n"))?;
         }
@@ -452,30 +466,15 @@ fn headline(status: &Status) -> String {
     )
 }
 
-/// `cars query`.
-#[derive(Debug, Args)]
-pub(crate) struct QueryArgs {
-    /// Name of the robot.
-    robot: RobotName,
-    /// The query; without it the whole state.
-    #[arg(value_parser = QUERIES, default_value = None)]
-    what: Option<String>,
-    #[command(flatten)]
-    run: RunRef,
-}
-
 /// Queries a robot of a run in progress, as another robot can, and prints the answer.
-pub(crate) fn query(args: &QueryArgs) -> miette::Result<ExitCode> {
-    let (bus, keys) = args.run.open()?;
-    let what = args.what.as_deref().unwrap_or(STATE);
-    let reply = bus
-        .get_within(&keys.query(&args.robot, what), "", None, PATIENCE)
-        .into_diagnostic()?;
+fn query(run: &RunRef, robot: &RobotName, what: Option<&str>) -> miette::Result<ExitCode> {
+    let (bus, keys) = run.open()?;
+    let key = keys.query(robot, what.unwrap_or(STATE));
+    let reply = bus.get_within(&key, "", None, PATIENCE).into_diagnostic()?;
     bus.close();
 
-    let run = args.run.run()?;
-    let reply =
-        reply.ok_or_else(|| miette!("no robot called {} answers in run {run}", args.robot))?;
+    let run = run.run()?;
+    let reply = reply.ok_or_else(|| miette!("no robot called {robot} answers in run {run}"))?;
     let answer: serde_json::Value = serde_json::from_slice(&payload(reply)?).into_diagnostic()?;
 
     // Epoch and tick around the value are for programs.
@@ -491,24 +490,21 @@ pub(crate) fn query(args: &QueryArgs) -> miette::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// `cars command`.
-#[derive(Debug, Args)]
-pub(crate) struct CommandArgs {
-    /// Name of the robot that receives the command.
-    robot: RobotName,
-    /// Text of the command, for example `refill`.
-    command: String,
-    #[command(flatten)]
-    run: RunRef,
-}
-
 /// Sends a command from the operator. It takes effect at the next tick boundary and is part of the record.
-pub(crate) fn command(args: &CommandArgs) -> miette::Result<ExitCode> {
-    let (bus, keys) = args.run.open()?;
-    put_command(args, &bus, &keys)?;
+fn send_command(run: &RunRef, robot: &RobotName, text: String) -> miette::Result<ExitCode> {
+    let command = Command {
+        command: text,
+        ..Command::default()
+    };
+    command
+        .check()
+        .map_err(|error| miette!("{}: {}", error.field, error.reason))?;
 
+    let (bus, keys) = run.open()?;
+    let key = keys.command(robot, &RobotName::operator());
+    bus.put(&key, encode(&command)).into_diagnostic()?;
     // Samples of one session arrive in order, so a simulator that answers this get has received the command.
-    let answer = ask(&bus, &keys, &args.run, &Control::Status);
+    let answer = ask(&bus, &keys, run, &Control::Status);
     bus.close();
 
     let ControlAnswer::Done(status) = answer? else {
@@ -519,30 +515,14 @@ pub(crate) fn command(args: &CommandArgs) -> miette::Result<ExitCode> {
             "refused: this is a replay of run {run}: its robots execute no commands"
         ));
     }
-    if !status.robots.iter().any(|robot| robot.name == args.robot) {
-        return Err(miette!(
-            "refused: no robot of this run is called {}",
-            args.robot
-        ));
+    if !status.robots.iter().any(|other| other.name == *robot) {
+        return Err(miette!("refused: no robot of this run is called {robot}"));
     }
     terminal::print_line(format_args!(
-        "{} receives {:?} at the tick after {}",
-        args.robot, args.command, status.tick
+        "{robot} receives {:?} at the tick after {}",
+        command.command, status.tick
     ))?;
     Ok(ExitCode::SUCCESS)
-}
-
-fn put_command(args: &CommandArgs, bus: &Bus, keys: &Keys) -> miette::Result<()> {
-    let command = Command {
-        command: args.command.clone(),
-        ..Command::default()
-    };
-    command
-        .check()
-        .map_err(|error| miette!("{}: {}", error.field, error.reason))?;
-
-    let key = keys.command(&args.robot, &RobotName::operator());
-    bus.put(&key, encode(&command)).into_diagnostic()
 }
 
 /// `cars log`.

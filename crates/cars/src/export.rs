@@ -1,81 +1,132 @@
-//! `cars export`: exports a run for other programs.
+//! `cars export`: writes a run as files for other programs.
 
-use std::path::PathBuf;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use lab::export::sheet::Format;
-use lab::export::{Wanted, export as export_epochs};
-use lab::folder::{find, recorded_epoch, recorded_epochs};
+use export::{ExportError, emotionml, shiviz, tables, trace};
+use lab::folder::{find, recorded_epoch, recorded_epochs, recording, run_name};
 use miette::miette;
-use protocol::Epoch;
+use protocol::{Epoch, RobotName, Tick};
+use record::names::LATEST;
+use record::{EpochFiles, RunFolder};
 use terminal::OutputError;
+
+use crate::output::{Output, cannot_write};
 
 /// `cars export`.
 #[derive(Debug, Args)]
 pub(crate) struct ExportArgs {
-    /// Name of the run, or its folder.
+    /// Name or folder of a run; without it the latest run.
+    #[arg(default_value = LATEST)]
     run: PathBuf,
     #[command(flatten)]
-    formats: Formats,
-    /// Folder of the files, which is made if it does not exist. Files of an earlier export are replaced.
-    #[arg(long, short, value_name = "DIR")]
-    output: PathBuf,
-    /// Export this epoch only.
+    format: Format,
+    /// Folder of the tables, which is made if it does not exist; file of any other format, without it the standard output.
+    #[arg(long, short, value_name = "PATH", required_if_eq("csv", "true"))]
+    output: Option<PathBuf>,
+    /// Export this epoch only. Without it, tables and ShiViz have all epochs, any other format the last one.
     #[arg(long, value_name = "N")]
     epoch: Option<Epoch>,
+    /// First tick of a trace; without it that of the epoch.
+    #[arg(long, value_name = "TICK", requires = "trace")]
+    from: Option<Tick>,
+    /// Last tick of a trace; without it that of the epoch.
+    #[arg(long, value_name = "TICK", requires = "trace")]
+    to: Option<Tick>,
+    /// Export the emotions of this robot only.
+    #[arg(long, value_name = "NAME", requires = "emotionml")]
+    robot: Option<RobotName>,
+    /// Use the nearest terms of W3C's vocabularies instead of the robots' own names of emotions and action tendencies.
+    #[arg(long, requires = "emotionml")]
+    standard: bool,
     /// Where run folders are made.
     #[arg(long, default_value = "runs", value_name = "DIR")]
     out: PathBuf,
 }
 
-/// The formats, of which there may be several.
+/// The format.
 #[derive(Debug, Args)]
-#[group(required = true, multiple = true)]
-struct Formats {
+#[group(required = true, multiple = false)]
+struct Format {
     /// Tables of events, states and variables as CSV.
     #[arg(long)]
     csv: bool,
-    /// The same tables as Parquet.
-    #[arg(long)]
-    parquet: bool,
     /// The order that commands impose on what robots did, as a log for ShiViz.
     #[arg(long)]
     shiviz: bool,
+    /// Where the wall-clock time went, as a trace that Perfetto and Chromium read.
+    #[arg(long)]
+    trace: bool,
+    /// The emotions of the robots as EmotionML 1.0.
+    #[arg(long)]
+    emotionml: bool,
 }
 
 /// Exports a run.
 pub(crate) fn export(args: &ExportArgs) -> miette::Result<ExitCode> {
     let folder = find(&args.out, &args.run)?;
-    let epochs = match args.epoch {
-        Some(_) => vec![recorded_epoch(&folder, args.epoch)?],
-        None => recorded_epochs(&folder)?,
-    };
-    let mut tables = Vec::new();
-    if args.formats.csv {
-        tables.push(Format::Csv);
+    if let (true, Some(into)) = (args.format.csv, &args.output) {
+        return write_tables(&args.epochs(&folder)?, into);
     }
-    if args.formats.parquet {
-        tables.push(Format::Parquet);
-    }
-    let wanted = Wanted {
-        tables,
-        has_shiviz: args.formats.shiviz,
-    };
 
-    let exported = export_epochs(&epochs, &args.output, &wanted)?;
-    for note in exported.notes {
+    let path = args.output.as_deref();
+    let mut output = Output::create(path)?;
+    let notes = match args.write(&folder, &mut output) {
+        // The reader has closed its end of the pipe, as `head` does.
+        Err(ExportError::Write(error)) if error.kind() == ErrorKind::BrokenPipe => {
+            return Ok(ExitCode::SUCCESS);
+        }
+        Err(ExportError::Write(error)) => return Err(cannot_write(path, &error)),
+        written => written?,
+    };
+    output.finish()?;
+    // The output may be on its way to another program, so the notes go to the standard error.
+    for note in notes {
         terminal::note(format_args!("note: {note}"));
     }
-    for file in exported.files {
+    Ok(ExitCode::SUCCESS)
+}
+
+fn write_tables(epochs: &[EpochFiles], into: &Path) -> miette::Result<ExitCode> {
+    let written = tables::write(epochs, into)?;
+    for note in written.notes {
+        terminal::note(format_args!("note: {note}"));
+    }
+    for file in written.files {
         OutputError::unless_closed(terminal::print_line(file.display()))?;
     }
-    if !exported.damage.is_empty() {
+    if !written.damage.is_empty() {
         return Err(miette!(
             help = "everything else was exported",
             "{}",
-            exported.damage.join("\n")
+            written.damage.join("\n")
         ));
     }
     Ok(ExitCode::SUCCESS)
+}
+
+impl ExportArgs {
+    /// Writes any format but the tables. Returns what it leaves out, a sentence each.
+    fn write(&self, folder: &RunFolder, out: &mut Output) -> Result<Vec<String>, ExportError> {
+        if self.format.shiviz {
+            shiviz::write(&self.epochs(folder)?, out)?;
+            return Ok(Vec::new());
+        }
+
+        let files = recorded_epoch(folder, self.epoch)?;
+        if self.format.trace {
+            return trace::write(&recording(&files)?, self.from, self.to, out);
+        }
+        let run = run_name(folder);
+        emotionml::write(&files, &run, self.robot.as_ref(), self.standard, out)
+    }
+
+    fn epochs(&self, folder: &RunFolder) -> Result<Vec<EpochFiles>, config::FileError> {
+        match self.epoch {
+            Some(_) => Ok(vec![recorded_epoch(folder, self.epoch)?]),
+            None => recorded_epochs(folder),
+        }
+    }
 }

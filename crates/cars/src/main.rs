@@ -5,7 +5,6 @@ mod check;
 mod conform;
 mod control;
 mod diagram;
-mod emotionml;
 mod exec;
 mod execution;
 mod expect;
@@ -31,7 +30,6 @@ mod run;
 mod secure;
 mod submit;
 mod table;
-mod trace;
 mod verify;
 
 use std::process::ExitCode;
@@ -55,9 +53,7 @@ Look:
   diagram      Draw who commanded whom, what was lost, what the robots felt
   replay       Show a recorded run to consoles as if it were in progress
   log          Show the log of a run, also of one in progress
-  export       Write tables as CSV or Parquet, a log for ShiViz
-  trace        Write where the wall-clock time of a run went
-  emotionml    Write the robots' emotions as EmotionML 1.0
+  export       Write tables as CSV, a log for ShiViz, a trace, emotions as EmotionML
 
 Compare:
   check        Check files of every kind, and all that a run has left
@@ -67,9 +63,7 @@ Compare:
   fork         Execute a recorded run up to a tick, and go on with changes
 
 Control a run in progress:
-  ctl          Start, pause, step, stop, set, cut, crash, and more
-  query        Query a robot
-  command      Send a robot a command
+  ctl          Start, pause, step, stop, set, cut, crash, query, command, and more
 
 Robots of your own:
   new          Make a skeleton of a robot
@@ -137,24 +131,16 @@ enum Subcommands {
     Fork(fork::ForkArgs),
     /// Show a recorded run to consoles and other observers as if it were in progress: start, pause, step, seek, speed.
     Replay(replay::ReplayArgs),
-    /// Control a run in progress, or a replay: init, start, pause, step, stop, speed, status.
+    /// Control a run in progress, or a replay: init, start, pause, step, stop, speed, status; query and command its robots.
     Ctl(control::CtlArgs),
-    /// Query a robot of a run in progress, for example `cars query Leguin emotion_state`.
-    Query(control::QueryArgs),
-    /// Send a robot of a run in progress a command, for example `cars command Leguin refill`.
-    Command(control::CommandArgs),
     /// Show the log of a run; `-f` follows one in progress.
     Log(control::LogArgs),
-    /// Export a run for other programs: tables as CSV or Parquet, a log for ShiViz.
+    /// Export a run for other programs: tables as CSV, a log for ShiViz, a trace of wall-clock time, emotions as EmotionML.
     Export(export::ExportArgs),
-    /// Export where the wall-clock time of a run went, as a trace that Perfetto and Chromium read.
-    Trace(trace::TraceArgs),
     /// Draw the space-time diagram of a run: who commanded whom, what was lost, what the robots felt.
     Diagram(diagram::DiagramArgs),
     /// Write a report about runs as one HTML file: emotions and behaviors over time, transitions, occupancy, the network.
     Report(report::ReportArgs),
-    /// Export the emotions of the robots of a run as EmotionML 1.0.
-    Emotionml(emotionml::EmotionmlArgs),
     /// Check a robot, written in any language, against the rules of the protocol.
     Conform(conform::ConformArgs),
     /// Faults of real links: cut, delay, bandwidth. The record is reproducible, the timing is not.
@@ -223,15 +209,11 @@ fn dispatch(subcommand: Subcommands) -> miette::Result<ExitCode> {
         Subcommands::Expect(args) => expect::expect(&args),
         Subcommands::Fork(args) => fork::fork(args),
         Subcommands::Replay(args) => replay::replay(&args),
-        Subcommands::Ctl(args) => control::ctl(&args),
-        Subcommands::Query(args) => control::query(&args),
-        Subcommands::Command(args) => control::command(&args),
+        Subcommands::Ctl(args) => control::ctl(args),
         Subcommands::Log(args) => control::log(&args),
         Subcommands::Export(args) => export::export(&args),
-        Subcommands::Trace(args) => trace::trace(&args),
         Subcommands::Diagram(args) => diagram::diagram(&args),
         Subcommands::Report(args) => report::report(&args),
-        Subcommands::Emotionml(args) => emotionml::emotionml(args),
         Subcommands::Conform(args) => conform::conform(&args),
         Subcommands::Net(command) => net::net(command),
         Subcommands::Router(args) => router::router(&args),

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::{Args, Command, CommandFactory};
 use clap_mangen::Man;
-use lab::export::draft::{Draft, unwritable};
+use export::draft::{Draft, unwritable};
 use robot::RobotArgs;
 
 /// The programs of the robots.

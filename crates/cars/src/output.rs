@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{BufWriter, ErrorKind, Stdout, Write};
 use std::path::Path;
 
-use lab::export::draft::{Draft, unwritable};
+use export::draft::{Draft, unwritable};
 use lab::is_part_of_record;
 use miette::miette;
 

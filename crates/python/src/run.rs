@@ -4,11 +4,10 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use ::export::tables;
 use config::shipped::{self, LAUNCHES, SCENARIOS};
 use config::units::Time;
 use config::{Override, Speed, seed};
-use lab::export::sheet::Format;
-use lab::export::{Wanted, export as export_epochs};
 use lab::folder::{find as find_folder, read_summary, recorded_epochs};
 use lab::run::{check_faults, execute_with};
 use launch::{RunOptions, scenario_file};
@@ -120,16 +119,12 @@ pub(crate) fn find(out: PathBuf, run: PathBuf) -> PyResult<(PathBuf, Option<Stri
     Ok((folder.path().to_owned(), summary))
 }
 
-/// Writes the tables of a run to a folder, as Parquet. Returns what they leave out, a sentence each.
+/// Writes the tables of a run to a folder, as CSV. Returns what they leave out, a sentence each.
 #[pyfunction]
 pub(crate) fn export(py: Python<'_>, run: PathBuf, into: PathBuf) -> PyResult<Vec<String>> {
-    let wanted = Wanted {
-        tables: vec![Format::Parquet],
-        has_shiviz: false,
-    };
     let exported = py.detach(|| -> miette::Result<_> {
         let epochs = recorded_epochs(&RunFolder::at(run)).into_diagnostic()?;
-        Ok(export_epochs(&epochs, &into, &wanted)?)
+        Ok(tables::write(&epochs, &into)?)
     });
     let mut exported = exported.map_err(reported)?;
     exported.notes.append(&mut exported.damage);

@@ -51,10 +51,16 @@ def test_settings_are_written_as_toml() -> None:
 
 @pytest.mark.parametrize("kind", ["pandas", "polars"])
 def test_frames_are_the_tables_of_the_export(run: cars.Run, lab: Lab, kind: str) -> None:
-    lab.cars("export", str(run.folder), "--parquet", "-o", str(lab.folder / "tables"))
+    lab.cars("export", str(run.folder), "--csv", "-o", str(lab.folder / "tables"))
+    page = (ROOT / "docs/exports.md").read_text()
+    types = {"integer": polars.Int64, "real": polars.Float64, "flag": polars.Boolean, "text": polars.String}
     frames = run.frames(kind)
     for name, frame in zip(frames._fields, frames):
-        exported = polars.read_parquet(lab.folder / "tables" / f"{name}.parquet")
+        section = page.split(f"### {name}\n")[1].split("\n##")[0]
+        own = dict(re.findall(r"^\| `(\w+)` \| (\w+) \|", section, re.MULTILINE))
+        columns = {"epoch": "integer", "tick": "integer", "time_s": "real"} | own
+        schema = {column: types[of] for column, of in columns.items()}
+        exported = polars.read_csv(lab.folder / "tables" / f"{name}.csv", schema=schema)
         if kind == "pandas":
             assert isinstance(frame, pandas.DataFrame)
             frame = polars.from_pandas(frame)
@@ -269,7 +275,7 @@ def test_an_experiment_is_that_of_the_command_line(lab: Lab) -> None:
     own = cars.experiment(file, out=lab.folder / "own", seeds=4, set={"guests.count": 20})
     options = ["--seeds", "4", "--set", "guests.count=20", "--out", str(lab.folder / "other")]
     lab.cars("experiment", "run", str(file), *options)
-    for name in ("results.json", "runs.csv", "runs.parquet"):
+    for name in ("results.json", "runs.csv"):
         assert (lab.folder / "own" / name).read_bytes() == (lab.folder / "other" / name).read_bytes(), name
 
     assert own.results.groupby("arm").seed.apply(list).to_dict() == {"calm": [1, 2, 3, 4], "feeling": [1, 2, 3, 4]}

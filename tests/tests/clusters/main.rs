@@ -18,7 +18,7 @@ const PATIENCE: Duration = Duration::from_secs(900);
 /// Number of units of the experiment.
 const UNITS: usize = 32;
 /// Files of the results, which have to be the same.
-const RESULTS: [&str; 3] = ["runs.csv", "runs.parquet", "results.json"];
+const RESULTS: [&str; 2] = ["runs.csv", "results.json"];
 
 /// Two arms under two conditions with eight seeds, with numbers and a time that some runs do not reach. Its folders have
 /// names that a shell has to read in quotes.

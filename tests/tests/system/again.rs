@@ -164,7 +164,7 @@ fn what_an_operator_and_the_machine_did_is_taken_from_the_record() {
         10,
         &[&["--speed", "10"], &continues[..]].concat(),
     );
-    lab.ok(&["command", "Leguin", "hurry", "--run", run]);
+    lab.ok(&["ctl", "command", "Leguin", "hurry", "--run", run]);
     // She misses ticks, and goes on without having been lost, or comes back.
     let leguin = launch.process("cars-leguin");
     send(leguin, Signal::SIGSTOP);

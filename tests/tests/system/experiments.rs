@@ -64,13 +64,7 @@ fn in_one_line(text: &str) -> String {
 
 /// Asserts that two folders have the same results, byte for byte.
 fn assert_same_results(one: &Path, other: &Path) {
-    for name in [
-        "plan.json",
-        "experiment.toml",
-        "runs.csv",
-        "runs.parquet",
-        "results.json",
-    ] {
+    for name in ["plan.json", "experiment.toml", "runs.csv", "results.json"] {
         let bytes = |folder: &Path| fs::read(folder.join(name)).unwrap();
         assert!(
             bytes(one) == bytes(other),

@@ -52,15 +52,13 @@ fn compare_tables(lab: &Lab, run: &str, tables: &str, epochs: &[&str]) -> Option
     Some(serde_json::from_slice(&output.stdout).unwrap())
 }
 
-/// Exports a run of a lab to one of its folders; returns what is printed.
-fn export(lab: &Lab, run: &str, to: &str, formats: &[&str]) -> String {
+/// Exports the tables of a run of a lab to one of its folders; returns what is printed.
+fn export(lab: &Lab, run: &str, to: &str, more: &[&str]) -> String {
     let folder = lab.out().join(to);
-    let mut args = vec!["export", run, "-o", folder.to_str().unwrap()];
-    args.extend(formats);
+    let mut args = vec!["export", run, "--csv", "-o", folder.to_str().unwrap()];
+    args.extend(more);
     lab.ok(&args)
 }
-
-const BOTH: [&str; 2] = ["--csv", "--parquet"];
 
 /// Plays a run with two epochs. In both a robot with hostile texts and numbers crashes and returns, and messages are lost,
 /// delayed and doubled.
@@ -152,8 +150,8 @@ fn tables_have_every_value_of_the_record_also_of_hostile_robots() {
 
     let lab = Lab::new();
     play_hostile(&lab, "exports-hostile");
-    let printed = export(&lab, "exports-hostile", "tables", &BOTH);
-    assert_eq!(printed.lines().count(), 6, "{printed}");
+    let printed = export(&lab, "exports-hostile", "tables", &[]);
+    assert_eq!(printed.lines().count(), 3, "{printed}");
 
     let Some(counts) = compare_tables(&lab, "exports-hostile", "tables", &[]) else {
         return;
@@ -196,21 +194,14 @@ fn tables_have_every_value_of_the_record_also_of_hostile_robots() {
     }
 
     // One epoch by itself, and the same bytes once more.
-    export(
-        &lab,
-        "exports-hostile",
-        "second",
-        &[&BOTH[..], &["--epoch", "2"]].concat(),
-    );
+    export(&lab, "exports-hostile", "second", &["--epoch", "2"]);
     compare_tables(&lab, "exports-hostile", "second", &["2"]);
-    export(&lab, "exports-hostile", "again", &BOTH);
+    export(&lab, "exports-hostile", "again", &[]);
     for table in ["events", "states", "variables"] {
-        for ending in ["csv", "parquet"] {
-            let name = format!("{table}.{ending}");
-            let [one, again] = ["tables", "again"]
-                .map(|folder| std::fs::read(lab.out().join(folder).join(&name)).unwrap());
-            assert!(one == again, "{name}");
-        }
+        let name = format!("{table}.csv");
+        let [one, again] = ["tables", "again"]
+            .map(|folder| std::fs::read(lab.out().join(folder).join(&name)).unwrap());
+        assert!(one == again, "{name}");
     }
 }
 
@@ -218,7 +209,7 @@ fn tables_have_every_value_of_the_record_also_of_hostile_robots() {
 fn the_examples_of_the_documentation_work() {
     let lab = Lab::new();
     lab.ok(&["run", HALL, "--run", "hall", "--duration", "60 s"]);
-    export(&lab, "hall", "tables", &BOTH);
+    export(&lab, "hall", "tables", &[]);
 
     let page = std::fs::read_to_string(root().join("docs/exports.md")).unwrap();
     let mut count = 0;
@@ -238,7 +229,7 @@ fn the_examples_of_the_documentation_work() {
 /// Exports a run to the folder `tables` of a lab; returns the notes.
 fn notes_of_export(lab: &Lab, run: &str) -> String {
     let folder = lab.out().join("tables");
-    let args = [&["export", run, "-o", folder.to_str().unwrap()], &BOTH[..]].concat();
+    let args = ["export", run, "--csv", "-o", folder.to_str().unwrap()];
     let output = lab.cars(&args).output().unwrap();
     let notes = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{notes}");
@@ -288,7 +279,7 @@ fn a_run_that_was_killed_or_not_recorded_is_exported_as_far_as_it_goes() {
 fn what_a_damaged_recording_has_before_the_damage_is_exported() {
     let lab = Lab::new();
     lab.ok(&["run", HALL, "--run", "hall", "--duration", "120 s"]);
-    export(&lab, "hall", "whole", &BOTH);
+    export(&lab, "hall", "whole", &[]);
     let recording = lab.file("hall", "run.mcap");
     let whole = std::fs::read(&recording).unwrap();
     let table = |folder: &str, name: &str| {
@@ -298,15 +289,11 @@ fn what_a_damaged_recording_has_before_the_damage_is_exported() {
     let damaged = |folder: &str, bytes: &[u8]| {
         std::fs::write(&recording, bytes).unwrap();
         let place = lab.out().join(folder);
-        let args = [
-            &["export", "hall", "-o", place.to_str().unwrap()],
-            &BOTH[..],
-        ]
-        .concat();
+        let args = ["export", "hall", "--csv", "-o", place.to_str().unwrap()];
         let output = lab.cars(&args).output().unwrap();
         assert_eq!(output.status.code(), Some(1));
         let printed = String::from_utf8_lossy(&output.stdout);
-        assert_eq!(printed.lines().count(), 6, "{printed}");
+        assert_eq!(printed.lines().count(), 3, "{printed}");
         assert_eq!(table(folder, "events.csv"), table("whole", "events.csv"));
         let words = String::from_utf8_lossy(&output.stderr);
         let words = words.split_whitespace().filter(|word| *word != "│");
@@ -341,15 +328,11 @@ fn commands_are_arrows_in_shiviz() {
 
     let lab = Lab::new();
     play_hostile(&lab, "exports-arrows");
-    let log = export(&lab, "exports-arrows", "log", &["--shiviz"]);
-    assert!(log.trim_end().ends_with("log/shiviz.log"), "{log}");
+    let log = lab.out().join("shiviz.log").display().to_string();
+    lab.ok(&["export", "exports-arrows", "--shiviz", "-o", &log]);
 
     let run = lab.out().join("exports-arrows");
-    let args = [
-        script("shiviz.py"),
-        run.to_str().unwrap().to_owned(),
-        log.trim_end().to_owned(),
-    ];
+    let args = [script("shiviz.py"), run.to_str().unwrap().to_owned(), log];
     let args: Vec<&str> = args.iter().map(String::as_str).collect();
     let Some(output) = python(lab.out(), &["json"], &args) else {
         return;
@@ -369,7 +352,11 @@ fn commands_are_arrows_in_shiviz() {
 /// The trace of a run, which is valid by the schema of the format.
 fn trace(lab: &Lab, run: &str, args: &[&str]) -> Value {
     let file = lab.out().join("trace.json");
-    let all = [&["trace", run, "-o", file.to_str().unwrap()], args].concat();
+    let all = [
+        &["export", run, "--trace", "-o", file.to_str().unwrap()],
+        args,
+    ]
+    .concat();
     lab.ok(&all);
 
     let schema = script("trace.schema.json");
@@ -517,26 +504,50 @@ fn an_export_that_fails_names_the_reason_and_leaves_nothing_behind() {
         "there is no run nowhere",
     );
     fails(
+        &["export", "hall", "--csv"],
+        2,
+        "required arguments were not provided",
+    );
+    fails(
+        &["export", "hall", "--csv", "--trace", "-o", &tables],
+        2,
+        "cannot be used with",
+    );
+    fails(
         &["export", "hall", "--csv", "-o", &tables, "--epoch", "7"],
         1,
         "has no epoch 7, the last one is 1",
     );
-    fails(&["trace", "nowhere"], 1, "there is no run nowhere");
-    fails(&["trace", "hall", "--epoch", "0"], 1, "has no epoch 0");
     fails(
-        &["trace", "hall", "--from", "500"],
+        &["export", "nowhere", "--trace"],
+        1,
+        "there is no run nowhere",
+    );
+    fails(
+        &["export", "hall", "--trace", "--epoch", "0"],
+        1,
+        "has no epoch 0",
+    );
+    fails(
+        &["export", "hall", "--trace", "--from", "500"],
         1,
         "has ticks 0 to 120, none of 500",
     );
     fails(
-        &["trace", "hall", "-o", "/nowhere/trace.json"],
+        &["export", "hall", "--trace", "-o", "/nowhere/trace.json"],
         1,
         "cannot write /nowhere/trace.json",
     );
-    lab.ok(&["trace", "hall", "-o", "/dev/null"]);
+    lab.ok(&["export", "hall", "--trace", "-o", "/dev/null"]);
     let recording = lab.file("hall", "run.mcap");
     fails(
-        &["trace", "hall", "-o", recording.to_str().unwrap()],
+        &[
+            "export",
+            "hall",
+            "--trace",
+            "-o",
+            recording.to_str().unwrap(),
+        ],
         1,
         "is part of the record",
     );
@@ -566,7 +577,11 @@ fn an_export_that_fails_names_the_reason_and_leaves_nothing_behind() {
         .write(true)
         .open("/dev/full")
         .unwrap();
-    let output = lab.cars(&["trace", "hall"]).stdout(full).output().unwrap();
+    let output = lab
+        .cars(&["export", "hall", "--trace"])
+        .stdout(full)
+        .output()
+        .unwrap();
     assert_eq!(output.status.code(), Some(1));
     let errors = String::from_utf8_lossy(&output.stderr);
     assert!(errors.contains("No space left on device"), "{errors}");

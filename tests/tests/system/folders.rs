@@ -12,6 +12,14 @@ use system_tests::processes::{Running, nobody_is_left};
 use system_tests::{Lab, eventually, free_port, programs, root};
 
 const HALL: &str = "launch/hors_doeuvres.toml";
+/// What writes one file: the subcommand, and its format.
+const WRITERS: [(&str, Option<&str>); 5] = [
+    ("report", None),
+    ("diagram", None),
+    ("export", Some("--shiviz")),
+    ("export", Some("--trace")),
+    ("export", Some("--emotionml")),
+];
 /// The name that is taken.
 const TAKEN: &str = "taken";
 /// A run beside it.
@@ -721,11 +729,12 @@ fn every_reader_takes_a_copy_with_any_name() {
             &["diff", "FOLDER", "FOLDER"],
             &["expect", "FOLDER"],
             &["log", "FOLDER"],
-            &["export", "FOLDER", "--csv", "--shiviz", "-o", "INTO"],
-            &["trace", "FOLDER", "-o", "INTO/file"],
+            &["export", "FOLDER", "--csv", "-o", "INTO"],
+            &["export", "FOLDER", "--shiviz", "-o", "INTO/file"],
+            &["export", "FOLDER", "--trace", "-o", "INTO/file"],
+            &["export", "FOLDER", "--emotionml", "-o", "INTO/file"],
             &["diagram", "FOLDER", "-o", "INTO/file"],
             &["report", "FOLDER", "-o", "INTO/file"],
-            &["emotionml", "FOLDER", "-o", "INTO/file"],
         ];
         for args in readers {
             let mut command = program("cars");
@@ -911,17 +920,19 @@ fn no_output_replaces_a_part_of_a_record() {
     assert!(targets.len() > 12, "{targets:?}");
 
     let before = tree(place.lab.out());
-    for command in ["report", "diagram", "trace", "emotionml"] {
+    for (command, format) in WRITERS {
         for target in &targets {
             for run in [PRECIOUS, "other"] {
                 let output = program("cars")
-                    .args([command, run, "-o"])
+                    .args([command, run])
+                    .args(format)
+                    .arg("-o")
                     .arg(target)
                     .arg("--out")
                     .arg(place.out())
                     .output()
                     .unwrap();
-                let what = format!("{command} {run} {}", target.display());
+                let what = format!("{command} {run} {format:?} {}", target.display());
                 let printed = in_one_line(&said(&output));
                 assert!(!output.status.success(), "{what}: {printed}");
                 assert!(
@@ -1065,13 +1076,15 @@ fn a_file_that_cannot_be_written_to_its_end_is_as_it_was() {
     std::fs::create_dir(&into).unwrap();
     let file = into.join("file");
     let run = lab.out().join("one");
-    for command in ["report", "diagram", "emotionml", "trace"] {
+    for (command, format) in WRITERS {
         std::fs::write(&file, "earlier").unwrap();
         let mut little = Command::new("sh");
         little
             .args(["-c", "trap '' XFSZ; ulimit -f 1; exec \"$@\"", "sh"])
             .arg(programs().join("cars"))
-            .args([command, run.to_str().unwrap(), "-o"])
+            .args([command, run.to_str().unwrap()])
+            .args(format)
+            .arg("-o")
             .arg(&file);
         let output = little.output().unwrap();
         let text = said(&output);
@@ -1085,7 +1098,9 @@ fn a_file_that_cannot_be_written_to_its_end_is_as_it_was() {
         assert_eq!(tree(&into).len(), 1, "{command} leaves a draft");
 
         let output = program("cars")
-            .args([command, run.to_str().unwrap(), "-o", "/dev/full"])
+            .args([command, run.to_str().unwrap()])
+            .args(format)
+            .args(["-o", "/dev/full"])
             .output()
             .unwrap();
         assert_eq!(

@@ -30,7 +30,7 @@ fn a_fork_without_changes_is_the_run_also_after_faults_and_commands_by_hand() {
     let mut launch = lab.start("parent", &args);
     lab.until_ready("parent");
     lab.step("parent", 6);
-    lab.ok(&["command", "Leguin", "hurry", "--run", "parent"]);
+    lab.ok(&["ctl", "command", "Leguin", "hurry", "--run", "parent"]);
     lab.step("parent", 40);
     lab.ok(&["ctl", "start", "--run", "parent"]);
     launch.finish();

@@ -20,6 +20,7 @@ mod control;
 mod dependencies;
 mod determinism;
 mod diagram;
+mod emotionml;
 mod ended;
 mod exec;
 mod expect;

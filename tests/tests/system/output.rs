@@ -121,7 +121,7 @@ fn output_without_a_reader_or_without_room_is_no_panic() {
             out,
         ],
         vec!["log", "--run", "first", "--out", out],
-        vec!["emotionml", "first", "--out", out],
+        vec!["export", "first", "--emotionml", "--out", out],
         vec![
             "secure",
             "init",
@@ -132,17 +132,6 @@ fn output_without_a_reader_or_without_room_is_no_panic() {
         ],
         deadlock.clone(),
         [deadlock.as_slice(), &["--json"]].concat(),
-        vec![
-            "bench",
-            "--only",
-            "bare lock-step",
-            "--robots",
-            "2",
-            "--rounds",
-            "1",
-            "--ticks",
-            "10",
-        ],
     ] {
         check_output("cars", &args);
     }

@@ -408,7 +408,7 @@ fn a_replay_is_paused_stepped_and_sought_in_both_directions() {
             "{text}"
         );
     }
-    let text = fails(&lab, &["command", "Leguin", "refill", "--run", run]);
+    let text = fails(&lab, &["ctl", "command", "Leguin", "refill", "--run", run]);
     assert!(text.contains("this is a replay"), "{text}");
     let scenario = lab.ok(&["ctl", "scenario", "--run", run]);
     assert_eq!(

@@ -227,8 +227,15 @@ fn a_secured_launch_gives_the_same_record_and_its_owner_controls_it() {
             .contains("tick 30")
     );
     assert_eq!(
-        lab.ok(&["query", "Leguin", "behavior_state", "--run", "secure-same"])
-            .trim(),
+        lab.ok(&[
+            "ctl",
+            "query",
+            "Leguin",
+            "behavior_state",
+            "--run",
+            "secure-same"
+        ])
+        .trim(),
         "WAIT"
     );
 

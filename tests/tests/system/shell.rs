@@ -17,14 +17,14 @@ fn a_robot_can_be_asked_and_commanded_from_a_shell() {
     );
     lab.until_ready("shell");
     lab.step("shell", 1);
-    let ask = |what| lab.ok(&["query", "Leguin", what, "--run", "shell"]);
+    let ask = |what| lab.ok(&["ctl", "query", "Leguin", what, "--run", "shell"]);
     assert_eq!(ask("emotion_state").trim(), "HAPPY");
     assert_eq!(ask("behavior_state").trim(), "WAIT");
     assert!(ask("location").contains("\"x\""));
-    let (_, text) = lab.fails(&["query", "Nobody", "speed", "--run", "shell"]);
+    let (_, text) = lab.fails(&["ctl", "query", "Nobody", "speed", "--run", "shell"]);
     assert!(text.contains("no robot called Nobody answers"), "{text}");
 
-    let sent = lab.ok(&["command", "Leguin", "refill", "--run", "shell"]);
+    let sent = lab.ok(&["ctl", "command", "Leguin", "refill", "--run", "shell"]);
     assert!(sent.contains("Leguin receives"), "{sent}");
     lab.step("shell", 3);
     assert_eq!(
@@ -32,7 +32,7 @@ fn a_robot_can_be_asked_and_commanded_from_a_shell() {
         "REFILL",
         "the command took effect"
     );
-    let (_, text) = lab.fails(&["command", "Nobody", "refill", "--run", "shell"]);
+    let (_, text) = lab.fails(&["ctl", "command", "Nobody", "refill", "--run", "shell"]);
     assert!(
         text.contains("no robot of this run is called Nobody"),
         "{text}"

@@ -384,7 +384,7 @@ fn assert_all_readers_agree(lab: &Lab, run: &str) -> Times {
         .filter(|((_, kind, _), _)| kind == "emotion")
         .map(|(state, time_s)| (state.clone(), *time_s))
         .collect();
-    let xml = lab.ok(&["emotionml", run]);
+    let xml = lab.ok(&["export", run, "--emotionml"]);
     let mut found = Times::new();
     for ((robot, kind, category), time_s) in times_in_emotionml(&xml) {
         // Categories are written in lower case.

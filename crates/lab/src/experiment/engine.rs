@@ -16,10 +16,10 @@ use xxhash_rust::xxh3::xxh3_64;
 use super::plan::{FILE, PLAN, Plan, Robots, UNITS, Unit};
 use super::processes::Launcher;
 use super::provenance::PROVENANCE;
-use super::results::RESULTS;
+use super::results::{RESULTS, RUNS};
 use super::store::Store;
 use super::unit::{self, Played};
-use crate::export::draft::unwritable;
+use export::draft::unwritable;
 
 /// Name of the threads that play units.
 pub const WORKER: &str = "units";
@@ -300,15 +300,7 @@ pub fn is_of_experiment(file: &Path) -> bool {
     let is_unit = folder.file_name().is_some_and(|name| name == UNITS)
         && folder.parent().is_some_and(is_experiment);
     let is_named = file.file_name().is_some_and(|name| {
-        let own = [
-            PLAN,
-            FILE,
-            LOCK,
-            PROVENANCE,
-            RESULTS,
-            "runs.csv",
-            "runs.parquet",
-        ];
+        let own = [PLAN, FILE, LOCK, PROVENANCE, RESULTS, RUNS];
         own.iter().any(|own| name == *own)
     });
 

@@ -19,8 +19,8 @@ use super::condition::{Condition, OWN_OPTIONS};
 use super::file::{Arm, Experiment};
 use super::script;
 use super::setting::Setting;
-use crate::export::draft::{Draft, unwritable};
 use crate::shell;
+use export::draft::{Draft, unwritable};
 
 /// The plan in the folder of an experiment.
 pub const PLAN: &str = "plan.json";

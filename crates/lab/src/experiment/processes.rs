@@ -16,10 +16,10 @@ use toml::{Table, Value};
 
 use super::follow::{Ended, Follow};
 use super::plan::LaunchText;
-use crate::export::draft::unwritable;
 use crate::folder::read_summary;
 use crate::scratch::Scratch;
 use crate::states::LastStates;
+use export::draft::unwritable;
 
 /// Name of the run of a unit, and of its folder.
 const RUN: &str = "unit";

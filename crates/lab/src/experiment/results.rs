@@ -5,6 +5,8 @@ use std::io::Write;
 use std::path::Path;
 
 use config::FileError;
+use export::csv::{Table, Value};
+use export::draft::{Draft, unwritable};
 use miette::IntoDiagnostic;
 use protocol::messages::Verdict;
 use serde::Serialize;
@@ -15,11 +17,9 @@ use super::outcome::{Failure, Outcome};
 use super::plan::Plan;
 use super::store::Store;
 use super::unheard::Unheard;
-use crate::export::draft::{Draft, unwritable};
-use crate::export::sheet::{Column, Format, Sheet, Type, Value};
 
-/// Name of the tables with a row for each unit.
-const RUNS: &str = "runs";
+/// The table with a row for each unit.
+pub(super) const RUNS: &str = "runs.csv";
 /// The estimates.
 pub(super) const RESULTS: &str = "results.json";
 
@@ -194,12 +194,12 @@ impl Results {
         all
     }
 
-    /// Writes the tables and the estimates into the folder of the experiment. The same results give the same bytes.
+    /// Writes the table and the estimates into the folder of the experiment. The same results give the same bytes.
     ///
     /// # Errors
     /// If a file cannot be written.
     pub fn write(&self, folder: &Path) -> miette::Result<()> {
-        let mut drafts = self.tables(folder)?;
+        let table = self.table(&folder.join(RUNS))?;
         let path = folder.join(RESULTS);
         let mut draft = Draft::create(&path)?;
         let written = Written {
@@ -215,24 +215,21 @@ impl Results {
         let text = serde_json::to_string_pretty(&written).into_diagnostic()?;
         writeln!(draft, "{text}").map_err(|error| unwritable(&path, &error))?;
 
-        drafts.push(draft);
-        for draft in drafts {
-            draft.publish()?;
-        }
+        table.publish()?;
+        draft.publish()?;
         Ok(())
     }
 
-    /// The tables with a row for each unit.
-    fn tables(&self, folder: &Path) -> Result<Vec<Draft>, FileError> {
+    /// The table with a row for each unit.
+    fn table(&self, path: &Path) -> Result<Draft, FileError> {
         let columns = Columns::of(self);
-        let formats = [Format::Csv, Format::Parquet];
-        let mut sheet = Sheet::create(folder, RUNS, &formats, columns.all.clone())?;
+        let mut table = Table::create(path, columns.all.clone())?;
 
         let mut outcomes = self.outcomes.iter().peekable();
         let mut failures = self.failures.iter().peekable();
         for number in 0..self.plan.units() {
             if let Some(outcome) = outcomes.next_if(|outcome| outcome.unit == number) {
-                sheet.add(columns.row(outcome))?;
+                table.add(columns.row(outcome))?;
             } else if let Some(failure) = failures.next_if(|failure| failure.unit == number) {
                 let unit = self.plan.unit(number);
                 let mut row = columns.unit(number, &unit.condition.levels);
@@ -240,19 +237,19 @@ impl Results {
                 row.push(("arm", failure.arm.as_str().into()));
                 row.push(("seed", failure.seed.into()));
                 row.push(("failed", failure.reason.as_str().into()));
-                sheet.add(row)?;
+                table.add(row)?;
             }
         }
 
-        sheet.finish()
+        Ok(table.finish())
     }
 }
 
 /// The columns of the table of units.
 struct Columns {
-    all: Vec<Column>,
-    /// Columns of factors, by the names of the factors.
-    levels: BTreeMap<String, Column>,
+    all: Vec<String>,
+    /// Columns of factors, by the names of the factors, and whether all levels are numbers.
+    levels: BTreeMap<String, (String, bool)>,
     /// Columns of measures: the number, and its state.
     measures: BTreeMap<String, (String, String)>,
     /// Columns of verdicts.
@@ -267,60 +264,59 @@ impl Columns {
             measures: BTreeMap::new(),
             verdicts: BTreeMap::new(),
         };
-        columns.add("unit", Type::Integer);
-        columns.add("condition", Type::Text);
+        columns.add("unit");
+        columns.add("condition");
         let conditions = results.plan.conditions();
         for (name, _) in conditions.iter().flat_map(|condition| &condition.levels) {
             if !columns.levels.contains_key(name) {
-                let of = columns.add_named(name, "factor", type_of(results, name));
-                columns.levels.insert(name.clone(), of);
+                let column = columns.add_named(name, "factor");
+                let are_numbers = are_numbers(results, name);
+                columns.levels.insert(name.clone(), (column, are_numbers));
             }
         }
-        columns.add("arm", Type::Text);
-        columns.add("seed", Type::Integer);
-        columns.add("yoked_to_seed", Type::Integer);
-        columns.add("failed", Type::Text);
-        columns.add("digest", Type::Text);
+        for name in ["arm", "seed", "yoked_to_seed", "failed", "digest"] {
+            columns.add(name);
+        }
 
         for measure in &results.plan.experiment.measures {
-            let number = columns.add_named(&measure.name, "measure", Type::Real).name;
-            let state = columns.add_named(&format!("{number}_state"), "measure", Type::Text);
-            let names = (number, state.name);
-            columns.measures.insert(measure.name.clone(), names);
+            let number = columns.add_named(&measure.name, "measure");
+            let state = columns.add_named(&format!("{number}_state"), "measure");
+            columns
+                .measures
+                .insert(measure.name.clone(), (number, state));
         }
         let verdicts = results.outcomes.iter().flat_map(|run| run.verdicts.keys());
         for name in BTreeSet::from_iter(verdicts) {
-            let column = columns.add_named(name, "verdict", Type::Text).name;
+            let column = columns.add_named(name, "verdict");
             columns.verdicts.insert(name.clone(), column);
         }
         columns
     }
 
-    fn add(&mut self, name: &str, of: Type) -> Column {
-        let column = Column::new(name, of);
-        self.all.push(column.clone());
-        column
+    fn add(&mut self, name: &str) {
+        self.all.push(name.to_owned());
     }
 
     /// Adds a column whose name the experiment gives, which may be that of another column.
-    fn add_named(&mut self, name: &str, kind: &str, of: Type) -> Column {
+    fn add_named(&mut self, name: &str, kind: &str) -> String {
         let mut unique = name.to_owned();
-        while self.all.iter().any(|column| column.name == unique) {
+        while self.all.contains(&unique) {
             unique = format!("{unique} ({kind})");
         }
-        self.add(&unique, of)
+        self.add(&unique);
+        unique
     }
 
     /// The cells that all units have.
     fn unit(&self, number: usize, levels: &[(String, String)]) -> Vec<(&str, Value<'_>)> {
         let mut row = vec![("unit", Value::from(number as u64))];
         for (name, level) in levels {
-            let column = &self.levels[name];
-            let level = match (column.of, level.parse()) {
-                (Type::Real, Ok(number)) => Value::Real(number),
+            let (column, are_numbers) = &self.levels[name];
+            let level = match level.parse::<f64>() {
+                Ok(number) if *are_numbers => number.into(),
                 _ => level.clone().into(),
             };
-            row.push((&column.name, level));
+            row.push((column, level));
         }
         row
     }
@@ -349,10 +345,9 @@ impl Columns {
     }
 }
 
-/// The values of a factor: numbers, if all of them are.
-fn type_of(results: &Results, factor: &str) -> Type {
+/// Whether all levels of a factor are numbers.
+fn are_numbers(results: &Results, factor: &str) -> bool {
     let conditions = results.plan.conditions().iter();
     let mut levels = conditions.flat_map(|condition| &condition.levels);
-    let are_numbers = levels.all(|(name, level)| name != factor || level.parse::<f64>().is_ok());
-    if are_numbers { Type::Real } else { Type::Text }
+    levels.all(|(name, level)| name != factor || level.parse::<f64>().is_ok())
 }

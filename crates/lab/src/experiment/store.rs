@@ -16,7 +16,7 @@ use xxhash_rust::xxh3::xxh3_64;
 
 use super::plan::{Key, Plan, UNITS, UNITS_ENDING};
 use super::unit::{self, Played};
-use crate::export::draft::unwritable;
+use export::draft::unwritable;
 
 /// What a seal begins with, in the last field of a line.
 const SEAL: &[u8] = b",\"seal\":\"";

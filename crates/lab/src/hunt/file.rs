@@ -14,8 +14,8 @@ use toml::Value;
 use super::case::Case;
 use super::fault::PlannedFault;
 use super::trial::{Played, Subject};
-use crate::export::draft::{Draft, unwritable};
 use crate::shell;
+use export::draft::{Draft, unwritable};
 
 /// What the file of a finding tells beside its case.
 #[derive(Debug, Clone, Copy)]

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, Optional, Union
 
 from . import _arguments, _cars, _settings
-from ._frames import Frame, of_rows, read
+from ._frames import Frame, of_rows, read_runs
 from ._pictures import Page
 from ._run import Name
 
@@ -60,7 +60,7 @@ class Experiment:
 
         :raises Error: if it is not installed.
         """
-        return read(Path(self.folder, "runs.parquet"), kind)
+        return read_runs(Path(self.folder, "runs.csv"), kind)
 
     @property
     def estimates(self) -> Frame:

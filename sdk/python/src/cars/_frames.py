@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import re
 from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
@@ -13,6 +15,15 @@ Frame = Any
 """A frame: ``pandas.DataFrame`` or ``polars.DataFrame``."""
 
 _NEEDS = {"pandas": ("pandas", "pyarrow"), "polars": ("polars",)}
+
+# The columns that are not of texts, as docs/exports.md and docs/experiments.md have them.
+_INTEGERS = "epoch tick generation seq until_tick seed protocol commands unit yoked_to_seed".split()
+_REALS = "time_s x_m y_m tick_s speed_mps direction_rad proposal_x_m proposal_y_m number".split()
+_FLAGS = "cuts_commands cuts_queries begins by_hand blocked missed".split()
+_TYPES = dict.fromkeys(_INTEGERS, "int64") | dict.fromkeys(_REALS, "double") | dict.fromkeys(_FLAGS, "bool")
+
+_REAL = re.compile(r"-?(\d+\.\d+|\d+(\.\d+)?e-?\d+|inf)|NaN")
+"""A real number in a table."""
 
 
 class Frames(NamedTuple):
@@ -41,15 +52,50 @@ def chosen(kind: Optional[str]) -> str:
 
 
 def read(path: Path, kind: Optional[str] = None) -> Frame:
-    """The table in a Parquet file."""
+    """A table of a run, to the last bit: an empty text is no null."""
+    with open(path, encoding="utf-8", newline="") as file:
+        columns = next(csv.reader(file))
+    return _read(path, kind, {name: _TYPES.get(name, "string") for name in columns})
+
+
+def read_runs(path: Path, kind: Optional[str] = None) -> Frame:
+    """The table of an experiment. Its factors and measures are columns of reals if they have nothing else."""
+    with open(path, encoding="utf-8", newline="") as file:
+        head, *rows = csv.reader(file)
+    types = {}
+    for name, *values in zip(head, *rows):
+        is_text = name in ("condition", "arm", "failed", "digest") or name.endswith("_state")
+        is_real = not is_text and all(not value or _REAL.fullmatch(value) for value in values)
+        whole = name in ("unit", "seed", "yoked_to_seed")
+        types[name] = "int64" if whole else "double" if is_real else "string"
+    return _read(path, kind, types)
+
+
+def _read(path: Path, kind: Optional[str], types: Mapping[str, str]) -> Frame:
     if chosen(kind) == "pandas":
         import pandas
+        import pyarrow.csv
 
+        lines = pyarrow.csv.ParseOptions(newlines_in_values=True)
+        cells = pyarrow.csv.ConvertOptions(
+            column_types=types,
+            null_values=[""],
+            strings_can_be_null=True,
+            quoted_strings_can_be_null=False,
+        )
+        table = pyarrow.csv.read_csv(path, parse_options=lines, convert_options=cells)
         # Whole numbers and flags stay what they are where a value is missing.
-        return pandas.read_parquet(path, dtype_backend="numpy_nullable")
+        nullable = {
+            pyarrow.int64(): pandas.Int64Dtype(),
+            pyarrow.float64(): pandas.Float64Dtype(),
+            pyarrow.bool_(): pandas.BooleanDtype(),
+            pyarrow.string(): pandas.StringDtype(),
+        }
+        return table.to_pandas(types_mapper=nullable.get)
     import polars
 
-    return polars.read_parquet(path)
+    schema = {"int64": polars.Int64, "double": polars.Float64, "bool": polars.Boolean, "string": polars.String}
+    return polars.read_csv(path, schema={name: schema[of] for name, of in types.items()})
 
 
 def of_rows(rows: Sequence[Mapping[str, Any]], kind: Optional[str] = None) -> Frame:

@@ -56,7 +56,7 @@ class Run:
                 for note in _cars.export(self.folder, Path(folder)):
                     warnings.warn(note, stacklevel=2)
                 names = ("events", "states", "variables")
-                self._frames[kind] = Frames(*(read(Path(folder, f"{name}.parquet"), kind) for name in names))
+                self._frames[kind] = Frames(*(read(Path(folder, f"{name}.csv"), kind) for name in names))
         return self._frames[kind]
 
     @property

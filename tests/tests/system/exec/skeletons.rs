@@ -139,10 +139,14 @@ impl Robot {
         };
         self.lab.until_ready(&run);
         for order in ["rest", r#"say "boo" \ backwards"#] {
-            assert!(cars(&["command", "Rosie", order]).status.success());
+            assert!(cars(&["ctl", "command", "Rosie", order]).status.success());
         }
         self.lab.step(&run, 9);
-        assert!(cars(&["command", "Rosie", "stroll"]).status.success());
+        assert!(
+            cars(&["ctl", "command", "Rosie", "stroll"])
+                .status
+                .success()
+        );
         self.lab.step(&run, 9);
         let log = self.cars_log(&run);
         for part in [

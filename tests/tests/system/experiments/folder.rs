@@ -581,7 +581,7 @@ fn runs_of_processes_give_the_results_of_one_process() {
     };
     let one = play("one", &[]);
     let processes = play("processes", &["--processes"]);
-    for name in ["runs.csv", "runs.parquet", "results.json"] {
+    for name in ["runs.csv", "results.json"] {
         let bytes = |folder: &Path| fs::read(folder.join(name)).unwrap();
         assert!(bytes(&one) == bytes(&processes), "{name}");
     }

@@ -6,15 +6,13 @@
 
 use std::collections::BTreeMap;
 use std::io::Write;
-use std::path::Path;
 
-use config::FileError;
 use protocol::plain::escape_line;
 use protocol::{Event, RobotName, Seq, Tick};
 use record::EpochFiles;
 use record::{Entry, Record};
 
-use super::draft::{Draft, unwritable};
+use crate::ExportError;
 
 /// How an event is read.
 const EVENT: &str = r"^(?<host>\S+) (?<clock>\{[^}]*\}) (?<tick>\d+) (?<event>.*)$";
@@ -24,31 +22,24 @@ const EPOCH: &str = r"^=== epoch (?<trace>\d+) ===$";
 /// How many events of each host an event knows of, itself included. Hosts without any are left out.
 type Clock = BTreeMap<RobotName, u64>;
 
-/// Writes the log of some epochs.
+/// Writes the log of epochs of a run.
 ///
 /// # Errors
-/// [`FileError`] if a record cannot be read, or the file cannot be written.
-pub(super) fn write(epochs: &[EpochFiles], path: &Path) -> Result<Draft, FileError> {
-    let mut draft = Draft::create(path)?;
-    write_line(&mut draft, EVENT)?;
-    write_line(&mut draft, EPOCH)?;
-
+/// [`ExportError`] if a record cannot be read, or the log cannot be written.
+pub fn write(epochs: &[EpochFiles], out: &mut impl Write) -> Result<(), ExportError> {
+    writeln!(out, "{EVENT}\n{EPOCH}")?;
     for files in epochs {
-        write_line(&mut draft, &format!("=== epoch {} ===", files.epoch))?;
+        writeln!(out, "=== epoch {} ===", files.epoch)?;
         let mut record = Record::of_events(&files.events)?;
         let mut hosts = Hosts::default();
         while let Some(entry) = record.next_entry()? {
             for line in hosts.lines(&entry) {
-                write_line(&mut draft, &line)?;
+                writeln!(out, "{line}")?;
             }
         }
     }
 
-    Ok(draft)
-}
-
-fn write_line(draft: &mut Draft, line: &str) -> Result<(), FileError> {
-    writeln!(draft, "{line}").map_err(|error| unwritable(draft.path(), &error))
+    Ok(())
 }
 
 /// The hosts of an epoch.

@@ -1,0 +1,31 @@
+//! Runs as files for other programs: tables of events and states ([`tables`]), a log for ShiViz ([`shiviz`]), a trace of
+//! wall-clock time ([`trace`]) and emotions ([`emotionml`]). A record is read tick by tick, so the length of a run does not
+//! matter.
+
+pub mod csv;
+pub mod draft;
+pub mod emotionml;
+pub mod shiviz;
+pub mod tables;
+pub mod trace;
+
+use config::FileError;
+use recording::RecordingError;
+
+/// Why an export is incomplete. What was written of it is of no use.
+#[derive(Debug, thiserror::Error, miette::Diagnostic)]
+pub enum ExportError {
+    /// The record of the run cannot be read.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Read(#[from] FileError),
+    /// The output cannot be written.
+    #[error("the export cannot be written: {0}")]
+    Write(#[from] std::io::Error),
+}
+
+impl From<RecordingError> for ExportError {
+    fn from(error: RecordingError) -> Self {
+        Self::Read(FileError::new(error.to_string()))
+    }
+}
