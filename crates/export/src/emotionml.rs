@@ -22,7 +22,7 @@ use protocol::keys::Keys;
 use protocol::messages::{StateVariables, Variable};
 use protocol::{Event, RobotName, RunName, Tick};
 use record::{Entry, EpochFiles, Record};
-use timeline::{Kind, States, Stay};
+use timeline::{Kind, Span, Stay, Timeline};
 
 use crate::ExportError;
 use terms::{escape, scale_value, token};
@@ -33,60 +33,31 @@ const ONESELF: &str = "self";
 const NO_EMOTION: [&str; 2] = ["", "NEUTRAL"];
 /// The face that expresses nothing.
 const NEUTRAL_FACE: &str = "neutral";
-/// Ids of the vocabularies that the document declares.
-const EMOTIONS: &str = "cars-emotions";
-const TENDENCIES: &str = "cars-action-tendencies";
-
-/// A state variable of the affect frame, and what it is in EmotionML: a number between 0 and 1.
-struct Measure {
-    variable: &'static str,
-    /// Its least value. The greatest one is 1; a number out of the range has another meaning, and is not exported.
-    min: f64,
-    element: &'static str,
-    name: &'static str,
-    /// The scale of EmotionML, from the mean of the variable.
-    scale: fn(f64) -> f64,
-}
-
-const fn measure(
-    variable: &'static str,
-    min: f64,
-    element: &'static str,
-    name: &'static str,
-    scale: fn(f64) -> f64,
-) -> Measure {
-    Measure {
-        variable,
-        min,
-        element,
-        name,
-        scale,
-    }
-}
-
-/// The first one is written as a trace, tick by tick, and all others as means.
-const MEASURES: [Measure; 7] = [
-    measure(INTENSITY, 0.0, "dimension", "intensity", |mean| mean),
-    measure(VALENCE, -1.0, "dimension", "valence", halved),
-    measure(CERTAINTY, 0.0, "dimension", "unpredictability", |mean| {
-        1.0 - mean
-    }),
-    measure(AGENCY, 0.0, "appraisal", "agency", |mean| mean),
-    measure(
-        CONTROLLABILITY,
-        0.0,
-        "appraisal",
-        "controllability",
-        |mean| mean,
+/// The vocabularies that a document declares: the kind of descriptor, the id, and what the names are.
+const OWN: [(&str, &str, &str); 2] = [
+    ("category", "cars-emotions", "emotion state"),
+    (
+        "action-tendency",
+        "cars-action-tendencies",
+        "action tendency",
     ),
-    measure(URGENCY, 0.0, "appraisal", "urgency", |mean| mean),
-    measure(GOAL_CONGRUENCE, -1.0, "appraisal", "desirability", halved),
 ];
+/// Indices of [`OWN`].
+const CATEGORY: usize = 0;
+const TENDENCY: usize = 1;
 
-/// A number between -1 and 1 on a scale from 0 to 1.
-fn halved(mean: f64) -> f64 {
-    0.5 + 0.5 * mean
-}
+/// State variables of the affect frame, and what they are in EmotionML: kind of descriptor, name, and offset and factor that make
+/// a number from 0 to 1 of them. One that is out of this range has another meaning, and is not exported. The first one is
+/// written tick by tick, and of all others the mean.
+const MEASURES: [(&str, &str, &str, f64, f64); 7] = [
+    (INTENSITY, "dimension", "intensity", 0.0, 1.0),
+    (VALENCE, "dimension", "valence", 0.5, 0.5),
+    (CERTAINTY, "dimension", "unpredictability", 1.0, -1.0),
+    (AGENCY, "appraisal", "agency", 0.0, 1.0),
+    (CONTROLLABILITY, "appraisal", "controllability", 0.0, 1.0),
+    (URGENCY, "appraisal", "urgency", 0.0, 1.0),
+    (GOAL_CONGRUENCE, "appraisal", "desirability", 0.5, 0.5),
+];
 
 /// What a robot publishes in a tick, in the order of [`MEASURES`].
 type Sample = [Option<f64>; MEASURES.len()];
@@ -98,7 +69,7 @@ struct Published {
     /// The state variables of its first report.
     first: Option<StateVariables>,
     /// The agent other than itself that it held responsible last.
-    other: Option<String>,
+    other: Option<RobotName>,
 }
 
 /// Writes the emotions of the robots of an epoch, or of one of them. Returns what is left out, for people, a sentence each.
@@ -120,35 +91,37 @@ pub fn write(
     let Some(Event::Init { seed, tick_s, .. }) = first.events.first() else {
         return Err(FileError::new(format!("{path} does not begin with `init`")).into());
     };
-    check_robot(only, &first)?;
+    let mut timeline = Timeline::default();
+    timeline.tick(0, &first.events);
+    let robots: Vec<&str> = timeline.robots().map(RobotName::as_str).collect();
+    if let Some(only) = only.filter(|only| !robots.contains(&only.as_str())) {
+        let robots = robots.join(", ");
+        let reason = format!("no robot of this run is called {only}; there are {robots}");
+        return Err(FileError::new(reason).into());
+    }
 
     let is_recorded = record.recording().is_some();
     let mut document = Document {
+        out,
         keys: Keys::new(run),
         tick_s: *tick_s,
         only,
         is_standard,
-        is_recorded,
-        states: States::default(),
+        timeline: Timeline::default(),
         published: BTreeMap::new(),
-        emotions: BTreeSet::new(),
-        tendencies: BTreeSet::new(),
+        own: Default::default(),
         notes: BTreeSet::new(),
-        out,
     };
     if !is_recorded {
-        document.notes.insert(
-            "there is no recording (`[record] frames = false`?): the events have no intensities"
-                .to_owned(),
-        );
+        let note = "there is no recording (`[record] frames = false`?): nothing but times is known";
+        document.notes.insert(note.to_owned());
     }
     document.begin(&format!("run {run}, epoch {}, seed {seed}", files.epoch))?;
 
     let mut next = Some(first);
     let mut last = 0;
     while let Some(entry) = next {
-        let is_lacking = is_recorded && entry.reports.is_none() && !entry.is_end();
-        if is_lacking {
+        if is_recorded && entry.reports.is_none() && !entry.is_end() {
             document.notes.insert(format!(
                 "the recording was not finished: what comes after tick {last} is left out"
             ));
@@ -161,21 +134,6 @@ pub fn write(
     document.end(last)
 }
 
-fn check_robot(only: Option<&RobotName>, first: &Entry) -> Result<(), FileError> {
-    let robots = first.events.iter().filter_map(|event| match event {
-        Event::Joined { robot, .. } => Some(robot),
-        _ => None,
-    });
-    let names: Vec<&str> = robots.map(RobotName::as_str).collect();
-    match only {
-        Some(only) if !names.contains(&only.as_str()) => Err(FileError::new(format!(
-            "no robot of this run is called {only}; there are {}",
-            names.join(", ")
-        ))),
-        _ => Ok(()),
-    }
-}
-
 /// A document that is being written.
 struct Document<'a, W: Write> {
     out: &'a mut W,
@@ -186,13 +144,10 @@ struct Document<'a, W: Write> {
     only: Option<&'a RobotName>,
     /// Whether only W3C's vocabularies are used.
     is_standard: bool,
-    is_recorded: bool,
-    states: States,
+    timeline: Timeline,
     published: BTreeMap<RobotName, Published>,
-    /// Emotions written so far, for the vocabulary.
-    emotions: BTreeSet<String>,
-    /// Action tendencies written so far, for the vocabulary.
-    tendencies: BTreeSet<String>,
+    /// The robots' own names written so far, of each vocabulary of [`OWN`].
+    own: [BTreeSet<String>; 2],
     /// What is left out, for people.
     notes: BTreeSet<String>,
 }
@@ -214,8 +169,8 @@ impl<W: Write> Document<'_, W> {
     /// Adds a tick, and writes the emotions that ended with it.
     fn tick(&mut self, entry: &Entry) -> std::io::Result<()> {
         for event in &entry.events {
-            for stay in self.states.apply(entry.tick, event) {
-                self.stay(&stay)?;
+            for span in self.timeline.apply(entry.tick, event) {
+                self.span(&span, entry.tick)?;
             }
             // Also of an emotion that has lasted for no tick.
             if let Event::Emotion { robot, .. }
@@ -239,13 +194,19 @@ impl<W: Write> Document<'_, W> {
         Ok(())
     }
 
-    /// Writes what is over, if it is an emotion.
-    fn stay(&mut self, stay: &Stay) -> std::io::Result<()> {
+    /// Writes what is over in a tick, if it is an emotion. One that begins in the last tick of a run lasts for no time.
+    fn span(&mut self, span: &Span, tick: Tick) -> std::io::Result<()> {
+        let Span::Stay(stay) = span else {
+            return Ok(());
+        };
         let is_wanted = self.only.is_none_or(|only| *only == stay.robot);
-        if stay.kind != Kind::Emotion || !is_wanted {
+        let ticks = stay.period.ticks(tick);
+        if stay.kind != Kind::Emotion || !is_wanted || ticks == 0 {
             return Ok(());
         }
-        let Stay { robot, state, .. } = stay;
+        let Stay {
+            robot, name: state, ..
+        } = stay;
         if NO_EMOTION.contains(&state.as_str()) {
             self.notes.insert(format!(
                 "{robot} has a state without emotion, {state:?}, which is left out"
@@ -253,49 +214,38 @@ impl<W: Write> Document<'_, W> {
             return Ok(());
         }
 
-        let published = self
-            .published
-            .get_mut(robot)
-            .map(std::mem::take)
-            .unwrap_or_default();
-        let trace = published.trace(0, stay);
-        if trace.is_none() && self.is_recorded {
+        let published = self.published.get_mut(robot).map(std::mem::take);
+        let published = published.unwrap_or_default().until(ticks);
+        let trace = published.all(0);
+        if trace.is_none() && published.first.is_some() {
             self.notes.insert(format!(
                 "{robot} does not publish `{INTENSITY}` between 0 and 1 in every tick; emotions with such ticks have no intensity"
             ));
         }
-        let trace = trace.map(|samples| {
-            let samples: Vec<String> = samples.into_iter().map(scale_value).collect();
-            format!(
-                "<trace freq=\"{}Hz\" samples=\"{}\"/>",
-                1.0 / self.tick_s,
-                samples.join(" ")
-            )
-        });
-        let (sets, elements) = self.descriptors(stay, &published, trace.as_deref());
-        if elements.is_empty() {
+        let (sets, descriptors) = self.descriptors(state, &published, trace);
+        if descriptors.is_empty() {
             self.notes.insert(format!(
                 "emotions {state:?} are left out: no standard vocabulary has a term for it"
             ));
             return Ok(());
         }
 
-        let begin_ms = self.milliseconds(stay.begin);
-        let duration_ms = self.milliseconds(stay.end) - begin_ms;
+        let begin_ms = self.milliseconds(stay.period.begin);
+        let duration_ms = self.milliseconds(stay.period.begin + ticks) - begin_ms;
         let clock = self.keys.clock();
         let face = published.text(FACE).filter(|face| *face != NEUTRAL_FACE);
         let face = face.map_or("", |_| " expressed-through=\"face\"");
         write!(
             self.out,
             "  <emotion id=\"emotion.{robot}.{}\" time-ref-uri=\"{clock}\" offset-to-start=\"{begin_ms}\" \
-             duration=\"{duration_ms}\"{sets}{face}>\n{elements}",
-            stay.begin
+             duration=\"{duration_ms}\"{sets}{face}>\n{descriptors}",
+            stay.period.begin
         )?;
         self.reference(robot, "experiencedBy")?;
-        let other = published
+        if let Some(other) = published
             .other
-            .and_then(|other| RobotName::new(&other).ok());
-        if let Some(other) = other.filter(|other| self.published.contains_key(other)) {
+            .filter(|other| self.published.contains_key(other))
+        {
             self.reference(&other, "targetedAt")?;
         }
         writeln!(self.out, "  </emotion>")
@@ -305,9 +255,9 @@ impl<W: Write> Document<'_, W> {
     /// not both.
     fn descriptors(
         &mut self,
-        stay: &Stay,
+        state: &str,
         published: &Published,
-        trace: Option<&str>,
+        trace: Option<Vec<f64>>,
     ) -> (String, String) {
         let mut sets = String::new();
         let mut elements = String::new();
@@ -318,65 +268,54 @@ impl<W: Write> Document<'_, W> {
             }
             elements += &format!("    <{kind} name=\"{name}\"{scale}\n");
         };
-        let traced = |kind: &str| match trace {
-            Some(trace) => format!(">{trace}</{kind}>"),
-            None => "/>".to_owned(),
+        let frequency = 1.0 / self.tick_s;
+        let traced = |kind: &str| {
+            let Some(trace) = &trace else {
+                return "/>".to_owned();
+            };
+            let samples: Vec<String> = trace.iter().copied().map(scale_value).collect();
+            let samples = samples.join(" ");
+            format!("><trace freq=\"{frequency}Hz\" samples=\"{samples}\"/></{kind}>")
         };
 
-        let category = if self.is_standard {
-            terms::nearest_category(&stay.state)
-        } else {
-            self.emotions.insert(stay.state.clone());
-            Some((format!("#{EMOTIONS}"), token(&stay.state)))
-        };
-        match &category {
-            Some((set, name)) => add("category", set, name, &traced("category")),
-            // Its vocabulary has no other dimension, so these are left out.
-            None if trace.is_some() => {
-                add(
-                    "dimension",
-                    &terms::w3c("intensity-dimension"),
-                    "intensity",
-                    &traced("dimension"),
-                );
-            }
-            None => {}
+        let category = self.term(CATEGORY, state);
+        if let Some((set, name)) = &category {
+            add("category", set, name, &traced("category"));
+        } else if trace.is_some() {
+            // The vocabulary of this dimension has no other one, so all others are left out.
+            let set = terms::w3c("intensity-dimension");
+            add("dimension", &set, "intensity", &traced("dimension"));
         }
-
-        for (index, measure) in MEASURES.iter().enumerate().skip(1) {
-            let set = match measure.element {
+        for (index, (_, kind, name, ..)) in MEASURES.iter().enumerate().skip(1) {
+            let set = match *kind {
                 "dimension" if category.is_none() => continue,
-                "dimension" => "fsre-dimensions",
-                _ => "ema-appraisals",
+                "dimension" => terms::w3c("fsre-dimensions"),
+                _ => terms::w3c("ema-appraisals"),
             };
-            if let Some(samples) = published.trace(index, stay) {
+            if let Some(samples) = published.all(index) {
                 let mean = samples.iter().sum::<f64>() / samples.len() as f64;
-                let value = scale_value((measure.scale)(mean));
-                add(
-                    measure.element,
-                    &terms::w3c(set),
-                    measure.name,
-                    &format!(" value=\"{value}\"/>"),
-                );
+                let value = format!(" value=\"{}\"/>", scale_value(mean));
+                add(kind, &set, name, &value);
             }
         }
-
-        let schema = Schemata::standard().get(&stay.state);
-        let tendency = published
-            .text(ACTION_TENDENCY)
-            .filter(|name| !name.is_empty());
-        if let Some(name) = tendency.or(schema.map(|schema| schema.action_tendency.name())) {
-            let term = if self.is_standard {
-                terms::nearest_tendency(name)
-            } else {
-                self.tendencies.insert(name.to_owned());
-                Some((format!("#{TENDENCIES}"), token(name)))
-            };
-            if let Some((set, name)) = term {
-                add("action-tendency", &set, &name, "/>");
-            }
+        // Where it is not recorded, it is that of the standard emotion.
+        let schema = Schemata::standard().get(state);
+        let tendency = published.text(ACTION_TENDENCY);
+        let tendency = tendency.or(schema.map(|schema| schema.action_tendency.name()));
+        if let Some((set, name)) = tendency.and_then(|name| self.term(TENDENCY, name)) {
+            add("action-tendency", &set, &name, "/>");
         }
         (sets, elements)
+    }
+
+    /// The vocabulary and the term for a name of a robot's, which is declared at the end of the document unless it is W3C's.
+    fn term(&mut self, index: usize, name: &str) -> Option<(String, String)> {
+        let (kind, id, _) = OWN[index];
+        if self.is_standard {
+            return terms::nearest(kind, name);
+        }
+        self.own[index].insert(name.to_owned());
+        Some((format!("#{id}"), token(name)))
     }
 
     fn reference(&mut self, robot: &RobotName, role: &str) -> std::io::Result<()> {
@@ -392,98 +331,73 @@ impl<W: Write> Document<'_, W> {
 
     /// Writes what lasts until the end of the run, the vocabularies, and the end tag. Returns the notes.
     fn end(mut self, last: Tick) -> Result<Vec<String>, ExportError> {
-        for stay in self.states.lasting(last) {
-            self.stay(&stay)?;
+        for span in self.timeline.in_progress() {
+            self.span(&span, last)?;
         }
 
-        let emotions = std::mem::take(&mut self.emotions);
-        self.vocabulary(
-            "category",
-            EMOTIONS,
-            "emotion state",
-            &emotions,
-            terms::nearest_category,
-        )?;
-        let tendencies = std::mem::take(&mut self.tendencies);
-        self.vocabulary(
-            "action-tendency",
-            TENDENCIES,
-            "action tendency",
-            &tendencies,
-            terms::nearest_tendency,
-        )?;
+        for ((kind, id, what), names) in OWN.iter().zip(&self.own) {
+            // The schema requires an item.
+            if names.is_empty() {
+                continue;
+            }
+            writeln!(self.out, "  <vocabulary type=\"{kind}\" id=\"{id}\">")?;
+            for name in names {
+                let nearest = terms::nearest(kind, name);
+                let nearest = nearest.map(|(set, term)| format!("; nearest: {term} of {set}"));
+                let info = format!("{what} {}{}", escape(name), nearest.unwrap_or_default());
+                let token = token(name);
+                writeln!(
+                    self.out,
+                    "    <item name=\"{token}\"><info>{info}</info></item>"
+                )?;
+            }
+            writeln!(self.out, "  </vocabulary>")?;
+        }
         writeln!(self.out, "</emotionml>")?;
         self.out.flush()?;
         Ok(self.notes.into_iter().collect())
-    }
-
-    /// Declares names, with the nearest terms of W3C. An empty vocabulary is left out: the schema requires an item.
-    fn vocabulary(
-        &mut self,
-        kind: &str,
-        id: &str,
-        what: &str,
-        names: &BTreeSet<String>,
-        nearest: fn(&str) -> Option<(String, String)>,
-    ) -> std::io::Result<()> {
-        if names.is_empty() {
-            return Ok(());
-        }
-
-        writeln!(self.out, "  <vocabulary type=\"{kind}\" id=\"{id}\">")?;
-        for name in names {
-            let nearest = nearest(name).map(|(set, term)| format!("; nearest: {term} of {set}"));
-            writeln!(
-                self.out,
-                "    <item name=\"{}\"><info>{what} {}{}</info></item>",
-                token(name),
-                escape(name),
-                nearest.unwrap_or_default()
-            )?;
-        }
-        writeln!(self.out, "  </vocabulary>")
     }
 }
 
 impl Published {
     fn add(&mut self, variables: &StateVariables) {
         self.samples
-            .push(MEASURES.each_ref().map(|measure| measure.of(variables)));
-        if let Some(Variable::Text(agent)) = variables.get(AGENCY)
-            && !agent.is_empty()
-            && agent != ONESELF
-        {
-            self.other = Some(agent.clone());
-        }
+            .push(MEASURES.map(|(name, _, _, offset, factor)| {
+                let value = match variables.get(name)? {
+                    Variable::Number(number) if name != AGENCY => offset + factor * number,
+                    Variable::Text(agent) if name == AGENCY && !agent.is_empty() => {
+                        f64::from(u8::from(agent == ONESELF))
+                    }
+                    _ => return None,
+                };
+                (0.0..=1.0).contains(&value).then_some(value)
+            }));
+        let agent = variables.get(AGENCY).and_then(Variable::as_str);
+        let other = agent.filter(|agent| *agent != ONESELF);
+        self.other = other
+            .and_then(|other| RobotName::new(other).ok())
+            .or(self.other.take());
         self.first.get_or_insert_with(|| variables.clone());
     }
 
-    /// A measure in each tick of an emotion, if it was published in all of them: EmotionML has no traces with gaps.
-    fn trace(&self, measure: usize, stay: &Stay) -> Option<Vec<f64>> {
-        let ticks = usize::try_from(stay.ticks()).ok()?;
-        self.samples
-            .get(..ticks)?
-            .iter()
-            .map(|sample| sample[measure])
-            .collect()
+    /// The first ticks; none if some of them are missing.
+    fn until(mut self, ticks: Tick) -> Self {
+        let ticks = usize::try_from(ticks).unwrap_or(usize::MAX);
+        let is_whole = self.samples.len() >= ticks;
+        self.samples.truncate(if is_whole { ticks } else { 0 });
+        self
+    }
+
+    /// A measure in each tick, if it was published in all of them: EmotionML has no traces with gaps.
+    fn all(&self, measure: usize) -> Option<Vec<f64>> {
+        let samples = self.samples.iter().map(|sample| sample[measure]);
+        let all: Option<Vec<f64>> = samples.collect();
+        all.filter(|all| !all.is_empty())
     }
 
     /// A text of the first report.
     fn text(&self, name: &str) -> Option<&str> {
-        self.first.as_ref()?.get(name)?.as_str()
-    }
-}
-
-impl Measure {
-    fn of(&self, variables: &StateVariables) -> Option<f64> {
-        match variables.get(self.variable)? {
-            Variable::Text(agent) if self.variable == AGENCY && !agent.is_empty() => {
-                Some(f64::from(u8::from(agent == ONESELF)))
-            }
-            Variable::Number(number) if self.variable != AGENCY => {
-                Some(*number).filter(|number| (self.min..=1.0).contains(number))
-            }
-            _ => None,
-        }
+        let text = self.first.as_ref()?.get(name)?.as_str();
+        text.filter(|text| !text.is_empty())
     }
 }

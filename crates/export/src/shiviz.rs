@@ -11,6 +11,7 @@ use protocol::plain::escape_line;
 use protocol::{Event, RobotName, Seq, Tick};
 use record::EpochFiles;
 use record::{Entry, Record};
+use timeline::Timeline;
 
 use crate::ExportError;
 
@@ -46,70 +47,81 @@ pub fn write(epochs: &[EpochFiles], out: &mut impl Write) -> Result<(), ExportEr
 #[derive(Default)]
 struct Hosts {
     clocks: BTreeMap<RobotName, Clock>,
-    /// Commands that may still arrive, by sender and number.
-    in_flight: BTreeMap<(RobotName, Seq), Sent>,
-}
-
-/// A command on its way.
-struct Sent {
-    clock: Clock,
-    command: String,
+    /// Clocks of commands under way, by sender and number.
+    sent: BTreeMap<(RobotName, Seq), Clock>,
+    timeline: Timeline,
 }
 
 impl Hosts {
     /// The lines of a tick.
     fn lines(&mut self, entry: &Entry) -> Vec<String> {
         let mut lines = Vec::new();
-        let mut over = Vec::new();
         for event in &entry.events {
-            match event {
-                Event::CommandSent {
-                    from,
-                    to,
-                    seq,
-                    command,
-                    ..
-                } => {
-                    lines.push(self.line(from, entry.tick, &format!("sends {to}: {command}")));
-                    let sent = Sent {
-                        clock: self.clocks[from].clone(),
-                        command: command.clone(),
-                    };
-                    self.in_flight.insert((from.clone(), *seq), sent);
-                }
-                Event::CommandDelivered { from, to, seq } => {
-                    let text = self.receive(from, to, *seq);
-                    lines.push(self.line(to, entry.tick, &text));
-                    // A command that was doubled arrives once more in this tick.
-                    over.push((from.clone(), *seq));
-                }
-                Event::CommandDropped { from, seq, .. } => over.push((from.clone(), *seq)),
-                _ => {
-                    if let Some((robot, text)) = own_event(event) {
-                        lines.push(self.line(robot, entry.tick, &text));
-                    }
-                }
+            if let Some((host, text)) = self.host_event(event) {
+                lines.push(self.line(&host, entry.tick, &text));
             }
+            if let Event::CommandSent { from, seq, .. } = event {
+                let clock = self.clocks.get(from).cloned().unwrap_or_default();
+                self.sent.insert((from.clone(), *seq), clock);
+            }
+            self.timeline.apply(entry.tick, event);
         }
 
-        for command in over {
-            self.in_flight.remove(&command);
-        }
+        let timeline = &self.timeline;
+        self.sent
+            .retain(|(from, seq), _| timeline.command(from, *seq).is_some());
         lines
+    }
+
+    /// The host of an event and what is said of it; `None` for an event of no host.
+    fn host_event(&mut self, event: &Event) -> Option<(RobotName, String)> {
+        let (host, text) = match event {
+            Event::Joined {
+                robot,
+                generation: Some(generation),
+                ..
+            } => (robot, format!("is back as incarnation {generation}")),
+            Event::Joined { robot, .. } => (robot, "takes part".to_owned()),
+            Event::Lost { robot } => (robot, "is lost".to_owned()),
+            Event::Emotion { robot, to, .. } => (robot, format!("emotion {to}")),
+            Event::Behavior { robot, to, .. } => (robot, format!("behavior {to}")),
+            Event::Say { robot, text } => (robot, format!("says: {text}")),
+            Event::Warned { robot, text } => (robot, format!("warning: {text}")),
+            Event::CommandSent {
+                from, to, command, ..
+            } => (from, format!("sends {to}: {command}")),
+            Event::CommandDelivered { from, to, seq } => (to, self.receive(from, to, *seq)),
+            Event::Init { .. }
+            | Event::Missed { .. }
+            | Event::DoneLate { .. }
+            | Event::Blocked { .. }
+            | Event::CommandDropped { .. }
+            | Event::CommandDelayed { .. }
+            | Event::CommandDuplicated { .. }
+            | Event::QueryLost { .. }
+            | Event::LinkCut { .. }
+            | Event::LinkHealed { .. }
+            | Event::Fault { .. }
+            | Event::Changed { .. }
+            | Event::Judged { .. }
+            | Event::Tick { .. }
+            | Event::End { .. } => return None,
+        };
+        Some((host.clone(), text))
     }
 
     /// Takes the clock of a command over. Returns the text of its arrival.
     fn receive(&mut self, from: &RobotName, to: &RobotName, seq: Seq) -> String {
-        let Some(sent) = self.in_flight.get(&(from.clone(), seq)) else {
+        let Some(command) = self.timeline.command(from, seq) else {
             return format!("receives command {seq} of {from}");
         };
 
         let clock = self.clocks.entry(to.clone()).or_default();
-        for (host, count) in &sent.clock {
+        for (host, count) in self.sent.get(&(from.clone(), seq)).into_iter().flatten() {
             let known = clock.entry(host.clone()).or_default();
             *known = (*known).max(*count);
         }
-        format!("receives from {from}: {}", sent.command)
+        format!("receives from {from}: {}", command.text)
     }
 
     /// The line of an event of a host, which its clock counts.
@@ -121,23 +133,4 @@ impl Hosts {
             .unwrap_or_else(|error| unreachable!("a clock is always JSON: {error}"));
         format!("{host} {clock} {tick} {}", escape_line(text))
     }
-}
-
-/// A robot's event that is about no command.
-fn own_event(event: &Event) -> Option<(&RobotName, String)> {
-    let named = match event {
-        Event::Joined {
-            robot,
-            generation: Some(generation),
-            ..
-        } => (robot, format!("is back as incarnation {generation}")),
-        Event::Joined { robot, .. } => (robot, "takes part".to_owned()),
-        Event::Lost { robot } => (robot, "is lost".to_owned()),
-        Event::Emotion { robot, to, .. } => (robot, format!("emotion {to}")),
-        Event::Behavior { robot, to, .. } => (robot, format!("behavior {to}")),
-        Event::Say { robot, text } => (robot, format!("says: {text}")),
-        Event::Warned { robot, text } => (robot, format!("warning: {text}")),
-        _ => return None,
-    };
-    Some(named)
 }

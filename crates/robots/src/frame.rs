@@ -16,7 +16,7 @@ pub(crate) fn of(
 }
 
 /// The action of a robot with this frame: its emotion, and state variables under the names of `affect::frame`, so that
-/// peers can query them and `cars emotionml` finds them.
+/// peers can query them and `cars export --emotionml` finds them.
 #[must_use]
 pub fn publish(frame: Option<Frame<'_>>, action: Action) -> Action {
     let Some(frame) = frame else {

@@ -10,25 +10,23 @@ pub(super) fn w3c(vocabulary: &str) -> String {
     format!("http://www.w3.org/TR/emotion-voc/xml#{vocabulary}")
 }
 
-/// Vocabulary and name of the category that is nearest to an emotion of the standard schemata.
-pub(super) fn nearest_category(emotion: &str) -> Option<(String, String)> {
-    let (vocabulary, name) = match emotion {
-        "HAPPY" => ("everyday-categories", "happy"),
-        "CONFIDENT" => ("everyday-categories", "confident"),
-        "CONCERNED" => ("everyday-categories", "worried"),
-        "FRUSTRATED" => ("fsre-categories", "irritation"),
-        "ANGRY" => ("everyday-categories", "angry"),
-        "DISCOURAGED" => ("frijda-categories", "resignation"),
-        "HOPEFUL" => ("occ-categories", "hope"),
+/// The nearest term for a category of the standard schemata, or for an action tendency: its vocabulary and its name.
+pub(super) fn nearest(kind: &str, name: &str) -> Option<(String, String)> {
+    let (vocabulary, term) = match (kind, name) {
+        ("category", "HAPPY") => ("everyday-categories", "happy"),
+        ("category", "CONFIDENT") => ("everyday-categories", "confident"),
+        ("category", "CONCERNED") => ("everyday-categories", "worried"),
+        ("category", "FRUSTRATED") => ("fsre-categories", "irritation"),
+        ("category", "ANGRY") => ("everyday-categories", "angry"),
+        ("category", "DISCOURAGED") => ("frijda-categories", "resignation"),
+        ("category", "HOPEFUL") => ("occ-categories", "hope"),
+        ("action-tendency", name) => (
+            "frijda-action-tendencies",
+            ActionTendency::named(name)?.emotionml()?,
+        ),
         _ => return None,
     };
-    Some((w3c(vocabulary), name.to_owned()))
-}
-
-/// Vocabulary and name of the nearest action tendency.
-pub(super) fn nearest_tendency(tendency: &str) -> Option<(String, String)> {
-    let name = ActionTendency::named(tendency)?.emotionml()?;
-    Some((w3c("frijda-action-tendencies"), name.to_owned()))
+    Some((w3c(vocabulary), term.to_owned()))
 }
 
 /// Formats a number between 0 and 1 with the seven digits of the schema's single precision.
@@ -78,9 +76,9 @@ mod tests {
     #[test]
     fn every_emotion_with_a_schema_has_a_nearest_category() {
         for name in affect::Schemata::standard().names() {
-            assert!(nearest_category(name).is_some(), "{name}");
+            assert!(nearest("category", name).is_some(), "{name}");
         }
-        assert_eq!(nearest_category("BORED"), None);
+        assert_eq!(nearest("category", "BORED"), None);
     }
 
     #[test]
