@@ -67,7 +67,7 @@ def subjects(robots: int) -> dict[str, list[list[str]]]:
     names = [["--name", f"r{i}"] for i in range(robots)]
     measured = {
         "Python, a process each": [python + name for name in names],
-        "Rust, a process each": [[program("cars"), "bench-robot", *name] for name in names],
+        "Rust, a process each": [[program("cars-bench"), "robot", *name] for name in names],
     }
     if robots > 1:
         measured["Python, all in one process"] = [python + [word for name in names for word in name]]

@@ -1,6 +1,5 @@
 //! `cars`: the command line of the Cooperative Affective Robot Simulator, and what the programs beside it do.
 
-mod bench;
 mod check;
 mod conform;
 mod control;
@@ -77,7 +76,6 @@ Network:
   secure       Make certificates and access control for a roster
 
 Other:
-  bench        Measure ticks per second of the lock-step and of the hall
   completions  Print shell completions
   man          Write manual pages
   help         Print the help of a subcommand
@@ -150,8 +148,6 @@ enum Subcommands {
     Router(router::RouterArgs),
     /// Make certificates and access control for a roster, for runs on a network that others can reach.
     Secure(secure::SecureArgs),
-    /// Measure ticks per second of the lock-step and of the hall, beside a bare zenoh star and a raw TCP barrier.
-    Bench(bench::BenchArgs),
     /// Print shell completions.
     Completions {
         /// The shell.
@@ -169,14 +165,6 @@ enum Subcommands {
     },
     #[command(hide = true)]
     ReplayRobot(replay_robot::ReplayRobotArgs),
-    #[command(hide = true)]
-    BenchRobot(robot::RobotArgs),
-    #[command(hide = true)]
-    BenchEcho(bench::tcp::EchoArgs),
-    #[command(hide = true)]
-    BenchStar(bench::star::StarArgs),
-    #[command(hide = true)]
-    BenchStarClient(bench::star::ClientArgs),
 }
 
 fn main() -> ExitCode {
@@ -218,7 +206,6 @@ fn dispatch(subcommand: Subcommands) -> miette::Result<ExitCode> {
         Subcommands::Net(command) => net::net(command),
         Subcommands::Router(args) => router::router(&args),
         Subcommands::Secure(args) => secure::secure(args),
-        Subcommands::Bench(args) => bench::bench(&args),
         Subcommands::Completions { shell } => print_completions(shell),
         Subcommands::Man(args) => man::man(&args, Cli::command()),
 
@@ -228,10 +215,6 @@ fn dispatch(subcommand: Subcommands) -> miette::Result<ExitCode> {
             Ok(ExitCode::SUCCESS)
         }
         Subcommands::ReplayRobot(args) => replay_robot::take_part(&args),
-        Subcommands::BenchRobot(args) => bench::robot::take_part(&args),
-        Subcommands::BenchEcho(args) => bench::tcp::echo(&args),
-        Subcommands::BenchStar(args) => bench::star::router(&args),
-        Subcommands::BenchStarClient(args) => bench::star::client(&args),
     }
 }
 

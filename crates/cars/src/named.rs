@@ -15,11 +15,6 @@ pub(crate) fn run() -> impl TypedValueParser<Value = PathBuf> {
     parser(&[LAUNCHES, SCENARIOS])
 }
 
-/// A scenario.
-pub(crate) fn scenario() -> impl TypedValueParser<Value = PathBuf> {
-    parser(&[SCENARIOS])
-}
-
 /// A file of any kind that `cars check` reads.
 pub(crate) fn any() -> impl TypedValueParser<Value = PathBuf> {
     parser(&[LAUNCHES, SCENARIOS, EXPERIMENTS, LINKS, PARAMETERS])

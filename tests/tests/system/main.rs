@@ -9,7 +9,6 @@
 
 mod affect;
 mod again;
-mod bench;
 mod book;
 mod boundaries;
 mod browser;

@@ -8,10 +8,10 @@ use std::time::Instant;
 use clap::Args;
 use miette::IntoDiagnostic;
 
-use super::programs::{Processes, own_command};
-use super::workload::{CLOCK_BYTES, REPORT_BYTES};
+use crate::programs::{Processes, own_command};
+use crate::workload::{CLOCK_BYTES, REPORT_BYTES};
 
-/// `cars bench-echo`.
+/// `cars-bench echo`.
 #[derive(Debug, Args)]
 pub(crate) struct EchoArgs {
     /// Address of the barrier.
@@ -19,13 +19,13 @@ pub(crate) struct EchoArgs {
 }
 
 /// Ticks per second of a barrier with this number of processes.
-pub(super) fn measure(processes: usize, ticks: u64) -> miette::Result<f64> {
+pub(crate) fn measure(processes: usize, ticks: u64) -> miette::Result<f64> {
     let listener = TcpListener::bind("127.0.0.1:0").into_diagnostic()?;
     let address = listener.local_addr().into_diagnostic()?.to_string();
     let mut children = Processes::default();
     let mut streams = Vec::new();
     for _ in 0..processes {
-        children.start(own_command()?.args(["bench-echo", &address]))?;
+        children.start(own_command()?.args(["echo", &address]))?;
         let (stream, _) = listener.accept().into_diagnostic()?;
         stream.set_nodelay(true).into_diagnostic()?;
         streams.push(stream);

@@ -5,30 +5,30 @@ use std::path::Path;
 use scenario::Scenario;
 
 /// Size of the clock in the star and in the TCP barrier, bytes; about as long as a real one.
-pub(super) const CLOCK_BYTES: usize = 64;
+pub(crate) const CLOCK_BYTES: usize = 64;
 /// Size of the report in the star and in the TCP barrier, bytes; about as long as a real one.
-pub(super) const REPORT_BYTES: usize = 300;
+pub(crate) const REPORT_BYTES: usize = 300;
 /// Fewest ticks of one measurement: a shorter one would measure start and end of the processes as well.
 const MIN_TICKS: u64 = 300;
 
 /// The hall, the length of a measurement, and a folder for its files.
-pub(super) struct Workload<'a> {
+pub(crate) struct Workload<'a> {
     /// Scenario file of the hall.
-    pub(super) hall_file: &'a Path,
+    pub(crate) hall_file: &'a Path,
     /// The same scenario, as this build reads it.
-    pub(super) hall: Scenario,
+    pub(crate) hall: Scenario,
     /// Ticks of a measurement with two processes.
-    pub(super) ticks: u64,
+    pub(crate) ticks: u64,
     /// Whether runs are secured with certificates.
-    pub(super) is_secured: bool,
+    pub(crate) is_secured: bool,
     /// Folder for scenarios and runs, removed after the last measurement.
-    pub(super) scratch: &'a Path,
+    pub(crate) scratch: &'a Path,
 }
 
 impl Workload<'_> {
     /// Ticks of a measurement with this number of processes. The product is constant, so all measurements take about as
     /// long.
-    pub(super) fn ticks_with(&self, processes: usize) -> u64 {
+    pub(crate) fn ticks_with(&self, processes: usize) -> u64 {
         (2 * self.ticks / processes as u64).max(MIN_TICKS)
     }
 }

@@ -15,9 +15,9 @@ use miette::{IntoDiagnostic, WrapErr, miette};
 use protocol::messages::{Clock, End, Point, Report, StateVariables};
 use protocol::{Tick, decode, encode};
 
-use super::programs::{Processes, free_endpoint, own_command};
-use super::subject::Content;
-use super::workload::{CLOCK_BYTES, REPORT_BYTES};
+use crate::programs::{Processes, free_endpoint, own_command};
+use crate::subject::Content;
+use crate::workload::{CLOCK_BYTES, REPORT_BYTES};
 
 const CLOCK: &str = "cars/star/clock";
 const REPORTS: &str = "cars/star/robot/*/report";
@@ -33,7 +33,7 @@ const REPORT: u8 = 2;
 /// How long a process of the star waits for the others; far longer than any measurement takes.
 const PATIENCE: Duration = Duration::from_secs(600);
 
-/// `cars bench-star`: the router in the middle.
+/// `cars-bench star`: the router in the middle.
 #[derive(Debug, Args)]
 pub(crate) struct StarArgs {
     /// Where clients connect.
@@ -50,7 +50,7 @@ pub(crate) struct StarArgs {
     content: Content,
 }
 
-/// `cars bench-star-client`: one of the robots.
+/// `cars-bench star-client`: one of the robots.
 #[derive(Debug, Args)]
 pub(crate) struct ClientArgs {
     /// Where the router listens.
@@ -65,7 +65,7 @@ pub(crate) struct ClientArgs {
 }
 
 /// Ticks per second of a star with this number of clients.
-pub(super) fn measure(clients: usize, content: Content, ticks: u64) -> miette::Result<f64> {
+pub(crate) fn measure(clients: usize, content: Content, ticks: u64) -> miette::Result<f64> {
     let printed = run_star(clients, content, ticks)?;
     let rate = printed.trim().parse();
     rate.into_diagnostic()
@@ -78,7 +78,7 @@ fn run_star(clients: usize, content: Content, ticks: u64) -> miette::Result<Stri
     let endpoint = free_endpoint(false)?;
     let mut router = own_command()?;
     router
-        .args(["bench-star", "--listen", &endpoint])
+        .args(["star", "--listen", &endpoint])
         .args(["--clients", &clients.to_string()])
         .args(["--ticks", &ticks.to_string()])
         .args(["--content", &content])
@@ -88,7 +88,7 @@ fn run_star(clients: usize, content: Content, ticks: u64) -> miette::Result<Stri
     for number in 0..clients {
         let mut client = own_command()?;
         client
-            .args(["bench-star-client", "--connect", &endpoint])
+            .args(["star-client", "--connect", &endpoint])
             .args(["--number", &number.to_string()])
             .args(["--content", &content]);
         processes.start(&mut client)?;

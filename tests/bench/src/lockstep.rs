@@ -9,8 +9,8 @@ use protocol::RobotName;
 use record::names::SUMMARY;
 use serde::Deserialize;
 
-use super::programs::{Processes, Programs, free_endpoint};
-use super::workload::Workload;
+use crate::programs::{Processes, Programs, free_endpoint};
+use crate::workload::Workload;
 
 /// Name of each run.
 const RUN: &str = "bench";
@@ -22,7 +22,7 @@ const APART_M: usize = 3;
 const ROOM_M: usize = 8;
 
 /// Ticks per second of the lock-step with idle robots.
-pub(super) fn bare(
+pub(crate) fn bare(
     workload: &Workload<'_>,
     programs: &Programs,
     robots: usize,
@@ -31,8 +31,8 @@ pub(super) fn bare(
     let mut commands = Vec::new();
     for number in 0..robots {
         let name = format!("r{number}");
-        let mut command = programs.command("cars");
-        command.args(["bench-robot", "--name", &name]);
+        let mut command = programs.command("cars-bench");
+        command.args(["robot", "--name", &name]);
         commands.push((name, command));
     }
 
@@ -59,7 +59,7 @@ fn bare_scenario(robots: usize) -> String {
 }
 
 /// Ticks per second of pairs of a Butler and his Leguin.
-pub(super) fn crowd(
+pub(crate) fn crowd(
     workload: &Workload<'_>,
     programs: &Programs,
     robots: usize,
@@ -133,7 +133,7 @@ fn side_of_square(count: usize) -> usize {
 }
 
 /// Ticks per second of the hall with a process for each robot.
-pub(super) fn hall(workload: &Workload<'_>, programs: &Programs) -> miette::Result<f64> {
+pub(crate) fn hall(workload: &Workload<'_>, programs: &Programs) -> miette::Result<f64> {
     let mut commands = Vec::new();
     for (name, spec) in &workload.hall.robots {
         let command = robot(programs, &spec.class, name.as_str());
@@ -144,7 +144,7 @@ pub(super) fn hall(workload: &Workload<'_>, programs: &Programs) -> miette::Resu
 }
 
 /// Ticks per second of the hall in one process.
-pub(super) fn hall_in_one_process(
+pub(crate) fn hall_in_one_process(
     workload: &Workload<'_>,
     programs: &Programs,
 ) -> miette::Result<f64> {

@@ -1,19 +1,19 @@
 //! Measured rates and the statistics of the table.
 
-use super::subject::Subject;
+use crate::subject::Subject;
 
 /// Results of one subject, ticks per second, by round.
-pub(super) struct Results {
-    pub(super) subject: Subject,
+pub(crate) struct Results {
+    pub(crate) subject: Subject,
     /// With this build.
-    pub(super) here: Vec<f64>,
+    pub(crate) here: Vec<f64>,
     /// With the build of `--against`; empty without one.
-    pub(super) there: Vec<f64>,
+    pub(crate) there: Vec<f64>,
 }
 
 impl Results {
     /// No rounds yet.
-    pub(super) fn of(subject: Subject) -> Self {
+    pub(crate) fn of(subject: Subject) -> Self {
         Self {
             subject,
             here: Vec::new(),
@@ -21,18 +21,18 @@ impl Results {
         }
     }
 
-    pub(super) fn best(&self) -> f64 {
+    pub(crate) fn best(&self) -> f64 {
         self.here.iter().copied().fold(f64::MIN, f64::max)
     }
 
-    pub(super) fn worst(&self) -> f64 {
+    pub(crate) fn worst(&self) -> f64 {
         self.here.iter().copied().fold(f64::MAX, f64::min)
     }
 }
 
 /// Median of the ratios of values of the same round. The machine's speed drifts between rounds; both values of a round
 /// drift together.
-pub(super) fn paired_ratio(values: &[f64], others: &[f64]) -> f64 {
+pub(crate) fn paired_ratio(values: &[f64], others: &[f64]) -> f64 {
     let mut ratios = Vec::new();
     for (value, other) in values.iter().zip(others) {
         ratios.push(value / other);
@@ -42,7 +42,7 @@ pub(super) fn paired_ratio(values: &[f64], others: &[f64]) -> f64 {
 }
 
 /// The middle value, or the mean of the two in the middle; NaN of no values.
-pub(super) fn median(values: &[f64]) -> f64 {
+pub(crate) fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
 

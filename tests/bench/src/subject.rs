@@ -1,13 +1,13 @@
 //! The subjects of the benchmark, and the floor that each is compared with.
 
 /// Number of robots in the crowd of Butlers and Leguins.
-pub(super) const CROWD: usize = 64;
+pub(crate) const CROWD: usize = 64;
 /// Number of processes of the raw TCP barrier.
 const TCP_PROCESSES: usize = 2;
 
 /// A barrier that is measured in ticks per second.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Subject {
+pub(crate) enum Subject {
     /// One write and one read over TCP for each process and tick.
     Tcp { processes: usize },
     /// One put in each direction over zenoh for each client and tick.
@@ -40,7 +40,7 @@ impl std::fmt::Display for Content {
 
 /// Where the robots of the hall run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum HallPlace {
+pub(crate) enum HallPlace {
     Processes,
     OneProcess,
 }
@@ -70,7 +70,7 @@ impl std::fmt::Display for Subject {
 impl Subject {
     /// The bare zenoh star with as many processes: no lock-step over zenoh is faster on the same machine. The hall in one
     /// process has no floor, because nothing crosses a process boundary.
-    pub(super) fn floor(self) -> Option<Self> {
+    pub(crate) fn floor(self) -> Option<Self> {
         match self {
             Self::Lockstep { robots }
             | Self::Crowd { robots }
@@ -88,7 +88,7 @@ impl Subject {
 
     /// The zenoh star that encodes and decodes as many messages of the protocol, for the bare lock-step: what is missing to it is
     /// what the simulator and the robots do.
-    pub(super) fn message_floor(self) -> Option<Self> {
+    pub(crate) fn message_floor(self) -> Option<Self> {
         match self {
             Self::Lockstep { robots } => Some(Self::star(robots, Content::Messages)),
             Self::Tcp { .. } | Self::Star { .. } | Self::Crowd { .. } | Self::Hall { .. } => None,
@@ -100,7 +100,7 @@ impl Subject {
     }
 
     /// The raw TCP barrier, for subjects with two processes.
-    pub(super) fn second_floor(self) -> Option<Self> {
+    pub(crate) fn second_floor(self) -> Option<Self> {
         let has_two = match self {
             Self::Star { clients, .. } => clients == TCP_PROCESSES,
             Self::Tcp { .. } => false,
@@ -116,7 +116,7 @@ impl Subject {
     }
 
     /// Whether the programs of the project run in it, so that builds can be compared.
-    pub(super) fn runs_the_project(self) -> bool {
+    pub(crate) fn runs_the_project(self) -> bool {
         !matches!(self, Self::Tcp { .. } | Self::Star { .. })
     }
 }

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use miette::IntoDiagnostic;
 use robot::{Action, BadParameters, Cars, Host, Robot, RobotArgs, RobotName};
 
-/// `cars bench-robot`.
+/// `cars-bench robot`.
 pub(crate) fn take_part(args: &RobotArgs) -> miette::Result<ExitCode> {
     let mut robots: Vec<(RobotName, Box<dyn Robot>)> = Vec::new();
     for name in &args.names {

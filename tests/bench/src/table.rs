@@ -5,11 +5,11 @@ use tabled::settings::object::Columns;
 use tabled::settings::{Alignment, Style};
 use terminal::OutputError;
 
-use super::results::{Results, median, paired_ratio};
-use super::subject::Subject;
+use crate::results::{Results, median, paired_ratio};
+use crate::subject::Subject;
 
 /// Prints median, best and worst of each subject, and medians of ratios.
-pub(super) fn print(all: &[Results]) -> Result<(), OutputError> {
+pub(crate) fn print(all: &[Results]) -> Result<(), OutputError> {
     let is_compared = all.iter().any(|results| !results.there.is_empty());
     let mut table = Builder::default();
     table.push_record(head(is_compared));

@@ -16,13 +16,13 @@ const POLL: Duration = Duration::from_millis(20);
 
 /// The folder of a build's programs.
 #[derive(Debug)]
-pub(super) struct Programs {
+pub(crate) struct Programs {
     folder: PathBuf,
 }
 
 impl Programs {
     /// The programs beside this executable.
-    pub(super) fn of_this_build() -> miette::Result<Self> {
+    pub(crate) fn of_this_build() -> miette::Result<Self> {
         let own = std::env::current_exe().into_diagnostic()?;
         let folder = own.parent().unwrap_or(Path::new("/"));
         Self::of(folder)
@@ -32,16 +32,22 @@ impl Programs {
     ///
     /// # Errors
     /// If one of them is missing.
-    pub(super) fn of(folder: &Path) -> miette::Result<Self> {
+    pub(crate) fn of(folder: &Path) -> miette::Result<Self> {
         let programs = Self {
             folder: folder.to_owned(),
         };
 
-        for name in ["cars", "cars-sim", "cars-butler", "cars-leguin"] {
+        for name in [
+            "cars",
+            "cars-bench",
+            "cars-sim",
+            "cars-butler",
+            "cars-leguin",
+        ] {
             let program = folder.join(name);
             if !program.exists() {
                 return Err(miette!(
-                    help = "build all programs first: `cargo build --release`",
+                    help = "build all programs first: `cargo build --release --workspace`",
                     "there is no {}",
                     program.display()
                 ));
@@ -52,13 +58,13 @@ impl Programs {
     }
 
     /// One of the build's programs, with the threads that suit the lock-step.
-    pub(super) fn command(&self, name: &str) -> Command {
+    pub(crate) fn command(&self, name: &str) -> Command {
         command(&self.folder.join(name))
     }
 }
 
 /// This program, with the threads that suit the lock-step.
-pub(super) fn own_command() -> miette::Result<Command> {
+pub(crate) fn own_command() -> miette::Result<Command> {
     let own = std::env::current_exe().into_diagnostic()?;
     Ok(command(&own))
 }
@@ -72,7 +78,7 @@ fn command(program: &Path) -> Command {
 }
 
 /// An endpoint on this machine where nothing listens.
-pub(super) fn free_endpoint(is_secured: bool) -> miette::Result<String> {
+pub(crate) fn free_endpoint(is_secured: bool) -> miette::Result<String> {
     let listener = TcpListener::bind("127.0.0.1:0").into_diagnostic()?;
     let address = listener.local_addr().into_diagnostic()?;
     let link = if is_secured { "tls" } else { "tcp" };
@@ -81,13 +87,13 @@ pub(super) fn free_endpoint(is_secured: bool) -> miette::Result<String> {
 
 /// Processes of one measurement. They are killed on drop, so none outlives a measurement that fails.
 #[derive(Debug, Default)]
-pub(super) struct Processes {
+pub(crate) struct Processes {
     children: Vec<Child>,
 }
 
 impl Processes {
     /// Starts a process.
-    pub(super) fn start(&mut self, command: &mut Command) -> miette::Result<()> {
+    pub(crate) fn start(&mut self, command: &mut Command) -> miette::Result<()> {
         let child = command
             .spawn()
             .into_diagnostic()
@@ -100,7 +106,7 @@ impl Processes {
     ///
     /// # Errors
     /// At the first failure, without waiting for the others: they might wait for the failed process.
-    pub(super) fn wait(&mut self) -> miette::Result<()> {
+    pub(crate) fn wait(&mut self) -> miette::Result<()> {
         while self.is_any_running()? {
             std::thread::sleep(POLL);
         }
@@ -120,7 +126,7 @@ impl Processes {
     }
 
     /// Output of the process that was started first, after its end. Empty unless its output was piped.
-    pub(super) fn output_of_first(&mut self) -> miette::Result<String> {
+    pub(crate) fn output_of_first(&mut self) -> miette::Result<String> {
         let mut printed = String::new();
         let first = self.children.first_mut();
         if let Some(output) = first.and_then(|child| child.stdout.as_mut()) {

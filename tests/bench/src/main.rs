@@ -1,34 +1,67 @@
-//! `cars bench`: ticks per second of the lock-step, and of two floors on the same machine in the same sitting: a bare zenoh
-//! star, with and without the messages of the protocol, and a raw TCP barrier.
+//! `cars-bench`, for developers: ticks per second of the lock-step, and of two floors on the same machine in the same sitting: a
+//! bare zenoh star, with and without the messages of the protocol, and a raw TCP barrier.
 
 mod lockstep;
 mod programs;
 mod results;
-pub(crate) mod robot;
-pub(crate) mod star;
+mod robot;
+mod star;
 mod subject;
 mod table;
-pub(crate) mod tcp;
+mod tcp;
 mod workload;
 
+use std::ffi::OsString;
 use std::fs::Permissions;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use clap::Args;
+use ::robot::RobotArgs;
+use clap::{Args, Parser, Subcommand};
+use config::shipped::{self, SCENARIOS};
+use launch::child::{AtExit, become_program};
 use miette::{IntoDiagnostic, WrapErr, miette};
 use scenario::{Changes, Scenario};
 
-use crate::named;
 use programs::Programs;
 use results::Results;
 use subject::{CROWD, HallPlace, Subject};
 use workload::Workload;
 
-/// `cars bench`.
+/// Ticks per second of the lock-step and of the hall, beside a bare zenoh star and a raw TCP barrier.
+#[derive(Debug, Parser)]
+#[command(name = "cars-bench", version, args_conflicts_with_subcommands = true)]
+struct Cli {
+    #[command(flatten)]
+    bench: BenchArgs,
+    #[command(subcommand)]
+    process: Option<Process>,
+}
+
+/// A process of a measurement.
+#[derive(Debug, Subcommand)]
+enum Process {
+    /// An idle robot of the bare lock-step.
+    #[command(hide = true)]
+    Robot(RobotArgs),
+    /// Becomes a program that is killed when the process `parent` exits: see `launch::child`.
+    #[command(hide = true)]
+    Child {
+        parent: i32,
+        #[arg(last = true, required = true)]
+        command: Vec<OsString>,
+    },
+    #[command(hide = true)]
+    Echo(tcp::EchoArgs),
+    #[command(hide = true)]
+    Star(star::StarArgs),
+    #[command(hide = true)]
+    StarClient(star::ClientArgs),
+}
+
 #[derive(Debug, Args)]
-pub(crate) struct BenchArgs {
+struct BenchArgs {
     /// Number of rounds; each round measures every subject once.
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u64).range(1..))]
     rounds: u64,
@@ -41,12 +74,12 @@ pub(crate) struct BenchArgs {
     )]
     robots: Vec<u64>,
     /// Scenario of the hall.
-    #[arg(long, default_value = "hors_doeuvres", value_name = "FILE", value_parser = named::scenario())]
+    #[arg(long, default_value = "hors_doeuvres", value_name = "FILE")]
     scenario: PathBuf,
     /// Ticks of a measurement with two processes; more processes do fewer.
     #[arg(long, default_value_t = 20_000, value_name = "N")]
     ticks: u64,
-    /// A folder with another build of cars, cars-sim, cars-butler and cars-leguin, to compare this build with.
+    /// A folder with another build of all programs, to compare this build with.
     #[arg(long, value_name = "DIR")]
     against: Option<PathBuf>,
     /// Secure every run with certificates. The floors stay plain.
@@ -57,8 +90,28 @@ pub(crate) struct BenchArgs {
     only: Option<String>,
 }
 
+fn main() -> ExitCode {
+    let cli: Cli = match terminal::arguments() {
+        Ok(cli) => cli,
+        Err(code) => return code,
+    };
+    terminal::print_diagnostics("warn,zenoh=error");
+
+    terminal::conclude(match cli.process {
+        None => bench(&cli.bench),
+        Some(Process::Robot(args)) => robot::take_part(&args),
+        Some(Process::Child { parent, command }) => {
+            let Err(error) = become_program(parent, AtExit::Kill, &command);
+            Err(error).into_diagnostic()
+        }
+        Some(Process::Echo(args)) => tcp::echo(&args),
+        Some(Process::Star(args)) => star::router(&args),
+        Some(Process::StarClient(args)) => star::client(&args),
+    })
+}
+
 /// Measures every subject in each round and prints a table.
-pub(crate) fn bench(args: &BenchArgs) -> miette::Result<ExitCode> {
+fn bench(args: &BenchArgs) -> miette::Result<ExitCode> {
     // A new folder with a random name, for this user alone: nothing that is there already is followed.
     let scratch = tempfile::Builder::new()
         .permissions(Permissions::from_mode(0o700))
@@ -75,9 +128,10 @@ pub(crate) fn bench(args: &BenchArgs) -> miette::Result<ExitCode> {
 fn measure_all(args: &BenchArgs, scratch: &Path) -> miette::Result<Vec<Results>> {
     let here = Programs::of_this_build()?;
     let there = args.against.as_deref().map(Programs::of).transpose()?;
+    let hall_file = shipped::find(&args.scenario, &[SCENARIOS]);
     let workload = Workload {
-        hall_file: &args.scenario,
-        hall: Scenario::load(&args.scenario, &Changes::default())?,
+        hall: Scenario::load(&hall_file, &Changes::default())?,
+        hall_file: &hall_file,
         ticks: args.ticks,
         is_secured: args.secured,
         scratch,
@@ -187,19 +241,11 @@ fn all_subjects(args: &BenchArgs, robots_of_hall: usize) -> miette::Result<Vec<S
 
 #[cfg(test)]
 mod tests {
-    use clap::Parser;
-
     use super::*;
-
-    #[derive(Parser)]
-    struct Line {
-        #[command(flatten)]
-        bench: BenchArgs,
-    }
 
     fn names(line: &[&str]) -> Vec<String> {
         let words = ["bench"].iter().chain(line);
-        let args = Line::try_parse_from(words).unwrap().bench;
+        let args = Cli::try_parse_from(words).unwrap().bench;
         let subjects = plan(&args, 2).unwrap();
         subjects.iter().map(ToString::to_string).collect()
     }
