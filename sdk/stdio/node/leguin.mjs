@@ -1,0 +1,528 @@
+#!/usr/bin/env node
+// Leguin, the refiller of the paper's experiment, in JavaScript: waits at the table until she is called, brings treats, hurries when
+// she is asked to, and goes home when she is sent or has had enough. Under another name she is Vonda.
+//
+//     cars exec --name Leguin -- node leguin.mjs
+//
+// She speaks JSON Lines over stdin and stdout (docs/any-language.md). Her tables and her arithmetic are those of
+// crates/robots/src/leguin, in the same order, so that a run with her is, byte for byte, a run with the Leguin in Rust. She has no
+// panel. Units are SI.
+
+import { createInterface } from "node:readline";
+
+const FT_M = 0.3048;
+// What each is for is in configs/robots/leguin.toml.
+const PARAMETERS = {
+  waiter: "Butler",
+  goods: "treats",
+  affect: "on",
+  policy: "emotion",
+  sensory_motor: "on",
+  schematic: "on",
+  caution: 0.5,
+  exchange_radius_m: 4 * FT_M,
+  exchange_s: 2,
+  v_refill_mps: 3 * FT_M,
+  hurry_mult: 1.5,
+  prep_s: 1,
+  block_patience_s: 25,
+  await_patience_s: 20,
+  progress_m: 0.5 * FT_M,
+  arrive_m: 1.5 * FT_M,
+  settle_s: 5,
+  settle_m: 6 * FT_M,
+  stand_off_m: 3 * FT_M,
+  query_stale_s: 5,
+  turn_mean_s: 5,
+  look_s: 2,
+  joke_mean_s: 60,
+};
+const DYNAMICS = {
+  caution_gain_base: 0.5,
+  caution_gain_slope: 1,
+  th_concerned: 0.45,
+  hurry: 0.6,
+  haste_onset: 0.25,
+  haste_full: 0.6,
+  label_cuts: [0.2, 0.4, 0.6, 0.8],
+};
+const JOKES = [
+  "Waiting is easy. I have it in my state table.",
+  "I asked the table for a joke. It said the spread was good enough.",
+  "My favorite distance is four feet.",
+  "They say a watched pot never boils. Nobody has tried it with a watched robot.",
+];
+/** Whether an emotion is unpleasant, its face, and what it inclines her to (Table 2 of the paper). */
+const FEELINGS = {
+  HAPPY: [false, "happy", "free-activate"],
+  CONFIDENT: [false, "neutral", "continue-normal-activity"],
+  CONCERNED: [true, "fearful", "monitor-progress-closely"],
+  FRUSTRATED: [true, "angry", "change-current-strategy"],
+};
+const always = () => true;
+/** Emotion state generator: the refiller's column of the paper's Table 2. The first row that holds counts. */
+const EMOTIONS = [
+  [["WAIT", "EXCHANGE", "GO_HOME"], always, "HAPPY"],
+  [["REFILL"], (m) => m.blocked >= 1, "FRUSTRATED"],
+  [["REFILL"], (m) => m.hurried || m.blocked >= dynamics.th_concerned, "CONCERNED"],
+  [["REFILL"], always, "CONFIDENT"],
+  [["AWAIT_GO_HOME"], (m) => m.waiting >= 1, "FRUSTRATED"],
+  [["AWAIT_GO_HOME"], (m) => m.waiting >= 0.5, "CONCERNED"],
+  [["AWAIT_GO_HOME"], always, "CONFIDENT"],
+];
+/** What she has done before on a way counts no more. */
+const NO_WAY = { stalledS: 0, nearestM: null };
+const finishErrand = () => set({ hurried: false, pending: "", sentHome: false });
+const turnHome = () => set({ trips: her.trips + 1, sentHome: false });
+const giveUp = () => set({ givenUp: her.givenUp + 1, hurried: false, ...NO_WAY });
+/** Behavior state generator: a row that applies acts, and goes where it says; without a place it reads on. */
+const BEHAVIORS = [
+  [["WAIT", "REFILL"], (c) => c.waiterIsNeedyHere, finishErrand, "EXCHANGE"],
+  [["WAIT"], (c) => c.pending !== "", (c) => set({ hurried: c.pending === "hurry", pending: "" }), "REFILL"],
+  [["REFILL"], (c) => c.pending === "hurry", () => set({ hurried: true, pending: "" }), null],
+  [["EXCHANGE"], (c) => c.exchangeIsOver, () => {}, "AWAIT_GO_HOME"],
+  [["AWAIT_GO_HOME"], (c) => c.sentHome, turnHome, "GO_HOME"],
+  [["AWAIT_GO_HOME", "REFILL"], (c) => c.givesUp, giveUp, "GO_HOME"],
+  [["GO_HOME"], (c) => c.isHome, () => {}, "WAIT"],
+  [["WAIT", "GO_HOME"], (c) => c.isHappy && c.hasJoke, joke, null],
+];
+
+let told, parameters, dynamics, her;
+
+function set(changes) {
+  Object.assign(her, changes);
+}
+
+// Messages.
+
+const lines = createInterface({ input: process.stdin, crlfDelay: Infinity })[Symbol.asyncIterator]();
+
+/** The next message; the end of the input is the end. */
+async function receive() {
+  const { value, done } = await lines.next();
+  return done ? { type: "end" } : JSON.parse(value);
+}
+
+function send(message) {
+  process.stdout.write(`${JSON.stringify(message)}\n`);
+}
+
+/** The answer to a question; undefined if there is none to be had, for instance across a cut network. */
+async function ask(question) {
+  send(question);
+  const answer = await receive();
+  if (answer.type !== "answer") process.exit(0); // The end came first.
+  return answer.value;
+}
+
+function log(text) {
+  send({ type: "log", text });
+}
+
+// Chance (docs/protocol.md, "Numbers and chance"): a stream for each thing that she leaves to it.
+
+const MASK = (1n << 64n) - 1n;
+const rotated = (word, bits) => ((word << bits) | (word >> (64n - bits))) & MASK;
+
+/** xoshiro256++, seeded by SplitMix64. */
+class Stream {
+  constructor(seed) {
+    this.words = [1n, 2n, 3n, 4n].map((number) => {
+      let z = (seed + number * 0x9e3779b97f4a7c15n) & MASK;
+      z = ((z ^ (z >> 30n)) * 0xbf58476d1ce4e5b9n) & MASK;
+      z = ((z ^ (z >> 27n)) * 0x94d049bb133111ebn) & MASK;
+      return z ^ (z >> 31n);
+    });
+  }
+
+  /** The stream that a run with this seed has under this name. */
+  static named(seed, name) {
+    let hash = 0xcbf29ce484222325n;
+    for (const byte of Buffer.from(name)) hash = ((hash ^ BigInt(byte)) * 0x100000001b3n) & MASK;
+    return new Stream(BigInt(seed) ^ hash);
+  }
+
+  next() {
+    const words = this.words;
+    const drawn = (rotated((words[0] + words[3]) & MASK, 23n) + words[0]) & MASK;
+    const shifted = (words[1] << 17n) & MASK;
+    words[2] ^= words[0];
+    words[3] ^= words[1];
+    words[1] ^= words[2];
+    words[0] ^= words[3];
+    words[2] ^= shifted;
+    words[3] = rotated(words[3], 45n);
+    return drawn;
+  }
+
+  /** Uniform in [0, 1). */
+  unit() {
+    return Number(this.next() >> 11n) / 2 ** 53;
+  }
+
+  /** Exponential with this mean. It decides when she jokes and nothing else: logarithms differ in the last bit between engines. */
+  exponential(mean) {
+    return -Math.log(1 - this.unit()) * mean;
+  }
+
+  /** A direction as a unit vector: a place in the unit disc, drawn until it is inside and not near the middle. */
+  direction() {
+    for (;;) {
+      const x = 2 * this.unit() - 1;
+      const y = 2 * this.unit() - 1;
+      const square = x * x + y * y;
+      if (square >= 1e-6 && square <= 1) return { x: x / Math.sqrt(square), y: y / Math.sqrt(square) };
+    }
+  }
+}
+
+// Motion. A heading is a unit vector and never an angle.
+
+const TOUCH_M = 1e-9; // How deep two bodies may overlap and still count as touching.
+// Cosine and sine of the headings tried around the straight one, 20 to 120 degrees.
+const OFFSETS = [
+  [0.9396926207859084, 0.3420201433256687],
+  [0.766044443118978, 0.6427876096865393],
+  [0.5, 0.8660254037844386],
+  [0.17364817766693041, 0.984807753012208],
+  [-0.17364817766693041, 0.984807753012208],
+  [-0.5, 0.8660254037844386],
+];
+
+function distanceM(a, b) {
+  const x = b.x - a.x;
+  const y = b.y - a.y;
+  return Math.sqrt(x * x + y * y);
+}
+
+function stepped(heading, stepM) {
+  return { x: her.at.x + heading.x * stepM, y: her.at.y + heading.y * stepM };
+}
+
+function isOnField({ x, y }) {
+  const marginM = told.body_m / 2 - TOUCH_M;
+  const [widthM, heightM] = told.field_m;
+  return x >= marginM && x <= widthM - marginM && y >= marginM && y <= heightM - marginM;
+}
+
+function stay() {
+  her.speedMps = 0;
+  return her.at;
+}
+
+/** A random walk: straight on, with a new heading when its time has come, when a step was refused, or where the field ends. */
+function walk(speedMps) {
+  her.turnS -= told.tick_s;
+  let turns = her.turnS <= 0 || her.wasBlocked;
+  for (let tries = 0; tries < 8; tries++, turns = true) {
+    if (turns) set({ heading: her.turns.direction(), turnS: parameters.turn_mean_s * (0.5 + her.turns.unit()) });
+    const there = stepped(her.heading, speedMps * told.tick_s);
+    if (!isOnField(there)) continue;
+    her.speedMps = speedMps;
+    return there;
+  }
+  return stay();
+}
+
+/** A straight step; for a while after a refused one she looks around first and steps aside where somebody is in the way. */
+async function drive(goal, stopM, speedMps) {
+  if (her.wasBlocked) her.carefulS = Math.max(parameters.look_s, told.tick_s);
+  const awayM = distanceM(her.at, goal);
+  let stepM = Math.min(speedMps * told.tick_s, awayM - stopM);
+  if (stepM <= 0) return stay();
+  let heading = { x: (goal.x - her.at.x) / awayM, y: (goal.y - her.at.y) / awayM };
+  if (her.carefulS > 0) {
+    her.carefulS -= told.tick_s;
+    const bodies = (await ask({ type: "percept" }))?.bodies ?? [];
+    // A narrow gap may take a short step where a long one does not fit.
+    const found = freeHeading(bodies, heading, stepM) ?? freeHeading(bodies, heading, (stepM *= 0.5));
+    if (!found) return stay();
+    heading = found;
+  }
+  set({ heading, speedMps: stepM / told.tick_s });
+  return stepped(heading, stepM);
+}
+
+/** The heading nearest to the straight one whose step is free, on the side that worked last before the other. */
+function freeHeading(bodies, straight, stepM) {
+  const apartM = told.body_m - TOUCH_M;
+  const isFree = (heading) => {
+    const there = stepped(heading, stepM);
+    const isApart = ({ location: at }) => Math.abs(at.x - there.x) >= apartM || Math.abs(at.y - there.y) >= apartM;
+    return isOnField(there) && bodies.every(isApart);
+  };
+  if (isFree(straight)) return straight;
+  for (const [cos, sine] of OFFSETS) {
+    for (const side of [her.side, -her.side]) {
+      const sin = side * sine;
+      const heading = { x: straight.x * cos - straight.y * sin, y: straight.x * sin + straight.y * cos };
+      if (!isFree(heading)) continue;
+      her.side = side;
+      return heading;
+    }
+  }
+  return null;
+}
+
+// Progress.
+
+/** Asks the waiter and looks for him: where he is sensed counts for more than his answer, which is a tick old. */
+async function observeWaiter(sensed) {
+  her.unheardS += told.tick_s;
+  her.unseenS += told.tick_s;
+  const state = await ask({ type: "query", of: parameters.waiter, what: "state" });
+  if (state) {
+    const { need, refiller } = state.state_variables ?? {};
+    set({ hasAnswered: true, unheardS: 0, waiterNeeds: need === true });
+    her.waiterCalls = typeof refiller === "string" ? refiller : null;
+  }
+  const seen = sensed.find(({ name }) => name === parameters.waiter)?.location;
+  const place = seen ?? state?.location ?? null;
+  if (place) her.unseenS = 0;
+  // Without an answer, a place within sensing range at which he is not sensed is one at which he is not.
+  const wasSearched = her.waiter !== null && distanceM(her.at, her.waiter) <= told.sensing_range_m;
+  set({ isSensed: seen !== undefined, isMissing: !place && (her.isMissing || wasSearched), waiter: place ?? her.waiter });
+}
+
+// Sums of ticks such as 0.1 s fall short of what they mean by far less than this.
+const hasLasted = (seconds) => her.lastingS + 1e-9 >= seconds;
+
+/** Where she is going; null if nowhere. */
+function goal() {
+  if (her.behavior === "GO_HOME") return her.home;
+  return her.behavior === "REFILL" && !her.isMissing ? her.waiter : null;
+}
+
+/** Whether she is nearer to her goal than ever before on this way. To and fro is no progress. */
+function observeWay() {
+  const hasLeft = her.behavior === "REFILL" && hasLasted(parameters.prep_s);
+  if (!hasLeft && her.behavior !== "GO_HOME") return set(NO_WAY);
+  her.stalledS += told.tick_s;
+  const awayM = goal() && distanceM(her.at, goal());
+  if (awayM !== null && (her.nearestM === null || awayM <= her.nearestM - parameters.progress_m)) {
+    set({ nearestM: awayM, stalledS: 0 });
+  }
+}
+
+function measure() {
+  const { hurried, behavior } = her;
+  const gain = dynamics.caution_gain_base + dynamics.caution_gain_slope * parameters.caution;
+  const hurry = hurried ? dynamics.hurry * gain : 0;
+  const blocked = behavior === "REFILL" ? (her.stalledS * gain) / parameters.block_patience_s : 0;
+  const waiting = (her.waitingS * gain) / parameters.await_patience_s;
+  her.measures = { hurried, blocked, waiting, urgency: Math.min(Math.max(hurry, blocked, waiting), 1) };
+}
+
+/** How she judges the moment: who is responsible is the waiter if he hurries her or keeps her waiting, or the crowd. */
+function appraisal() {
+  const { hurried, blocked, waiting, urgency } = her.measures;
+  const isOfCrowd = blocked >= dynamics.th_concerned;
+  const age = her.unseenS === 0 ? 0 : Math.min(her.unseenS / parameters.query_stale_s, 1);
+  return {
+    goal_congruence: 1 - 2 * urgency,
+    controllability: 1 - Math.min(blocked, 1),
+    certainty: her.waiter === null ? 0 : 1 - age,
+    agency: hurried || waiting >= 0.5 ? parameters.waiter : isOfCrowd ? "the crowd" : "self",
+  };
+}
+
+// Emotion and behavior.
+
+const hasAffect = () => parameters.affect === "on";
+const isNegative = () => FEELINGS[her.emotion][0];
+const intensity = () => (isNegative() ? her.urgency : 1 - her.urgency);
+
+function updateEmotion() {
+  if (!hasAffect()) return;
+  const row = EMOTIONS.find(([during, when]) => during.includes(her.behavior) && when(her.measures));
+  set({ emotion: row[2], urgency: her.measures.urgency });
+}
+
+function updateBehavior() {
+  const { policy, exchange_radius_m: radiusM, query_stale_s: staleS, schematic } = parameters;
+  const { blocked, waiting } = her.measures;
+  const isEmotional = hasAffect() && schematic === "on";
+  const isUnknown = !her.hasAnswered || her.unheardS > staleS;
+  const isCertain = her.isSensed || (told.sensing_range_m < radiusM && her.unseenS === 0);
+  const isHere = isCertain && her.waiter !== null && distanceM(her.at, her.waiter) <= radiusM;
+  const awayM = distanceM(her.at, her.home);
+  const isOver = blocked >= 1 || waiting >= 1;
+  const actsByRules = policy === "rules" || policy === "timer";
+  const context = {
+    givesUp: policy === "emotion" ? isEmotional && her.emotion === "FRUSTRATED" : actsByRules && isOver,
+    isHappy: isEmotional && her.emotion === "HAPPY",
+    pending: her.pending,
+    // Vonda does not step in for Leguin.
+    waiterIsNeedyHere: isHere && [null, told.name].includes(her.waiterCalls) && (her.waiterNeeds || isUnknown),
+    exchangeIsOver: hasLasted(parameters.exchange_s),
+    sentHome: her.sentHome,
+    isHome: awayM <= parameters.arrive_m || (awayM <= parameters.settle_m && her.stalledS >= parameters.settle_s),
+    hasJoke: her.untilJokeS <= 0,
+  };
+  const from = her.behavior;
+  for (const [comeFrom, when, act, go] of BEHAVIORS) {
+    if (!comeFrom.includes(from) || !when(context)) continue;
+    act(context);
+    if (go !== null) return set({ behavior: go, lastingS: 0 });
+  }
+}
+
+function joke() {
+  const chosen = Math.min(Math.floor(her.jokes.unit() * JOKES.length), JOKES.length - 1);
+  log(`jokes: ${JOKES[chosen]}`);
+  her.untilJokeS = her.jokes.exponential(parameters.joke_mean_s);
+}
+
+/** The factor on her speed. By emotion, the stronger her concern, the faster she is. */
+function haste() {
+  const { policy, hurry_mult: most, sensory_motor } = parameters;
+  const { haste_onset: onset, haste_full: full, th_concerned } = dynamics;
+  if (policy === "emotion") {
+    if (sensory_motor !== "on") return 1;
+    const felt = intensity();
+    const share = !isNegative() ? 0 : felt >= full ? 1 : felt <= onset ? 0 : (felt - onset) / (full - onset);
+    return 1 + (most - 1) * share;
+  }
+  const isConcerning = policy === "rules" && her.measures.blocked >= th_concerned;
+  return policy !== "neither" && (her.hurried || isConcerning) ? most : 1;
+}
+
+function take({ from, command }) {
+  const isThere = her.behavior === "EXCHANGE";
+  if (command === "refill") {
+    if (!isThere && her.behavior !== "REFILL") her.pending ||= "refill";
+  } else if (command === "hurry") {
+    if (!isThere) her.pending = "hurry";
+  } else if (command === "go home") {
+    her.sentHome ||= isThere || her.behavior === "AWAIT_GO_HOME";
+  } else {
+    const characters = [...command];
+    const shown = characters.length <= 60 ? command : `${characters.slice(0, 60).join("")}...`;
+    log(`does not understand ${JSON.stringify(shown)} from ${from}`);
+  }
+}
+
+async function projectLocation() {
+  const { v_refill_mps: speedMps, prep_s, stand_off_m } = parameters;
+  if (her.behavior === "GO_HOME") return drive(her.home, 0, speedMps);
+  if (her.behavior !== "REFILL" || !hasLasted(prep_s)) return stay();
+  const to = goal();
+  return to ? drive(to, stand_off_m, speedMps * haste()) : walk(speedMps * haste());
+}
+
+/** The end of every tick: where she goes, and what others see. */
+async function finishTick() {
+  const proposal = await projectLocation();
+  const to = goal();
+  const [, face, action_tendency] = FEELINGS[her.emotion];
+  const frame = {
+    valence: isNegative() ? -intensity() : intensity(),
+    intensity: intensity(),
+    urgency: her.urgency,
+    ...appraisal(),
+    action_tendency,
+    face,
+  };
+  send({
+    type: "done",
+    proposal,
+    speed_mps: her.speedMps,
+    // Rounded, so that languages whose arc tangents differ in the last bit agree.
+    direction_rad: Math.floor(Math.atan2(her.heading.y, her.heading.x) * 1e6 + 0.5) / 1e6,
+    emotion_state: hasAffect() ? her.emotion : "NEUTRAL",
+    behavior_state: her.behavior,
+    state_variables: {
+      hurried: her.hurried,
+      blocked_s: her.stalledS,
+      waiting_s: her.waitingS,
+      distance_m: to ? distanceM(her.at, to) : 0,
+      pending: her.pending,
+      trips: her.trips,
+      given_up: her.givenUp,
+      waiter: parameters.waiter,
+      behavior: her.behavior,
+      home_x_m: her.home.x,
+      home_y_m: her.home.y,
+      ...(hasAffect() ? frame : {}),
+    },
+  });
+}
+
+/** The defaults with what is given; a name that she does not know would silently run another experiment. */
+function known(defaults, given) {
+  const unknown = Object.keys(given).find((name) => !(name in defaults));
+  if (unknown) throw new Error(`there is no parameter ${unknown}`);
+  return { ...defaults, ...given };
+}
+
+/** Back to the initial state; a former incarnation that was lost has published what it knew. */
+async function begin(init) {
+  const { dynamics: given, ...others } = init.parameters ?? {};
+  told = init;
+  parameters = known(PARAMETERS, others);
+  dynamics = known(DYNAMICS, given ?? {});
+  const own = Stream.named(init.seed, init.stream);
+  her = {
+    at: init.location,
+    home: init.location,
+    heading: { x: 1, y: 0 },
+    speedMps: 0,
+    side: 1, // Where she last found a way around: 1 is left.
+    carefulS: 0,
+    turnS: 0,
+    wasBlocked: false,
+    waiter: null, // His last known place.
+    waiterNeeds: false,
+    waiterCalls: null,
+    hasAnswered: false,
+    isSensed: false,
+    isMissing: false,
+    unheardS: 0,
+    unseenS: 0,
+    behavior: "WAIT",
+    lastingS: 0,
+    waitingS: 0,
+    emotion: "HAPPY",
+    urgency: 0,
+    measures: { hurried: false, blocked: 0, waiting: 0, urgency: 0 },
+    hurried: false,
+    sentHome: false,
+    pending: "",
+    trips: 0,
+    givenUp: 0,
+    turns: new Stream(own.next()),
+    jokes: new Stream(own.next()),
+    ...NO_WAY,
+  };
+  her.untilJokeS = her.jokes.exponential(parameters.joke_mean_s);
+  if (init.tick === 0) return finishTick();
+
+  const last = init.last_state_variables;
+  if (!last) return;
+  const isErrand = last.pending === "refill" || last.pending === "hurry";
+  set({ hurried: last.hurried === true, pending: isErrand ? last.pending : "" });
+  set({ trips: last.trips ?? 0, givenUp: last.given_up ?? 0, behavior: last.behavior ?? "GO_HOME" });
+  her.home = { x: last.home_x_m ?? her.home.x, y: last.home_y_m ?? her.home.y };
+  log("is back, and takes over where the last one was lost");
+}
+
+/** A tick, in the order of the paper's Figure 5. */
+async function tick({ location, blocked = false, sensed = [], commands = [] }) {
+  set({ at: location, wasBlocked: blocked });
+  commands.forEach(take);
+  her.lastingS += told.tick_s;
+  her.untilJokeS -= told.tick_s;
+  her.waitingS = her.behavior === "AWAIT_GO_HOME" ? her.waitingS + told.tick_s : 0;
+  await observeWaiter(sensed);
+  observeWay();
+  measure();
+  updateEmotion();
+  updateBehavior();
+  await finishTick();
+}
+
+for (let message = await receive(); message.type !== "end"; message = await receive()) {
+  if (message.type === "init") await begin(message);
+  else await tick(message);
+}
+process.exit(0);
