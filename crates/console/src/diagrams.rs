@@ -3,7 +3,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use diagram::{Diagram, Options, TooMuch};
+use pictures::diagram::{Diagram, Options, TooMuch};
 use protocol::{Epoch, Tick};
 use recording::{Recording, RecordingError};
 use serde::Deserialize;

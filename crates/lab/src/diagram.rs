@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use diagram::Diagram;
+use pictures::diagram::Diagram;
 use miette::miette;
 use protocol::messages::Awaited;
 use protocol::{Event, Tick};
@@ -12,7 +12,7 @@ use record::{Entry, Record};
 use recording::{Recording, RecordingError};
 use timeline::Timeline;
 
-pub use diagram::Options;
+pub use pictures::diagram::Options;
 
 use crate::moment::Moment;
 

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use ::report::Page;
+use pictures::Page;
 use lab::diagram::{Options, Window, draw};
 use lab::experiment::PLAN;
 use lab::folder::{recorded_epoch, recorded_epochs};

@@ -12,10 +12,9 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("lockstep", &["protocol"]),
     ("config", &["protocol"]),
     ("timeline", &["protocol"]),
-    ("diagram", &["protocol", "timeline"]),
+    ("pictures", &["protocol", "timeline"]),
     ("statistics", &["protocol"]),
     ("observe", &["config", "protocol", "timeline"]),
-    ("report", &["diagram"]),
     ("bus", &["protocol"]),
     ("recording", &["protocol"]),
     (
@@ -73,7 +72,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         "console",
         &[
             "bus",
-            "diagram",
+            "pictures",
             "protocol",
             "recording",
             "terminal",
@@ -103,13 +102,12 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "robot",
             "robots",
             "config",
-            "diagram",
             "export",
             "lockstep",
             "observe",
+            "pictures",
             "protocol",
             "recording",
-            "report",
             "statistics",
             "timeline",
         ],
@@ -138,7 +136,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         "python-module",
         &[
             "lab", "launch", "scenario", "record", "robots", "robot", "bus", "config", "export",
-            "protocol", "report", "terminal",
+            "protocol", "pictures", "terminal",
         ],
     ),
     (
@@ -260,7 +258,7 @@ fn one_file_names_the_middleware() {
 #[test]
 fn the_pure_crates_know_no_clock_no_network_and_no_files() {
     for (name, dependencies) in dependencies() {
-        if ["world", "affect", "lockstep", "diagram", "report"].contains(&name.as_str()) {
+        if ["world", "affect", "lockstep", "pictures"].contains(&name.as_str()) {
             for impure in ["tokio", "tracing", "zenoh", "clap", "nix"] {
                 assert!(
                     !dependencies.contains(impure),

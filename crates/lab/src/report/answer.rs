@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use observe::Measure;
-use report::Part;
+use pictures::Part;
 use statistics::{Estimate, Interval};
 
 use super::study::{Study, is_shown, label};

@@ -2,7 +2,7 @@
 
 use protocol::Tick;
 use record::EpochFiles;
-use report::{BandRow, Bands, Panel, State};
+use pictures::{BandRow, Bands, Panel, State};
 
 use super::facts::{RobotFacts, RunFacts, States};
 use crate::diagram::{Options, Window, draw};

@@ -6,7 +6,7 @@ use miette::{IntoDiagnostic, miette};
 use observe::{Measure, Measured};
 use protocol::RunName;
 use record::{EpochFiles, RunFolder};
-use report::{Cell, Column, Figure, Page, Part, State, Table};
+use pictures::{Cell, Column, Figure, Page, Part, State, Table};
 
 use super::answer::{lead, sentences};
 use super::course::{diagram_lines, run_panel};

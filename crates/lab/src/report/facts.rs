@@ -10,7 +10,7 @@ use protocol::{Event, RobotName, Tick};
 use record::EpochFiles;
 use record::{Entry, Record};
 use recording::{Recording, RecordingError};
-use report::{Band, Floor};
+use pictures::{Band, Floor};
 use timeline::{Counts, Kind, LinkCounts, Period, Span, StateCounts, Stay, Timeline};
 
 /// Parts of the floor along its longer side.

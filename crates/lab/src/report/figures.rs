@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 
 use observe::Measure;
 use protocol::messages::Verdict;
-use report::{
+use pictures::{
     Cell, Column, Curve, Estimate, Figure, IntervalRow, Intervals, Matrix, MatrixCell, MatrixLabel,
     Panel, Part, Step, Steps, Table, Trend, TrendLine, TrendPoint, decimals_for, fixed,
     round_range,

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use protocol::RobotName;
-use report::{Cell, Column, Figure, Floor, Panel, Part, Table};
+use pictures::{Cell, Column, Figure, Floor, Panel, Part, Table};
 
 use super::facts::RunFacts;
 use super::limits::{MAX_PANELS, limited};

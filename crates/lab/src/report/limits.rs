@@ -1,6 +1,6 @@
 //! Limits that keep a report small, whatever is reported.
 
-use report::Panel;
+use pictures::Panel;
 
 /// Most panels of a figure.
 pub(super) const MAX_PANELS: usize = 24;

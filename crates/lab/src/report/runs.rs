@@ -8,7 +8,7 @@ use protocol::messages::{End, Variable};
 use protocol::time::{self, tick_seconds, time_s};
 use protocol::{RobotName, Tick};
 use record::{EpochFiles, RunFolder, Summary};
-use report::{BandRow, Cell, Column, Figure, Page, Panel, Part, State, Table};
+use pictures::{BandRow, Cell, Column, Figure, Page, Panel, Part, State, Table};
 
 use super::course::{diagram_lines, run_panel, state_panel, states_of};
 use super::facts::{Disturbance, RunFacts};

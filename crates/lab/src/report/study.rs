@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use observe::{Measure, Measured};
-use report::Estimate;
+use pictures::Estimate;
 use statistics::TimeTo;
 
 use crate::experiment::{

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use protocol::RobotName;
-use report::{Cell, Column, Figure, Matrix, MatrixCell, MatrixLabel, Panel, Part, State, Table};
+use pictures::{Cell, Column, Figure, Matrix, MatrixCell, MatrixLabel, Panel, Part, State, Table};
 
 use super::course::states_of;
 use super::facts::RunFacts;

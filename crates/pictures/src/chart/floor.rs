@@ -1,0 +1,131 @@
+//! Where a robot was: the floor from above, darker where it was longer.
+
+use std::collections::BTreeMap;
+
+use crate::markup::number;
+
+use crate::axis::{draw_below, draw_left};
+use crate::canvas::{Chart, PANEL_PX};
+use crate::palette::{HEAT_SHADES, level};
+use crate::scale::Scale;
+
+/// Most height of the floor, pixels.
+const MAX_PX: f64 = 420.0;
+
+/// The time that a robot spent in each part of the floor.
+#[derive(Debug, Clone)]
+pub struct Floor {
+    /// Name of the chart.
+    pub title: String,
+    /// Width and height of the field, meters.
+    pub field_m: [f64; 2],
+    /// Side of obstacles, meters.
+    pub body_m: f64,
+    /// Centers of obstacles, meters.
+    pub obstacles: Vec<[f64; 2]>,
+    /// Side of a part, meters.
+    pub part_m: f64,
+    /// Time in each part, by column and row from the origin, seconds.
+    pub times_s: BTreeMap<(u32, u32), f64>,
+}
+
+impl Floor {
+    /// The chart as SVG.
+    #[must_use]
+    pub fn draw(&self) -> String {
+        let [width_m, height_m] = self.field_m;
+        let left = 44.0;
+        let right = PANEL_PX - 2.0;
+        let px_per_m = ((right - left) / width_m).min(MAX_PX / height_m);
+        let right = left + width_m * px_per_m;
+        let top = 6.0;
+        let bottom = top + height_m * px_per_m;
+        let x = Scale::new(0.0, width_m, left, right);
+        let y = Scale::new(0.0, height_m, bottom, top);
+
+        let description = self.description();
+        let mut chart = Chart::begin("floor", PANEL_PX, bottom + 64.0, &self.title, &description);
+        draw_below(&mut chart, &x, top, bottom, "x, m");
+        draw_left(&mut chart, &y, left, right);
+        let middle = f64::midpoint(top, bottom);
+        chart.upward("muted", 12.0, middle, "middle", "y, m");
+        self.draw_times(&mut chart, &x, &y);
+        self.draw_obstacles(&mut chart, &x, &y);
+        chart.rect("frame", left, top, right - left, bottom - top);
+        self.draw_key(&mut chart, left, bottom + 42.0);
+        chart.finish()
+    }
+
+    /// The longest time in one part, seconds.
+    fn most_s(&self) -> f64 {
+        self.times_s.values().copied().fold(0.0, f64::max)
+    }
+
+    fn description(&self) -> String {
+        format!(
+            "A field of {:.1} m by {:.1} m in parts of {:.2} m: the robot was in {} of them, at most {:.1} s in one",
+            self.field_m[0],
+            self.field_m[1],
+            self.part_m,
+            self.times_s.len(),
+            self.most_s()
+        )
+    }
+
+    /// Darkness grows with the square root of the time, so that ways are seen beside places to wait.
+    fn draw_times(&self, chart: &mut Chart, x: &Scale, y: &Scale) {
+        let most_s = self.most_s().max(f64::MIN_POSITIVE);
+        let mut paths: BTreeMap<usize, String> = BTreeMap::new();
+
+        for ((column, row), time_s) in &self.times_s {
+            let from_x = x.at(f64::from(*column) * self.part_m);
+            let to_x = x.at(f64::from(*column + 1) * self.part_m);
+            let from_y = y.at(f64::from(*row) * self.part_m);
+            let to_y = y.at(f64::from(*row + 1) * self.part_m);
+
+            let path = paths.entry(level((time_s / most_s).sqrt())).or_default();
+            *path += &format!(
+                "M{} {}H{}V{}H{}z",
+                number(from_x),
+                number(to_y),
+                number(to_x),
+                number(from_y),
+                number(from_x)
+            );
+        }
+
+        for (level, path) in paths {
+            chart.path(&format!("h{level}"), &path);
+        }
+    }
+
+    fn draw_obstacles(&self, chart: &mut Chart, x: &Scale, y: &Scale) {
+        let half = self.body_m / 2.0;
+        for [center_x, center_y] in &self.obstacles {
+            let left = x.at(center_x - half);
+            let top = y.at(center_y + half);
+            let width = x.at(center_x + half) - left;
+            let height = y.at(center_y - half) - top;
+
+            chart.group(
+                "obstacle",
+                &format!("obstacle at {center_x:.2} m, {center_y:.2} m"),
+            );
+            chart.rect("obstacle", left, top, width, height);
+            chart.close();
+        }
+    }
+
+    fn draw_key(&self, chart: &mut Chart, left: f64, top: f64) {
+        const STEP_PX: f64 = 14.0;
+        chart.text("muted", left, top + 11.0, "start", "0 s");
+        let first = left + 24.0;
+        for step in 1..HEAT_SHADES.len() {
+            let x = first + (step - 1) as f64 * STEP_PX;
+            chart.rect(&format!("h{step}"), x, top + 2.0, STEP_PX, 10.0);
+        }
+        let end = first + (HEAT_SHADES.len() - 1) as f64 * STEP_PX + 6.0;
+        let text = format!("{:.1} s in a part of {:.2} m", self.most_s(), self.part_m);
+        chart.text("muted", end, top + 11.0, "start", &text);
+    }
+}

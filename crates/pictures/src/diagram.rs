@@ -1,0 +1,133 @@
+//! The space-time diagram of a run, as one SVG text: robots are lanes, time is to scale in ticks, commands are slanted lines.
+//!
+//! Pure: events of ticks go in ([`Diagram::tick`]), text comes out ([`Diagram::to_svg`]). The same events give the same bytes.
+//! What was in progress when the window began is known from the events before it ([`Timeline`]).
+
+mod axis;
+mod bands;
+mod changes;
+mod commands;
+mod draw;
+mod items;
+mod labels;
+mod lanes;
+mod legend;
+mod options;
+pub(crate) mod palette;
+mod picture;
+mod scale;
+mod shading;
+mod style;
+mod words;
+
+use protocol::messages::Awaited;
+use protocol::{Event, RobotName, Tick};
+use timeline::{Span, Timeline};
+
+use self::draw::draw;
+use self::items::{HeldUp, Items};
+use self::picture::Window;
+
+pub use options::Options;
+pub use style::style;
+pub use words::{shortened, width_px};
+
+/// Most things in a diagram: bands, commands, marks. A picture with this many has about 4 MB.
+pub const MAX_ITEMS: usize = 12_000;
+
+/// The window has more things than can be drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the window has {items} bands, commands and marks, and a diagram has at most {MAX_ITEMS}")]
+pub struct TooMuch {
+    /// Number of things in the window.
+    pub items: usize,
+}
+
+/// The diagram of a window of ticks.
+#[derive(Debug, Clone)]
+pub struct Diagram {
+    timeline: Timeline,
+    tick_s: f64,
+    from: Tick,
+    /// The last tick of the window so far.
+    to: Tick,
+    options: Options,
+    items: Items,
+    /// Number of things beyond [`MAX_ITEMS`], which are not kept.
+    beyond: usize,
+    /// Whether the run ended with the last tick of the window.
+    has_end: bool,
+}
+
+impl Diagram {
+    /// A diagram of no tick yet. `timeline` is that after the tick before `from`; a tick lasts `tick_s` simulated seconds.
+    #[must_use]
+    pub fn new(timeline: Timeline, tick_s: f64, from: Tick, options: Options) -> Self {
+        Self {
+            timeline,
+            tick_s,
+            from,
+            to: from,
+            options,
+            items: Items::default(),
+            beyond: 0,
+            has_end: false,
+        }
+    }
+
+    /// Adds what happened in a tick. `awaited` are the robots for which the clock was held.
+    pub fn tick(&mut self, tick: Tick, events: &[Event], awaited: &[Awaited]) {
+        self.to = self.to.max(tick);
+        let mut items = Items::default();
+
+        for event in events {
+            for span in self.timeline.apply(tick, event) {
+                self.add(span, &mut items);
+            }
+            self.has_end |= matches!(event, Event::End { .. });
+        }
+        for awaited in awaited {
+            items.held_up.push(HeldUp {
+                tick,
+                awaited: awaited.clone(),
+            });
+        }
+
+        if self.items.count() <= MAX_ITEMS {
+            self.items.append(items);
+        } else {
+            self.beyond += items.count();
+        }
+    }
+
+    /// The picture.
+    ///
+    /// # Errors
+    /// [`TooMuch`] if the window has more than [`MAX_ITEMS`] things.
+    pub fn to_svg(&self) -> Result<String, TooMuch> {
+        let mut items = self.items.clone();
+        for span in self.timeline.in_progress() {
+            self.add(span, &mut items);
+        }
+        let count = items.count() + self.beyond;
+        if count > MAX_ITEMS {
+            return Err(TooMuch { items: count });
+        }
+
+        let window = Window {
+            from: self.from,
+            to: self.to,
+            tick_s: self.tick_s,
+            has_end: self.has_end,
+        };
+        let robots: Vec<RobotName> = self.timeline.robots().cloned().collect();
+        Ok(draw(robots, &items, window, &self.options))
+    }
+
+    /// Adds what is shown.
+    fn add(&self, span: Span, items: &mut Items) {
+        if self.options.queries || !matches!(span, Span::QueriesLost(_)) {
+            items.push(span);
+        }
+    }
+}

@@ -1,0 +1,431 @@
+//! Draws commands: slanted lines from the tick they were sent to the tick they arrived, or were lost.
+
+use std::collections::BTreeMap;
+
+use protocol::Tick;
+use protocol::event::Cause;
+
+use crate::diagram::items::{Command, CommandEnd, Items, QueriesLost};
+use crate::diagram::labels::Area;
+use crate::diagram::picture::{LABEL_PX, Label, OUTSIDE_PX, Picture};
+use crate::diagram::words::{self, width_px};
+
+/// Distance of the first wait from the target's lane, pixels.
+const WAIT_PX: f64 = 12.0;
+/// Distance between two waits at the same time, pixels.
+const NEXT_WAIT_PX: f64 = 5.0;
+/// Most waits beside each other; more are drawn over the last one.
+const MAX_WAITS: usize = 6;
+/// How far the two ends of a doubled command are from where it arrives, pixels.
+const FORK_PX: f64 = 4.0;
+
+/// A point of the picture, pixels.
+type Point = (f64, f64);
+
+/// Where the waits at each lane end, by index of the lane and whether the commands come from above.
+type Waits = BTreeMap<(usize, bool), Vec<f64>>;
+
+/// The way of a command over the picture.
+struct Route {
+    /// To where it waits, arrives, forks or is lost.
+    line: Vec<Point>,
+    /// Where it waits; empty if it does not.
+    wait: Vec<Point>,
+    /// After the wait or the fork.
+    branches: Vec<[Point; 2]>,
+    /// Tips of arrows, each with the point before it.
+    heads: Vec<[Point; 2]>,
+    /// Breaks, each with its reason.
+    breaks: Vec<(Point, Cause)>,
+}
+
+/// A label that is placed after all lines are known.
+pub(crate) struct Wanted<'a> {
+    command: &'a Command,
+    /// The line beside which the text is put.
+    beside: [Point; 2],
+    breaks: Vec<(Point, Cause)>,
+}
+
+/// Draws the commands, in the order in which they were sent. Returns the labels that are to be placed.
+pub(crate) fn draw_commands<'a>(picture: &mut Picture, items: &'a Items) -> Vec<Wanted<'a>> {
+    let mut commands: Vec<&Command> = items.commands.iter().collect();
+    commands.sort_by_key(|command| (command.sent, &command.from, command.seq));
+
+    let mut waits = Waits::new();
+    let mut wanted = Vec::new();
+    for command in commands {
+        wanted.extend(draw_command(picture, command, &mut waits));
+    }
+    wanted
+}
+
+fn draw_command<'a>(
+    picture: &mut Picture,
+    command: &'a Command,
+    waits: &mut Waits,
+) -> Option<Wanted<'a>> {
+    let route = route(picture, command, waits)?;
+    let is_lost = command.is_lost();
+    let is_over = command.ends.len() == command.copies() || is_lost;
+    let fate = match (is_lost, is_over) {
+        (true, _) => "lost",
+        (false, true) => "delivered",
+        (false, false) => "under-way",
+    };
+    let mut class = format!("command {fate}");
+    let comes_in = command.sent < picture.window.from;
+    for (applies, word) in [
+        (command.until.is_some(), " delayed"),
+        (command.is_doubled, " doubled"),
+        (comes_in, " enters"),
+        (!is_over, " leaves"),
+    ] {
+        if applies {
+            class += word;
+        }
+    }
+
+    let title = picture.titles.command(command);
+    let tick = picture.shown(command.sent);
+    picture
+        .svg
+        .tag("g")
+        .with("class", &class)
+        .count("data-tick", tick)
+        .with("data-from", command.from.as_str())
+        .with("data-to", command.to.as_str())
+        .count("data-seq", command.seq)
+        .open();
+    picture.svg.title(&title);
+    draw_route(picture, &route, comes_in);
+    picture.close();
+
+    let beside = match route.line[..] {
+        [first, .., last] => [first, last],
+        _ => [*route.wait.first()?, *route.wait.last()?],
+    };
+    Some(Wanted {
+        command,
+        beside,
+        breaks: route.breaks,
+    })
+}
+
+fn draw_route(picture: &mut Picture, route: &Route, comes_in: bool) {
+    let mut lines = Vec::new();
+    if !route.line.is_empty() {
+        picture.path("line", &route.line);
+        lines.extend(route.line.windows(2).map(|ends| [ends[0], ends[1]]));
+    }
+    if !route.wait.is_empty() {
+        picture.path("wait", &route.wait);
+        lines.extend(route.wait.windows(2).map(|ends| [ends[0], ends[1]]));
+    }
+    for branch in &route.branches {
+        picture.path("line", branch);
+        lines.push(*branch);
+    }
+    for [from, to] in lines {
+        picture.labels.avoid_line(from, to);
+    }
+
+    if !comes_in && let Some((x, y)) = route.line.first() {
+        picture
+            .svg
+            .tag("circle")
+            .with("class", "start")
+            .at("cx", *x)
+            .at("cy", *y)
+            .at("r", 2.0)
+            .empty();
+    }
+    for [from, to] in &route.heads {
+        picture.triangle("head", *from, *to);
+    }
+    for ((x, y), _) in &route.breaks {
+        picture.cross("break", *x, *y);
+        picture.labels.take(Area {
+            left: x - 5.0,
+            top: y - 5.0,
+            width: 10.0,
+            height: 10.0,
+            is_before: false,
+        });
+    }
+}
+
+/// Where a command begins and which lane it goes to.
+struct Course {
+    start: Point,
+    /// The edge of the target's lane, or a place beside that of the sender if the target has none.
+    end_y: f64,
+    /// 1 if it goes down, -1 if it goes up.
+    down: f64,
+    /// Index of the lane beside which it waits, and whether it comes from above.
+    waits_at: (usize, bool),
+    is_to_itself: bool,
+}
+
+/// The course of a command; `None` if its sender has no lane.
+fn course(picture: &Picture, command: &Command) -> Option<Course> {
+    let sender = picture.lanes.index(&command.from)?;
+    let target = picture.lanes.index(&command.to);
+    let goes_down = target.is_none_or(|target| target >= sender);
+    let lane = &picture.lanes.all[sender];
+    let start_y = if goes_down { lane.bottom } else { lane.top };
+    let end_y = match target {
+        Some(target) if target == sender => start_y,
+        Some(target) if goes_down => picture.lanes.all[target].top,
+        Some(target) => picture.lanes.all[target].bottom,
+        None => start_y + 44.0,
+    };
+
+    let start_x = if command.sent < picture.window.from {
+        picture.scale.left_px() - OUTSIDE_PX
+    } else {
+        picture.scale.x(command.sent)
+    };
+    Some(Course {
+        start: (start_x, start_y),
+        end_y,
+        down: if goes_down { 1.0 } else { -1.0 },
+        waits_at: (target.unwrap_or(sender), goes_down),
+        is_to_itself: target == Some(sender),
+    })
+}
+
+/// The way of a command; `None` if its sender has no lane or it was over before the window.
+fn route(picture: &Picture, command: &Command, waits: &mut Waits) -> Option<Route> {
+    let last_end = command.ends.iter().map(|end| end.tick).max();
+    if last_end.is_some_and(|tick| tick < picture.window.from) {
+        return None;
+    }
+
+    let course = course(picture, command)?;
+    let mut route = Route {
+        line: vec![course.start],
+        wait: Vec::new(),
+        branches: Vec::new(),
+        heads: Vec::new(),
+        breaks: Vec::new(),
+    };
+    match (command.until, last_end) {
+        (Some(until), _) => {
+            let over = last_end.unwrap_or(until);
+            add_wait(&mut route, picture, command, &course, over, waits);
+        }
+        (None, Some(tick)) => {
+            let end = (picture.scale.x(tick), course.end_y);
+            let mut turn = course.start;
+            if course.is_to_itself {
+                // Down and up again.
+                turn = ((turn.0 + end.0) / 2.0, turn.1 + 16.0);
+                route.line.push(turn);
+            }
+            add_ends(&mut route, command, turn, end, course.down);
+        }
+        (None, None) => {
+            let out_x = picture.scale.right_px() + OUTSIDE_PX;
+            let half_y = (course.start.1 + course.end_y) / 2.0;
+            route.line.push((out_x, half_y));
+        }
+    }
+    Some(route)
+}
+
+/// Adds the wait of a command that the medium holds back until tick `over`, and what becomes of it then.
+fn add_wait(
+    route: &mut Route,
+    picture: &Picture,
+    command: &Command,
+    course: &Course,
+    over: Tick,
+    waits: &mut Waits,
+) {
+    const TURN_PX: f64 = 5.0;
+    let window = picture.window;
+    let is_over = !command.ends.is_empty();
+    let waits_already = command.sent + 1 < window.from;
+    let begin_x = if waits_already {
+        course.start.0
+    } else {
+        picture.scale.x(command.sent + 1)
+    };
+    let end_x = if over > window.to {
+        picture.scale.right_px() + OUTSIDE_PX
+    } else {
+        picture.scale.x(over)
+    };
+
+    let slot = take_slot(waits, course.waits_at, begin_x, end_x);
+    let wait_y = course.end_y - course.down * (WAIT_PX + NEXT_WAIT_PX * slot as f64);
+    if waits_already {
+        route.line.clear();
+    } else {
+        route.line.push((begin_x, wait_y));
+    }
+    let turn_x = if is_over {
+        (end_x - TURN_PX).max(begin_x)
+    } else {
+        end_x
+    };
+    route.wait = vec![(begin_x, wait_y), (turn_x, wait_y)];
+    let end = (end_x, course.end_y);
+    add_ends(route, command, (turn_x, wait_y), end, course.down);
+}
+
+/// Takes the first place for a wait that is free from `begin_x` on.
+fn take_slot(waits: &mut Waits, key: (usize, bool), begin_x: f64, end_x: f64) -> usize {
+    let ends = waits.entry(key).or_default();
+    let free = ends.iter().position(|end| *end < begin_x);
+    let slot = free.unwrap_or(ends.len()).min(MAX_WAITS - 1);
+    if slot == ends.len() {
+        ends.push(end_x);
+    } else {
+        ends[slot] = ends[slot].max(end_x);
+    }
+    slot
+}
+
+/// Adds what becomes of a command that has come to `turn` and is to arrive at `end`.
+fn add_ends(route: &mut Route, command: &Command, turn: Point, end: Point, down: f64) {
+    let is_waiting = !route.wait.is_empty();
+    let fork = if command.is_doubled && !is_waiting {
+        (
+            turn.0 + 0.6 * (end.0 - turn.0),
+            turn.1 + 0.6 * (end.1 - turn.1),
+        )
+    } else {
+        turn
+    };
+    if fork != turn {
+        route.line.push(fork);
+    }
+
+    for (index, CommandEnd { lost, .. }) in command.ends.iter().enumerate() {
+        let aside = match (command.is_doubled, index) {
+            (false, _) => 0.0,
+            (true, 0) => -FORK_PX,
+            (true, _) => FORK_PX,
+        };
+        let place = (end.0 + aside, end.1);
+        let last = match lost {
+            None => place,
+            Some(Cause::Missed | Cause::Overflow) => (place.0, place.1 - down * 9.0),
+            Some(_) if is_waiting => (end.0, turn.1),
+            Some(_) => (place.0, (turn.1 + end.1) / 2.0),
+        };
+        let is_straight = !command.is_doubled && !is_waiting && route.line.len() == 1;
+        if is_straight {
+            route.line.push(last);
+        } else {
+            route.branches.push([fork, last]);
+        }
+        match lost {
+            None => route.heads.push([fork, place]),
+            Some(because) => route.breaks.push((last, *because)),
+        }
+    }
+}
+
+/// Places the texts of commands, and why they were lost.
+pub(crate) fn place_labels(picture: &mut Picture, wanted: &[Wanted<'_>]) {
+    for label in wanted {
+        place_label(picture, label);
+    }
+}
+
+fn place_label(picture: &mut Picture, wanted: &Wanted<'_>) {
+    let command = wanted.command;
+    let text = words::label(command);
+    let text_px = width_px(&text, LABEL_PX);
+    let performative = command.performative.name();
+    let whole_px = width_px(performative, LABEL_PX) + width_px(" ", LABEL_PX) + text_px;
+
+    for (prefix, width) in [(performative, whole_px), ("", text_px)] {
+        let candidates = beside(wanted.beside, width);
+        if let Some(area) = picture.labels.place(&candidates) {
+            picture.placed.push(Label {
+                area,
+                class: "text",
+                tick: command.sent,
+                prefix,
+                text,
+            });
+            break;
+        }
+    }
+
+    for ((x, y), because) in &wanted.breaks {
+        let text = words::cause(*because);
+        let width = width_px(text, LABEL_PX);
+        let mut candidates = Vec::new();
+        for middle in [*y, *y + 12.0, *y - 12.0] {
+            candidates.push(Area::of_label(x + 8.0, middle, width));
+            candidates.push(Area::of_label_before(x - 8.0, middle, width));
+        }
+        if let Some(area) = picture.labels.place(&candidates) {
+            picture.placed.push(Label {
+                area,
+                class: "reason",
+                tick: command.sent,
+                prefix: "",
+                text: text.to_owned(),
+            });
+        }
+    }
+}
+
+/// Places for a label beside a line.
+fn beside([from, to]: [Point; 2], width: f64) -> Vec<Area> {
+    let mut candidates = Vec::new();
+    for distance in [6.0, 14.0] {
+        for share in [0.5, 0.35, 0.65, 0.22, 0.78] {
+            let x = from.0 + share * (to.0 - from.0);
+            let y = from.1 + share * (to.1 - from.1);
+            candidates.push(Area::of_label(x + distance, y, width));
+            candidates.push(Area::of_label_before(x - distance, y, width));
+        }
+    }
+    candidates
+}
+
+/// Draws the queries that were lost: dashes at the lane of the robot that would have asked, with a stub towards the other.
+pub(crate) fn draw_queries(picture: &mut Picture, items: &Items) {
+    for lost in &items.queries {
+        draw_lost_queries(picture, lost);
+    }
+}
+
+fn draw_lost_queries(picture: &mut Picture, lost: &QueriesLost) {
+    let Some((left, width)) = picture.extent(lost.period) else {
+        return;
+    };
+    let Some(asker) = picture.lanes.index(&lost.from) else {
+        return;
+    };
+    let target = picture.lanes.index(&lost.to);
+    let goes_down = target.is_none_or(|target| target > asker);
+    let lane = &picture.lanes.all[asker];
+    let (edge, stub) = if goes_down {
+        (lane.bottom + 3.0, lane.bottom + 9.0)
+    } else {
+        (lane.top - 3.0, lane.top - 9.0)
+    };
+
+    let title = picture.titles.queries(lost);
+    let begin = lost.period.begin;
+    let ticks = lost.period.end.map_or(1, |end| end - begin);
+    let tick = picture.shown(begin);
+    picture
+        .svg
+        .tag("g")
+        .with("class", "queries")
+        .count("data-tick", tick)
+        .count("data-ticks", ticks)
+        .open();
+    picture.svg.title(&title);
+    picture.path("query", &[(left, stub), (left, edge), (left + width, edge)]);
+    picture.close();
+}

@@ -1,0 +1,28 @@
+//! Pictures of runs and experiments as text: the space-time diagram ([`diagram`]), charts ([`Bands`], [`Matrix`], [`Floor`],
+//! [`Intervals`], [`Trend`], [`Steps`]), and the page around them with its figures and tables ([`Page`]).
+//!
+//! Pure: plain data in, SVG or HTML out. The same data give the same bytes. Every text is escaped.
+
+mod axis;
+mod canvas;
+mod chart;
+pub mod diagram;
+mod labels;
+mod markup;
+mod number;
+mod page;
+mod palette;
+mod scale;
+mod style;
+mod table;
+
+pub use chart::bands::{Band, BandRow, Bands, State};
+pub use chart::floor::Floor;
+pub use chart::intervals::{Estimate, IntervalRow, Intervals};
+pub use chart::matrix::{Matrix, MatrixCell, MatrixLabel};
+pub use chart::steps::{Curve, Step, Steps};
+pub use chart::trend::{Trend, TrendLine, TrendPoint};
+pub use number::{decimals_for, fixed};
+pub use page::{Figure, Page, Panel, Part};
+pub use scale::round_range;
+pub use table::{Cell, Column, Table};
