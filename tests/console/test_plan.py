@@ -27,7 +27,7 @@ RING = """(name) => {
 
 def color_of_emotion(name, scheme):
     """As the space-time diagrams and the reports have it."""
-    source = (ROOT / "crates/pictures/src/diagram/palette.rs").read_text()
+    source = (ROOT / "crates/pictures/src/palette.rs").read_text()
     names = re.findall(r'"([A-Z]+)"', source.split("EMOTIONS: [&str; 7] = [")[1].split("]")[0])
     shades = re.findall(r'shade\("#(\w+)", "#(\w+)"\)', source.split("EMOTION_SHADES: [Shade; 15] = [")[1])
     color = shades[names.index(name)][0 if scheme == "light" else 1]

@@ -382,7 +382,7 @@ fn read_ticks(recording: &Recording, wanted: Wanted) -> Response {
 async fn diagram_style() -> Response {
     (
         [(CONTENT_TYPE, content_type(DIAGRAM_STYLE))],
-        pictures::diagram::style(),
+        pictures::style(),
     )
         .into_response()
 }

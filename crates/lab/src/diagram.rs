@@ -3,8 +3,8 @@
 
 use std::collections::BTreeMap;
 
-use pictures::diagram::Diagram;
 use miette::miette;
+use pictures::diagram::Diagram;
 use protocol::messages::Awaited;
 use protocol::{Event, Tick};
 use record::EpochFiles;

@@ -8,6 +8,7 @@ mod facts;
 mod figures;
 mod floor;
 mod limits;
+mod quantity;
 mod runs;
 mod study;
 mod transitions;

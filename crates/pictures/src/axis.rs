@@ -1,47 +1,37 @@
 //! Axes of charts.
 
-use crate::canvas::Chart;
+use crate::markup::Markup;
 use crate::number::typeset;
 use crate::scale::Scale;
 
 /// Draws an axis below a plot, with grid lines through it. `top` and `bottom` are the ends of the plot.
-pub(crate) fn draw_below(chart: &mut Chart, scale: &Scale, top: f64, bottom: f64, title: &str) {
-    let width_px = (scale.to_px - scale.from_px).abs();
-    let (ticks, decimals) = scale.ticks((width_px / 50.0).round().max(3.0) as usize);
-
+pub(crate) fn draw_below(svg: &mut Markup, scale: &Scale, top: f64, bottom: f64, title: &str) {
+    let (left, right) = (scale.from_px(), scale.to_px());
+    let (ticks, decimals) = scale.ticks(distance(right - left, 50.0, 3.0));
     for value in ticks {
         let x = scale.at(value);
-        chart.line("grid", (x, top), (x, bottom));
-        chart.text(
-            "tick",
-            x,
-            bottom + 14.0,
-            "middle",
-            &typeset(value, decimals),
-        );
+        svg.line("grid", &[(x, top), (x, bottom)]);
+        let text = typeset(value, decimals);
+        svg.text("tick", x, bottom + 14.0, "middle", &text);
     }
 
-    chart.line("axis", (scale.from_px, bottom), (scale.to_px, bottom));
-    if !title.is_empty() {
-        let middle = f64::midpoint(scale.from_px, scale.to_px);
-        chart.text("muted", middle, bottom + 29.0, "middle", title);
-    }
+    svg.line("axis", &[(left, bottom), (right, bottom)]);
+    let middle = f64::midpoint(left, right);
+    svg.text("muted", middle, bottom + 29.0, "middle", title);
 }
 
 /// Draws an axis at the left of a plot, with grid lines through it. `scale` runs upward.
-pub(crate) fn draw_left(chart: &mut Chart, scale: &Scale, left: f64, right: f64) {
-    let height_px = (scale.to_px - scale.from_px).abs();
-    let (ticks, decimals) = scale.ticks((height_px / 40.0).round().max(2.0) as usize);
-
+pub(crate) fn draw_left(svg: &mut Markup, scale: &Scale, left: f64, right: f64) {
+    let (ticks, decimals) = scale.ticks(distance(scale.from_px() - scale.to_px(), 40.0, 2.0));
     for value in ticks {
         let y = scale.at(value);
-        chart.line("grid", (left, y), (right, y));
-        chart.text(
-            "tick",
-            left - 6.0,
-            y + 3.5,
-            "end",
-            &typeset(value, decimals),
-        );
+        svg.line("grid", &[(left, y), (right, y)]);
+        let text = typeset(value, decimals);
+        svg.text("tick", left - 6.0, y + 3.5, "end", &text);
     }
+}
+
+/// The distance of ticks on an axis: about `usual_px`, so that there are about `least` of them or more.
+fn distance(length_px: f64, usual_px: f64, least: f64) -> f64 {
+    length_px / (length_px / usual_px).round().max(least)
 }

@@ -3,21 +3,16 @@
 //! Pure: events of ticks go in ([`Diagram::tick`]), text comes out ([`Diagram::to_svg`]). The same events give the same bytes.
 //! What was in progress when the window began is known from the events before it ([`Timeline`]).
 
-mod axis;
-mod bands;
 mod changes;
 mod commands;
+mod cuts;
 mod draw;
 mod items;
-mod labels;
 mod lanes;
 mod legend;
-mod options;
-pub(crate) mod palette;
 mod picture;
-mod scale;
-mod shading;
-mod style;
+mod robots;
+mod time_axis;
 mod words;
 
 use protocol::messages::Awaited;
@@ -28,9 +23,7 @@ use self::draw::draw;
 use self::items::{HeldUp, Items};
 use self::picture::Window;
 
-pub use options::Options;
-pub use style::style;
-pub use words::{shortened, width_px};
+pub use self::draw::Options;
 
 /// Most things in a diagram: bands, commands, marks. A picture with this many has about 4 MB.
 pub const MAX_ITEMS: usize = 12_000;

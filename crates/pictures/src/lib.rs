@@ -4,7 +4,6 @@
 //! Pure: plain data in, SVG or HTML out. The same data give the same bytes. Every text is escaped.
 
 mod axis;
-mod canvas;
 mod chart;
 pub mod diagram;
 mod labels;
@@ -13,16 +12,21 @@ mod number;
 mod page;
 mod palette;
 mod scale;
+mod shapes;
 mod style;
 mod table;
 
-pub use chart::bands::{Band, BandRow, Bands, State};
+pub use chart::Estimate;
+pub use chart::bands::{Band, BandRow, Bands};
 pub use chart::floor::Floor;
-pub use chart::intervals::{Estimate, IntervalRow, Intervals};
+pub use chart::intervals::{IntervalRow, Intervals};
 pub use chart::matrix::{Matrix, MatrixCell, MatrixLabel};
 pub use chart::steps::{Curve, Step, Steps};
 pub use chart::trend::{Trend, TrendLine, TrendPoint};
+pub use labels::width_px;
 pub use number::{decimals_for, fixed};
-pub use page::{Figure, Page, Panel, Part};
+pub use page::{Figure, Page, Panel, Text};
+pub use palette::state_class;
 pub use scale::round_range;
-pub use table::{Cell, Column, Table};
+pub use style::style;
+pub use table::{Cell, Table};

@@ -6,82 +6,88 @@ use protocol::plain::{escape_line, escape_text};
 
 /// A text of elements that is being written: XML, which HTML parsers read, too.
 #[derive(Debug, Default)]
-pub struct Markup {
+pub(crate) struct Markup {
     text: String,
 }
 
 /// A start tag that is being written.
 #[must_use]
-pub struct Tag<'a> {
+pub(crate) struct Tag<'a> {
     markup: &'a mut Markup,
     name: &'static str,
 }
 
 impl Markup {
     /// Begins a start tag.
-    pub fn tag(&mut self, name: &'static str) -> Tag<'_> {
+    pub(crate) fn tag(&mut self, name: &'static str) -> Tag<'_> {
         self.text.push('<');
         self.text.push_str(name);
         Tag { markup: self, name }
     }
 
     /// Writes the end tag of an element that was opened.
-    pub fn close(&mut self, name: &str) {
+    pub(crate) fn close(&mut self, name: &str) {
         self.text.push_str("</");
         self.text.push_str(name);
         self.text.push_str(">\n");
     }
 
     /// Writes the title of the element that was opened last: its description, which viewers show under the pointer.
-    pub fn title(&mut self, text: &str) {
+    pub(crate) fn title(&mut self, text: &str) {
         self.tag("title").content(text);
     }
 
     /// Writes a style sheet, which is text of this program.
-    pub fn style(&mut self, sheet: &str) {
+    pub(crate) fn style(&mut self, sheet: &str) {
         self.text.push_str("<style>");
         self.text.push_str(sheet);
         self.text.push_str("</style>\n");
     }
 
     /// Writes a text between elements.
-    pub fn text(&mut self, text: &str) {
+    pub(crate) fn plain(&mut self, text: &str) {
         self.text.push_str(&escaped(&escape_line(text)));
     }
 
     /// Writes elements that have been written as a text of their own.
-    pub fn add(&mut self, elements: &str) {
+    pub(crate) fn add(&mut self, elements: &str) {
         self.text.push_str(elements);
     }
 
     /// Number of bytes so far.
-    #[must_use]
-    pub fn size(&self) -> usize {
+    pub(crate) fn size(&self) -> usize {
         self.text.len()
     }
 
     /// The text.
-    #[must_use]
-    pub fn finish(self) -> String {
+    pub(crate) fn finish(self) -> String {
         self.text
     }
 }
 
 impl Tag<'_> {
+    /// The attribute `class`, unless it is empty.
+    pub(crate) fn class(self, class: &str) -> Self {
+        if class.is_empty() {
+            return self;
+        }
+        self.with("class", class)
+    }
+
     /// An attribute.
-    pub fn with(self, name: &str, value: &str) -> Self {
+    pub(crate) fn with(self, name: &str, value: &str) -> Self {
         let value = escaped(&escape_line(value));
         self.raw(name, &value)
     }
 
     /// An attribute that is a length, pixels.
-    pub fn at(self, name: &str, px: f64) -> Self {
+    pub(crate) fn at(self, name: &str, px: f64) -> Self {
         let value = number(px);
         self.raw(name, &value)
     }
 
     /// An attribute that is a number.
-    pub fn count(self, name: &str, value: u64) -> Self {
+    pub(crate) fn count(self, name: &str, value: u64) -> Self {
         let value = value.to_string();
         self.raw(name, &value)
     }
@@ -93,22 +99,22 @@ impl Tag<'_> {
     }
 
     /// Ends the tag; elements that follow are in this one.
-    pub fn open(self) {
+    pub(crate) fn open(self) {
         self.markup.text.push('>');
     }
 
     /// Ends an element without content.
-    pub fn empty(self) {
+    pub(crate) fn empty(self) {
         self.markup.text.push_str("/>");
     }
 
     /// Ends an element with a text in one line.
-    pub fn content(self, text: &str) {
+    pub(crate) fn content(self, text: &str) {
         self.end(&escaped(&escape_line(text)));
     }
 
     /// Ends an element with a text of several lines.
-    pub fn lines(self, text: &str) {
+    pub(crate) fn lines(self, text: &str) {
         self.end(&escaped(&escape_text(text)));
     }
 
@@ -122,8 +128,7 @@ impl Tag<'_> {
 }
 
 /// A number as it is in SVG: in tenths, without an end of zeros.
-#[must_use]
-pub fn number(value: f64) -> String {
+pub(crate) fn number(value: f64) -> String {
     let tenths = (value * 10.0).round() / 10.0;
     // Not "-0".
     format!("{}", tenths + 0.0)

@@ -10,36 +10,50 @@ use crate::table::Table;
 /// What the page may load: nothing. Its style is in it.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; img-src data:";
 
-/// A part of a sentence.
-#[derive(Debug, Clone)]
-pub enum Part {
-    /// Plain text.
-    Text(String),
-    /// Text with emphasis.
-    Strong(String),
-    /// A command, a path, a name from a file.
-    Code(String),
-    /// A link within the page: text and the id of its target.
-    Link(String, String),
+/// A text, parts of which stand out.
+#[derive(Debug, Clone, Default)]
+pub struct Text {
+    /// The parts, each with its element; plain text has none.
+    parts: Vec<(Option<&'static str>, String)>,
 }
 
-impl Part {
-    /// Plain text.
+impl Text {
+    /// Adds plain text.
     #[must_use]
-    pub fn text(text: impl Into<String>) -> Self {
-        Self::Text(text.into())
+    pub fn text(self, text: impl Into<String>) -> Self {
+        self.with(None, text.into())
     }
 
-    /// Text with emphasis.
+    /// Adds text with emphasis.
     #[must_use]
-    pub fn strong(text: impl Into<String>) -> Self {
-        Self::Strong(text.into())
+    pub fn strong(self, text: impl Into<String>) -> Self {
+        self.with(Some("strong"), text.into())
     }
 
-    /// A command, a path, a name from a file.
+    /// Adds a command, a path, a name from a file.
     #[must_use]
-    pub fn code(text: impl Into<String>) -> Self {
-        Self::Code(text.into())
+    pub fn code(self, text: impl Into<String>) -> Self {
+        self.with(Some("code"), text.into())
+    }
+
+    fn with(mut self, element: Option<&'static str>, text: String) -> Self {
+        self.parts.push((element, text));
+        self
+    }
+
+    fn write(&self, markup: &mut Markup) {
+        for (element, text) in &self.parts {
+            match element {
+                Some(element) => markup.tag(element).content(text),
+                None => markup.plain(&kept_together(text)),
+            }
+        }
+    }
+}
+
+impl<T: Into<String>> From<T> for Text {
+    fn from(text: T) -> Self {
+        Self::default().text(text)
     }
 }
 
@@ -54,13 +68,34 @@ pub struct Panel {
     pub is_wide: bool,
 }
 
+impl Panel {
+    /// A chart that has the width of a panel.
+    #[must_use]
+    pub fn new(heading: impl Into<String>, svg: String) -> Self {
+        Self {
+            heading: heading.into(),
+            svg,
+            is_wide: false,
+        }
+    }
+
+    /// A chart that is as wide as the page.
+    #[must_use]
+    pub fn wide(heading: impl Into<String>, svg: String) -> Self {
+        Self {
+            is_wide: true,
+            ..Self::new(heading, svg)
+        }
+    }
+}
+
 /// Charts with one caption, and the same numbers as a table.
 #[derive(Debug, Clone, Default)]
 pub struct Figure {
     /// The charts.
     pub panels: Vec<Panel>,
     /// What is shown, with n and the kind of interval.
-    pub caption: Vec<Part>,
+    pub caption: Text,
     /// The numbers.
     pub table: Option<Table>,
 }
@@ -83,7 +118,7 @@ impl Page {
     #[must_use]
     pub fn new(kind: &str, title: &str) -> Self {
         let mut head = Markup::default();
-        head.tag("p").with("class", "kind").content(kind);
+        head.tag("p").class("kind").content(kind);
         head.tag("h1").content(title);
         Self {
             title: title.to_owned(),
@@ -96,10 +131,8 @@ impl Page {
     }
 
     /// Adds a paragraph below the title.
-    pub fn lead(&mut self, parts: &[Part]) {
-        self.head.tag("p").with("class", "lead").open();
-        write_parts(&mut self.head, parts);
-        self.head.close("p");
+    pub fn lead(&mut self, text: impl Into<Text>) {
+        write_text(&mut self.head, "p", "lead", &text.into());
     }
 
     /// Begins a section; the one before ends.
@@ -119,26 +152,20 @@ impl Page {
     }
 
     /// Adds a paragraph.
-    pub fn paragraph(&mut self, parts: &[Part]) {
-        self.body.tag("p").open();
-        write_parts(&mut self.body, parts);
-        self.body.close("p");
+    pub fn paragraph(&mut self, text: impl Into<Text>) {
+        write_text(&mut self.body, "p", "", &text.into());
     }
 
     /// Adds a remark about what is not shown or not known.
-    pub fn remark(&mut self, parts: &[Part]) {
-        self.body.tag("p").with("class", "remark").open();
-        write_parts(&mut self.body, parts);
-        self.body.close("p");
+    pub fn remark(&mut self, text: impl Into<Text>) {
+        write_text(&mut self.body, "p", "remark", &text.into());
     }
 
     /// Adds a list.
-    pub fn list(&mut self, items: &[Vec<Part>]) {
+    pub fn list(&mut self, items: &[Text]) {
         self.body.tag("ul").open();
         for item in items {
-            self.body.tag("li").open();
-            write_parts(&mut self.body, item);
-            self.body.close("li");
+            write_text(&mut self.body, "li", "", item);
         }
         self.body.close("ul");
     }
@@ -148,32 +175,27 @@ impl Page {
         let number = self.figures.len() + 1;
         let begin = self.body.size();
         let body = &mut self.body;
-        body.tag("figure")
-            .with("id", &format!("figure-{number}"))
-            .open();
-        body.tag("div").with("class", "panels").open();
+        let id = format!("figure-{number}");
+        body.tag("figure").with("id", &id).open();
+        body.tag("div").class("panels").open();
         for panel in &figure.panels {
             let class = if panel.is_wide { "panel wide" } else { "panel" };
-            body.tag("div").with("class", class).open();
+            body.tag("div").class(class).open();
             if !panel.heading.is_empty() {
-                body.tag("p").with("class", "name").content(&panel.heading);
+                body.tag("p").class("name").content(&panel.heading);
             }
-            body.tag("div").with("class", "scroll").open();
+            body.tag("div").class("scroll").open();
             body.add(&panel.svg);
             body.close("div");
             body.close("div");
         }
         body.close("div");
 
-        body.tag("figcaption").open();
-        body.tag("b").content(&format!("Figure {number}."));
-        body.text(" ");
-        write_parts(body, &figure.caption);
-        body.close("figcaption");
+        write_caption(body, &format!("Figure {number}."), &figure.caption);
         if let Some(table) = &figure.table {
             body.tag("details").open();
-            body.tag("summary")
-                .content(&format!("Numbers of figure {number}"));
+            let summary = format!("Numbers of figure {number}");
+            body.tag("summary").content(&summary);
             table.write(body);
             body.close("details");
         }
@@ -182,31 +204,21 @@ impl Page {
         number
     }
 
-    /// Adds a table and returns its number.
-    pub fn table(&mut self, caption: &[Part], table: &Table) -> usize {
+    /// Adds a table.
+    pub fn table(&mut self, caption: impl Into<Text>, table: &Table) {
         self.tables += 1;
         let number = self.tables;
-
         let body = &mut self.body;
-        body.tag("figure")
-            .with("class", "table")
-            .with("id", &format!("table-{number}"))
-            .open();
-
-        body.tag("figcaption").open();
-        body.tag("b").content(&format!("Table {number}."));
-        body.text(" ");
-        write_parts(body, caption);
-        body.close("figcaption");
+        let id = format!("table-{number}");
+        body.tag("figure").class("table").with("id", &id).open();
+        write_caption(body, &format!("Table {number}."), &caption.into());
         table.write(body);
         body.close("figure");
-
-        number
     }
 
     /// Adds commands, one a line, to be copied.
     pub fn commands(&mut self, commands: &[String]) {
-        self.body.tag("pre").with("class", "command").open();
+        self.body.tag("pre").class("command").open();
         for command in commands {
             self.body.tag("code").content(command);
             self.body.add("\n");
@@ -216,10 +228,9 @@ impl Page {
 
     /// Adds a file, whole, behind its name.
     pub fn file(&mut self, name: &str, text: &str) {
-        self.body.tag("details").open();
-        self.body.tag("summary").content(name);
+        self.begin_details(name);
         self.body.tag("pre").lines(text);
-        self.body.close("details");
+        self.end_details();
     }
 
     /// Opens a part that readers unfold; [`Self::end_details`] closes it.
@@ -282,18 +293,14 @@ fn begin(title: &str) -> Markup {
     page.tag("html").with("lang", "en").open();
     page.tag("head").open();
     page.tag("meta").with("charset", "utf-8").empty();
-    page.tag("meta")
-        .with("http-equiv", "Content-Security-Policy")
-        .with("content", POLICY)
-        .empty();
-    page.tag("meta")
-        .with("name", "viewport")
-        .with("content", "width=device-width, initial-scale=1")
-        .empty();
-    page.tag("meta")
-        .with("name", "color-scheme")
-        .with("content", "light dark")
-        .empty();
+    for (kind, name, content) in [
+        ("http-equiv", "Content-Security-Policy", POLICY),
+        ("name", "viewport", "width=device-width, initial-scale=1"),
+        ("name", "color-scheme", "light dark"),
+    ] {
+        let tag = page.tag("meta").with(kind, name);
+        tag.with("content", content).empty();
+    }
     page.tag("title").content(title);
     page.style(&sheet());
     page.close("head");
@@ -314,9 +321,8 @@ fn end(mut page: Markup) -> String {
 fn write_contents(page: &mut Markup, sections: &[(String, String)]) {
     page.tag("nav").with("aria-label", "Contents").open();
     for (heading, id) in sections {
-        page.tag("a")
-            .with("href", &format!("#{id}"))
-            .content(heading);
+        let tag = page.tag("a").with("href", &format!("#{id}"));
+        tag.content(heading);
     }
     page.close("nav");
 }
@@ -331,16 +337,17 @@ fn kept_together(text: &str) -> String {
     text
 }
 
-fn write_parts(markup: &mut Markup, parts: &[Part]) {
-    for part in parts {
-        match part {
-            Part::Text(text) => markup.text(&kept_together(text)),
-            Part::Strong(text) => markup.tag("strong").content(text),
-            Part::Code(text) => markup.tag("code").content(text),
-            Part::Link(text, id) => markup
-                .tag("a")
-                .with("href", &format!("#{id}"))
-                .content(text),
-        }
-    }
+/// Writes an element with a text.
+fn write_text(markup: &mut Markup, element: &'static str, class: &str, text: &Text) {
+    markup.tag(element).class(class).open();
+    text.write(markup);
+    markup.close(element);
+}
+
+fn write_caption(markup: &mut Markup, number: &str, caption: &Text) {
+    markup.tag("figcaption").open();
+    markup.tag("b").content(number);
+    markup.plain(" ");
+    caption.write(markup);
+    markup.close("figcaption");
 }

@@ -1,12 +1,25 @@
-//! A linear scale from values to pixels, with round ticks.
+//! A scale from values to pixels, with round ticks: linear, but for gaps, which are narrower.
 
-/// From values to pixels.
+use std::fmt::Write;
+
+/// A piece of a scale, linear in itself.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Scale {
+pub(crate) struct Piece {
     pub(crate) from: f64,
     pub(crate) to: f64,
     pub(crate) from_px: f64,
     pub(crate) to_px: f64,
+    /// Whether it is not to scale.
+    pub(crate) is_gap: bool,
+}
+
+/// From values to pixels.
+#[derive(Debug, Clone)]
+pub(crate) struct Scale {
+    /// At least one, each from the end of the one before.
+    pieces: Vec<Piece>,
+    /// Pixels for each unit outside of gaps; negative if larger values have smaller places.
+    px: f64,
 }
 
 impl Scale {
@@ -21,34 +34,113 @@ impl Scale {
             (0.0, 1.0)
         };
 
-        Self {
-            from,
-            to,
-            from_px,
-            to_px,
+        let px = (to_px - from_px) / (to - from);
+        Self::with_gaps((from, to), &[], from_px, px, 0.0)
+    }
+
+    /// A scale with `px` pixels for each unit, except in gaps, which have `gap_px` pixels each.
+    pub(crate) fn with_gaps(
+        (from, to): (f64, f64),
+        gaps: &[(f64, f64)],
+        from_px: f64,
+        px: f64,
+        gap_px: f64,
+    ) -> Self {
+        let mut pieces: Vec<Piece> = Vec::new();
+        let mut add = |to: f64, is_gap: bool| {
+            let last = pieces.last().map(|piece| (piece.to, piece.to_px));
+            let (from, from_px) = last.unwrap_or((from, from_px));
+            let width = if is_gap { gap_px } else { (to - from) * px };
+            pieces.push(Piece {
+                from,
+                to,
+                from_px,
+                to_px: from_px + width,
+                is_gap,
+            });
+        };
+        for (begin, end) in gaps {
+            add(*begin, false);
+            add(*end, true);
         }
+        add(to, false);
+        Self { pieces, px }
+    }
+
+    /// The gaps, from left to right.
+    pub(crate) fn gaps(&self) -> Vec<Piece> {
+        let mut gaps = self.pieces.clone();
+        gaps.retain(|piece| piece.is_gap);
+        gaps
+    }
+
+    fn first(&self) -> Piece {
+        self.pieces[0]
+    }
+
+    fn last(&self) -> Piece {
+        self.pieces[self.pieces.len() - 1]
+    }
+
+    /// The least and the largest value.
+    pub(crate) fn range(&self) -> (f64, f64) {
+        (self.first().from, self.last().to)
+    }
+
+    /// Where the scale begins.
+    pub(crate) fn from_px(&self) -> f64 {
+        self.first().from_px
+    }
+
+    /// Where the scale ends.
+    pub(crate) fn to_px(&self) -> f64 {
+        self.last().to_px
     }
 
     /// The place of a value. Values outside of the range are at its ends.
     pub(crate) fn at(&self, value: f64) -> f64 {
-        let share = (value - self.from) / (self.to - self.from);
+        let index = self.pieces.partition_point(|piece| piece.to <= value);
+        let piece = self.pieces.get(index).copied().unwrap_or(self.last());
+        let share = (value - piece.from) / (piece.to - piece.from);
         let share = if share.is_nan() { 0.0 } else { share };
-        self.from_px + share.clamp(0.0, 1.0) * (self.to_px - self.from_px)
+        piece.from_px + share.clamp(0.0, 1.0) * (piece.to_px - piece.from_px)
     }
 
-    /// Round values within the range, about so many, and the decimals with which they are written.
-    pub(crate) fn ticks(&self, about: usize) -> (Vec<f64>, usize) {
-        let step = round_step((self.to - self.from) / about.max(1) as f64);
-        let first = (self.from / step - 1e-9).ceil();
-        let last = (self.to / step + 1e-9).floor();
+    /// Round values outside of gaps, at least so many pixels apart, and the decimals with which they are written.
+    pub(crate) fn ticks(&self, least_px: f64) -> (Vec<f64>, usize) {
+        let step = round_step(least_px / self.px.abs());
+        (self.multiples(step, 1e-9), step_decimals(step))
+    }
 
-        let mut ticks = Vec::new();
-        let mut at = first;
-        while at <= last && ticks.len() < 100 {
-            ticks.push(at * step);
-            at += 1.0;
+    /// Round whole values outside of gaps, at least so many pixels apart. The end of a piece is not in it.
+    pub(crate) fn whole_ticks(&self, least_px: f64) -> Vec<f64> {
+        self.multiples(round_step(least_px / self.px.abs()).max(1.0), -1e-9)
+    }
+
+    /// The multiples of a step outside of gaps, up to so many steps after the end of each piece.
+    fn multiples(&self, step: f64, after: f64) -> Vec<f64> {
+        let mut multiples = Vec::new();
+        for piece in self.pieces.iter().filter(|piece| !piece.is_gap) {
+            // Not "-0".
+            let mut number = (piece.from / step - 1e-9).ceil() + 0.0;
+            while number <= piece.to / step + after && multiples.len() < 1000 {
+                multiples.push(number * step);
+                number += 1.0;
+            }
         }
-        (ticks, step_decimals(step))
+        multiples
+    }
+
+    /// Points of the piecewise linear function from pixels to values, `px value` each, for programs that look for the value at a
+    /// place of the picture.
+    pub(crate) fn knots(&self) -> String {
+        let mut text = String::new();
+        for piece in &self.pieces {
+            // Infallible: it is written to memory.
+            let _ = write!(text, "{:.1} {}, ", piece.from_px, piece.from);
+        }
+        let _ = write!(text, "{:.1} {}", self.to_px(), self.last().to);
+        text
     }
 }
 
@@ -100,13 +192,9 @@ mod tests {
     #[test]
     fn ticks_are_round() {
         let scale = Scale::new(0.0, 600.0, 0.0, 300.0);
-        assert_eq!(
-            scale.ticks(4),
-            (vec![0.0, 200.0, 400.0, 600.0], 0),
-            "a step of at least 150"
-        );
+        assert_eq!(scale.ticks(75.0), (vec![0.0, 200.0, 400.0, 600.0], 0));
         let scale = Scale::new(-0.03, 0.11, 0.0, 300.0);
-        let (ticks, decimals) = scale.ticks(4);
+        let (ticks, decimals) = scale.ticks(75.0);
         assert_eq!(decimals, 2);
         assert_eq!(ticks.len(), 3, "{ticks:?}");
     }
@@ -123,8 +211,17 @@ mod tests {
         for (from, to) in ranges {
             let scale = Scale::new(from, to, 10.0, 20.0);
             assert!((10.0..=20.0).contains(&scale.at(from)), "{from} to {to}");
-            assert!(!scale.ticks(5).0.is_empty());
+            assert!(!scale.ticks(2.0).0.is_empty());
         }
+    }
+
+    #[test]
+    fn a_gap_has_its_own_width_and_no_ticks() {
+        let scale = Scale::with_gaps((0.0, 100.0), &[(30.0, 90.0)], 10.0, 2.0, 20.0);
+        let places = [0.0, 30.0, 60.0, 90.0, 100.0, 200.0].map(|value| scale.at(value));
+        assert_eq!(places, [10.0, 70.0, 80.0, 90.0, 110.0, 110.0]);
+        assert_eq!(scale.whole_ticks(20.0), [0.0, 10.0, 20.0, 90.0]);
+        assert_eq!(scale.knots(), "10.0 0, 70.0 30, 90.0 90, 110.0 100");
     }
 
     #[test]

@@ -1,37 +1,7 @@
 //! Tables of numbers, which can be copied.
 
 use crate::markup::Markup;
-
 use crate::number::fixed;
-
-/// A column of a table.
-#[derive(Debug, Clone)]
-pub struct Column {
-    /// Its head, with the unit.
-    pub name: String,
-    /// Whether it has numbers, which stand at its right.
-    pub is_number: bool,
-}
-
-impl Column {
-    /// A column of texts.
-    #[must_use]
-    pub fn text(name: &str) -> Self {
-        Self {
-            name: name.to_owned(),
-            is_number: false,
-        }
-    }
-
-    /// A column of numbers.
-    #[must_use]
-    pub fn number(name: &str) -> Self {
-        Self {
-            name: name.to_owned(),
-            is_number: true,
-        }
-    }
-}
 
 /// A cell of a table.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,50 +19,83 @@ pub enum Cell {
 }
 
 impl Cell {
-    /// A text.
-    #[must_use]
-    pub fn text(text: impl Into<String>) -> Self {
-        Self::Text(text.into())
+    /// Whether the column of the cell has numbers, which stand at its right.
+    fn is_number(&self) -> bool {
+        matches!(self, Self::Count(_) | Self::Number(..))
+    }
+}
+
+impl From<&str> for Cell {
+    fn from(text: &str) -> Self {
+        Self::Text(text.to_owned())
+    }
+}
+
+impl From<String> for Cell {
+    fn from(text: String) -> Self {
+        Self::Text(text)
+    }
+}
+
+impl From<u64> for Cell {
+    fn from(count: u64) -> Self {
+        Self::Count(count)
+    }
+}
+
+impl From<usize> for Cell {
+    fn from(count: usize) -> Self {
+        Self::Count(count as u64)
     }
 }
 
 /// A table. The first cell of each row is its head.
 #[derive(Debug, Clone, Default)]
 pub struct Table {
-    /// The columns.
-    pub columns: Vec<Column>,
+    columns: Vec<String>,
     /// The rows.
     pub rows: Vec<Vec<Cell>>,
 }
 
 impl Table {
-    /// An empty table.
+    /// An empty table with these columns, whose names have their units and are separated by ` | `.
     #[must_use]
-    pub fn new(columns: Vec<Column>) -> Self {
+    pub fn new(columns: &str) -> Self {
         Self {
-            columns,
+            columns: columns.split(" | ").map(str::to_owned).collect(),
             rows: Vec::new(),
         }
     }
 
+    /// Adds a row.
+    pub fn row(&mut self, cells: impl Into<Vec<Cell>>) {
+        self.rows.push(cells.into());
+    }
+
     /// Writes the table.
     pub(crate) fn write(&self, markup: &mut Markup) {
+        let mut classes = vec![""; self.columns.len()];
+        for row in &self.rows {
+            for (class, cell) in classes.iter_mut().zip(row) {
+                if cell.is_number() {
+                    *class = "number";
+                }
+            }
+        }
+
         markup
             .tag("div")
-            .with("class", "scroll")
+            .class("scroll")
             .with("tabindex", "0")
             .with("role", "region")
             .with("aria-label", "Table")
             .open();
-        markup.tag("table").open();
-        markup.tag("thead").open();
-        markup.tag("tr").open();
-        for column in &self.columns {
-            let mut tag = markup.tag("th").with("scope", "col");
-            if column.is_number {
-                tag = tag.with("class", "number");
-            }
-            tag.content(&column.name);
+        for element in ["table", "thead", "tr"] {
+            markup.tag(element).open();
+        }
+        for (column, class) in self.columns.iter().zip(&classes) {
+            let tag = markup.tag("th").with("scope", "col");
+            tag.class(class).content(column);
         }
         markup.close("tr");
         markup.close("thead");
@@ -100,30 +103,24 @@ impl Table {
         markup.tag("tbody").open();
         for row in &self.rows {
             markup.tag("tr").open();
-            for (index, cell) in row.iter().enumerate() {
-                let name = if index == 0 { "th" } else { "td" };
-                let is_number = self
-                    .columns
-                    .get(index)
-                    .is_some_and(|column| column.is_number);
-                write_cell(markup, name, is_number, cell);
+            for (index, (cell, class)) in row.iter().zip(&classes).enumerate() {
+                write_cell(markup, index == 0, class, cell);
             }
             markup.close("tr");
         }
-        markup.close("tbody");
-        markup.close("table");
-        markup.close("div");
+        for element in ["tbody", "table", "div"] {
+            markup.close(element);
+        }
     }
 }
 
-fn write_cell(markup: &mut Markup, name: &'static str, is_number: bool, cell: &Cell) {
-    let mut tag = markup.tag(name);
-    if name == "th" {
+fn write_cell(markup: &mut Markup, is_head: bool, class: &str, cell: &Cell) {
+    let element = if is_head { "th" } else { "td" };
+    let mut tag = markup.tag(element);
+    if is_head {
         tag = tag.with("scope", "row");
     }
-    if is_number {
-        tag = tag.with("class", "number");
-    }
+    let tag = tag.class(class);
 
     match cell {
         Cell::Text(text) => tag.content(text),
@@ -132,15 +129,13 @@ fn write_cell(markup: &mut Markup, name: &'static str, is_number: bool, cell: &C
         Cell::Code(text) => {
             tag.open();
             markup.tag("code").content(text);
-            markup.close(name);
+            markup.close(element);
         }
         Cell::Number(value, decimals) => {
             tag.open();
-            markup
-                .tag("data")
-                .with("value", &format!("{value:?}"))
-                .content(&fixed(*value, *decimals));
-            markup.close(name);
+            let data = markup.tag("data").with("value", &format!("{value:?}"));
+            data.content(&fixed(*value, *decimals));
+            markup.close(element);
         }
     }
 }

@@ -8,11 +8,12 @@
 use std::collections::BTreeMap;
 
 use pictures::{
-    Band, BandRow, Bands, Cell, Column, Curve, Estimate, Figure, Floor, IntervalRow, Intervals,
-    Matrix, MatrixCell, MatrixLabel, Page, Panel, Part, State, Step, Steps, Table, Trend,
-    TrendLine, TrendPoint,
+    Band, BandRow, Bands, Cell, Curve, Estimate, Figure, Floor, IntervalRow, Intervals, Matrix,
+    MatrixCell, MatrixLabel, Page, Panel, Step, Steps, Table, Text, Trend, TrendLine, TrendPoint,
+    state_class,
 };
 use roxmltree::{Document, Node, ParsingOptions};
+use timeline::Kind;
 
 /// A text that would leave its place if it were not escaped.
 const HOSTILE: &str = "</svg><script>alert(\"1\")</script>&amp;'\u{1b}[31m\u{202e}\u{0}]]>";
@@ -70,7 +71,7 @@ fn bands_are_as_many_as_the_states() {
     }
     let chart = Bands {
         title: HOSTILE.to_owned(),
-        state: State::Emotion,
+        kind: Kind::Emotion,
         end_s: 40.0,
         rows: vec![BandRow {
             label: HOSTILE.to_owned(),
@@ -99,7 +100,7 @@ fn a_long_row_has_a_bounded_size() {
     }
     let chart = Bands {
         title: "long".to_owned(),
-        state: State::Behavior,
+        kind: Kind::Behavior,
         end_s: 500_000.0,
         rows: vec![BandRow {
             label: "one".to_owned(),
@@ -117,7 +118,7 @@ fn a_matrix_has_a_cell_for_each_value() {
         let labels: Vec<MatrixLabel> = (0..size)
             .map(|index| MatrixLabel {
                 text: format!("{HOSTILE}{index}"),
-                color: Some(State::Behavior.class("WAIT")),
+                color: Some(state_class(Kind::Behavior, "WAIT")),
             })
             .collect();
         let mut cells = Vec::new();
@@ -190,7 +191,6 @@ fn intervals_have_a_marker_for_each_estimate() {
         title: "served".to_owned(),
         axis: "served".to_owned(),
         range: (0.0, 20.0),
-        decimals: 1,
         reference: Some(0.0),
         rows,
     };
@@ -222,7 +222,6 @@ fn a_trend_has_a_marker_for_each_estimate_and_each_name() {
         y_axis: "served".to_owned(),
         levels: levels.iter().map(|x| (*x, x.to_string())).collect(),
         range: (0.0, 110.0),
-        decimals: 1,
         reference: None,
         lines,
     };
@@ -253,7 +252,6 @@ fn the_arms_at_a_value_are_nearer_to_it_than_to_the_next_one() {
         y_axis: String::new(),
         levels: levels.iter().map(|x| (*x, x.to_string())).collect(),
         range: (0.0, 1.0),
-        decimals: 1,
         reference: None,
         lines,
     };
@@ -285,7 +283,6 @@ fn intervals_with_one_range_have_one_axis() {
         title: String::new(),
         axis: String::new(),
         range: (-400.0, 100.0),
-        decimals: 1,
         reference: Some(0.0),
         rows: vec![IntervalRow {
             label: "arm".to_owned(),
@@ -335,7 +332,7 @@ fn a_matrix_is_as_wide_as_its_numbers_need() {
 #[test]
 fn numbers_stay_with_their_units_and_relations() {
     let mut page = Page::new("kind", "title");
-    page.paragraph(&[Part::text("n = 32, p < 0.05, 95 %"), Part::code("a = 1 %")]);
+    page.paragraph(Text::from("n = 32, p < 0.05, 95 %").code("a = 1 %"));
     let html = page.finish();
     assert!(html.contains("n\u{a0}=\u{a0}32, p\u{a0}&lt;\u{a0}0.05, 95\u{a0}%"));
     assert!(html.contains("a = 1 %"));
@@ -379,7 +376,7 @@ fn curves_are_thinned_to_what_can_be_seen() {
 fn charts_of_nothing_are_drawn() {
     let bands = Bands {
         title: String::new(),
-        state: State::Emotion,
+        kind: Kind::Emotion,
         end_s: 0.0,
         rows: Vec::new(),
     };
@@ -399,7 +396,6 @@ fn charts_of_nothing_are_drawn() {
         y_axis: String::new(),
         levels: Vec::new(),
         range: (f64::INFINITY, f64::NEG_INFINITY),
-        decimals: 0,
         reference: Some(0.0),
         lines: Vec::new(),
     };
@@ -409,22 +405,18 @@ fn charts_of_nothing_are_drawn() {
 #[test]
 fn a_page_is_well_formed_and_loads_nothing() {
     let mut page = Page::new(HOSTILE, HOSTILE);
-    page.lead(&[Part::text(HOSTILE), Part::strong(HOSTILE)]);
+    page.lead(Text::from(HOSTILE).strong(HOSTILE));
     page.section(HOSTILE);
-    let mut table = Table::new(vec![Column::text(HOSTILE), Column::number("n")]);
-    table
-        .rows
-        .push(vec![Cell::text(HOSTILE), Cell::Number(0.1 + 0.2, 1)]);
-    table
-        .rows
-        .push(vec![Cell::Code(HOSTILE.to_owned()), Cell::Empty]);
+    let mut table = Table::new(&format!("{HOSTILE} | n"));
+    table.row([HOSTILE.into(), Cell::Number(0.1 + 0.2, 1)]);
+    table.row([Cell::Code(HOSTILE.to_owned()), Cell::Empty]);
     let figure = Figure {
         panels: vec![Panel {
             heading: HOSTILE.to_owned(),
             svg: String::new(),
             is_wide: false,
         }],
-        caption: vec![Part::code(HOSTILE)],
+        caption: Text::default().code(HOSTILE),
         table: Some(table),
     };
     assert_eq!(page.figure(&figure), 1);

@@ -5,7 +5,8 @@
     reason = "a test that cannot set up its subject fails"
 )]
 
-use pictures::diagram::{Diagram, MAX_ITEMS, Options, TooMuch, style, width_px};
+use pictures::diagram::{Diagram, MAX_ITEMS, Options, TooMuch};
+use pictures::{style, width_px};
 use protocol::event::Cause;
 use protocol::messages::{Awaited, FaultKind, Performative, Point, Reason};
 use protocol::{Event, RobotName, Tick};

@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 
-use pictures::Page;
 use lab::diagram::{Options, Window, draw};
 use lab::experiment::PLAN;
 use lab::folder::{recorded_epoch, recorded_epochs};
 use lab::moment::Moment;
 use lab::report::{page_of_experiment, page_of_runs};
+use pictures::Page;
 use pyo3::prelude::*;
 use record::RunFolder;
 

@@ -27,6 +27,12 @@ impl Period {
         Self { begin: tick, end }
     }
 
+    /// Whether it is not over before a tick.
+    #[must_use]
+    pub fn lasts_to(self, tick: Tick) -> bool {
+        self.end.is_none_or(|end| end >= tick)
+    }
+
     /// Its number of ticks. If it is in progress, it is counted up to the tick `now`, which is not part of it.
     #[must_use]
     pub fn ticks(self, now: Tick) -> Tick {

@@ -49,7 +49,9 @@ impl Provenance {
         let command = std::env::args_os().skip(1);
         Self {
             program: Program::this(),
-            command: command.map(|arg| arg.to_string_lossy().into_owned()).collect(),
+            command: command
+                .map(|arg| arg.to_string_lossy().into_owned())
+                .collect(),
             written_unix_s: written.map_or(0, |since| since.as_secs()),
             machine: Machine::this(),
         }

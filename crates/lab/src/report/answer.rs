@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use observe::Measure;
-use pictures::Part;
+use pictures::Text;
 use statistics::{Estimate, Interval};
 
 use super::study::{Study, is_shown, label};
@@ -13,53 +13,43 @@ use crate::experiment::{Contrast, Difference, SHOWN_P, least_p_holm};
 const MAX_NAMED: usize = 8;
 
 /// What all comparisons show, in one or two sentences.
-pub(super) fn lead(study: &Study<'_>) -> Vec<Part> {
+pub(super) fn lead(study: &Study<'_>) -> Text {
     let tested = study.contrasts.iter().filter(|one| one.p_holm.is_some());
     let all = tested.count();
     let Some(first) = study.contrasts.first() else {
-        return vec![Part::text(
-            "No arms are compared: the experiment has no baseline, or no measure with `contrast = true`, or no seed was played in both arms. Its estimates are below.",
-        )];
+        return "No arms are compared: the experiment has no baseline, or no measure with `contrast = true`, or no seed was played in both arms. Its estimates are below.".into();
     };
 
-    let mut parts = Vec::new();
-    let shown = study
-        .contrasts
-        .iter()
-        .filter(|contrast| is_shown(contrast))
-        .count();
-    parts.push(Part::text(format!("Of {all} comparisons with the arm ")));
-    parts.push(Part::strong(&first.baseline));
-    parts.push(Part::text(format!(
-        ", {shown} show a difference after Holm's correction over the comparisons of each measure: "
-    )));
+    let count_shown = |contrasts: &[&Contrast]| {
+        let shown = contrasts.iter().filter(|contrast| is_shown(contrast));
+        shown.count()
+    };
+    let contrasts: Vec<&Contrast> = study.contrasts.iter().collect();
+    let shown = count_shown(&contrasts);
     let mut counts = Vec::new();
     for measure in study.measures() {
         let contrasts = study.contrasts_of(measure);
         if let Some(first) = contrasts.first() {
-            let shown = contrasts
-                .iter()
-                .filter(|contrast| is_shown(contrast))
-                .count();
-            counts.push(format!(
-                "{shown} of {} in {}",
-                first.comparisons,
-                label(measure)
-            ));
+            let (shown, of) = (count_shown(&contrasts), first.comparisons);
+            counts.push(format!("{shown} of {of} in {}", label(measure)));
         }
     }
-    parts.push(Part::text(format!("{}.", counts.join(", "))));
-    if all < study.contrasts.len() {
-        parts.push(Part::text(format!(
-            " {} more cannot be made: there are too few pairs of runs with a number, or their differences are not finite.",
-            study.contrasts.len() - all
-        )));
+    let counts = counts.join(", ");
+    let text = Text::from(format!("Of {all} comparisons with the arm "));
+    let text = text.strong(&first.baseline).text(format!(
+        ", {shown} show a difference after Holm's correction over the comparisons of each measure: {counts}."
+    ));
+    let others = study.contrasts.len() - all;
+    if others == 0 {
+        return text;
     }
-    parts
+    text.text(format!(
+        " {others} more cannot be made: there are too few pairs of runs with a number, or their differences are not finite."
+    ))
 }
 
 /// What the comparisons in a measure show: a sentence for each arm and direction, and what is not shown.
-pub(super) fn sentences(study: &Study<'_>, measure: &Measure) -> Vec<Vec<Part>> {
+pub(super) fn sentences(study: &Study<'_>, measure: &Measure) -> Vec<Text> {
     let mut contrasts = study.contrasts_of(measure);
     contrasts.retain(|contrast| contrast.p_holm.is_some());
     let mut shown: BTreeMap<(usize, bool), Vec<&Contrast>> = BTreeMap::new();
@@ -73,7 +63,8 @@ pub(super) fn sentences(study: &Study<'_>, measure: &Measure) -> Vec<Vec<Part>> 
         let Some(arm) = arm else {
             continue;
         };
-        let is_more = direction(&contrast.difference) > 0.0;
+        // Its numbers are larger, or its event comes later or in fewer runs.
+        let is_more = mean(contrast).is_some_and(|mean| mean.value > 0.0);
         shown.entry((arm, is_more)).or_default().push(contrast);
     }
 
@@ -87,25 +78,20 @@ pub(super) fn sentences(study: &Study<'_>, measure: &Measure) -> Vec<Vec<Part>> 
     sentences
 }
 
-/// Which way an arm differs from the baseline: above 0 if its numbers are larger, or its event comes later or in fewer runs.
-fn direction(difference: &Difference) -> f64 {
-    match difference {
-        Difference::Number { mean, .. } => mean.value,
+/// The mean difference of a contrast: that of its numbers, or of its times.
+fn mean(contrast: &Contrast) -> Option<&Estimate> {
+    match &contrast.difference {
+        Difference::Number { mean, .. } => Some(mean),
         Difference::Time {
             restricted_mean_s, ..
-        } => restricted_mean_s.value,
-        Difference::NoPair | Difference::NotFinite => f64::NAN,
+        } => Some(restricted_mean_s),
+        Difference::NoPair | Difference::NotFinite => None,
     }
 }
 
-fn sentence(
-    study: &Study<'_>,
-    measure: &Measure,
-    contrasts: &[&Contrast],
-    is_more: bool,
-) -> Vec<Part> {
+fn sentence(study: &Study<'_>, measure: &Measure, contrasts: &[&Contrast], is_more: bool) -> Text {
     let Some(first) = contrasts.first() else {
-        return Vec::new();
+        return Text::default();
     };
 
     let how = match (measure.is_time(), is_more) {
@@ -114,13 +100,8 @@ fn sentence(
         (true, true) => "comes later or in fewer runs than with",
         (true, false) => "comes earlier or in more runs than with",
     };
-    let mut parts = vec![
-        Part::text("With "),
-        Part::strong(&first.arm),
-        Part::text(format!(", {} {how} ", label(measure))),
-        Part::strong(&first.baseline),
-        Part::text(": "),
-    ];
+    let with_arm = Text::from("With ").strong(&first.arm);
+    let compared = with_arm.text(format!(", {} {how} ", label(measure)));
 
     let mut named = Vec::new();
     for contrast in contrasts.iter().take(MAX_NAMED) {
@@ -133,16 +114,12 @@ fn sentence(
         named.push(format!("{under}({})", numbers(measure, contrast)));
     }
 
-    let mut text = named.join("; ");
+    let mut text = format!(": {}", named.join("; "));
     if contrasts.len() > MAX_NAMED {
-        text += &format!(
-            "; and {} more, which are in the table",
-            contrasts.len() - MAX_NAMED
-        );
+        let others = contrasts.len() - MAX_NAMED;
+        text += &format!("; and {others} more, which are in the table");
     }
-
-    parts.push(Part::text(text + "."));
-    parts
+    compared.strong(&first.baseline).text(text + ".")
 }
 
 /// The name of a condition, whose lines break between its factors only.
@@ -192,22 +169,17 @@ pub(super) fn p_value(p: f64) -> String {
     format!("p = {p:.3}")
 }
 
-fn not_shown(measure: &Measure, contrasts: &[&Contrast], others: usize) -> Vec<Part> {
+fn not_shown(measure: &Measure, contrasts: &[&Contrast], others: usize) -> Text {
     let all = contrasts.len();
     let what = if others == all {
-        format!(
-            "In none of the {all} comparisons do the data show a difference in {}",
-            label(measure)
-        )
+        format!("In none of the {all} comparisons do the data")
     } else {
-        format!(
-            "In the other {others} of {all} comparisons the data do not show a difference in {}",
-            label(measure)
-        )
+        format!("In the other {others} of {all} comparisons the data do not")
     };
     let mut text = format!(
-        "{what}: p is not below {SHOWN_P} after the correction{}. This is no evidence that there is none; the intervals show how \
+        "{what} show a difference in {}: p is not below {SHOWN_P} after the correction{}. This is no evidence that there is none; the intervals show how \
          large one could be.",
+        label(measure),
         with_zero(contrasts)
     );
 
@@ -218,7 +190,7 @@ fn not_shown(measure: &Measure, contrasts: &[&Contrast], others: usize) -> Vec<P
              more seeds."
         );
     }
-    vec![Part::text(text)]
+    text.into()
 }
 
 /// How many of the differences that are not shown have an interval with zero in it.
@@ -226,15 +198,7 @@ fn with_zero(contrasts: &[&Contrast]) -> String {
     let mut count = 0;
     let mut all = 0;
     for contrast in contrasts.iter().filter(|contrast| !is_shown(contrast)) {
-        let difference = match &contrast.difference {
-            Difference::Number { mean, .. } => mean,
-            Difference::Time {
-                restricted_mean_s, ..
-            } => restricted_mean_s,
-            Difference::NoPair | Difference::NotFinite => continue,
-        };
-
-        let Some((low, high)) = difference.bounds() else {
+        let Some((low, high)) = mean(contrast).and_then(Estimate::bounds) else {
             continue;
         };
         all += 1;

@@ -1,13 +1,17 @@
 //! The course of a run: its states over time and its space-time diagram.
 
-use protocol::Tick;
+use pictures::{BandRow, Bands, Panel};
+use protocol::{RobotName, Tick};
 use record::EpochFiles;
-use pictures::{BandRow, Bands, Panel, State};
+use timeline::Kind;
 
 use super::facts::{RobotFacts, RunFacts, States};
 use crate::diagram::{Options, Window, draw};
 use crate::moment::Moment;
 
+/// How a space-time diagram is read.
+pub(super) const READ_DIAGRAM: &str = "to be read line by line: robots are lanes, with emotion above behavior; a slanted line is a \
+     command, from the tick it was sent to the tick it arrived; a cross is where one was lost. n = 1 run.";
 /// Ticks of one line of a space-time diagram, in which commands are told apart.
 const LINE_TICKS: Tick = 150;
 /// Most ticks of a line.
@@ -20,45 +24,40 @@ const MAX_DIAGRAM_BYTES: usize = 400_000;
 const LINE_PX: f64 = 620.0;
 
 /// The states of the robots of one run over time; `None` if they have none.
-pub(super) fn run_panel(facts: &RunFacts, state: State, what: &str) -> Option<Panel> {
-    let mut rows = Vec::new();
-    for (name, robot) in &facts.robots {
-        rows.push(BandRow {
-            label: name.to_string(),
-            bands: states_of(robot, state).bands.clone(),
-        });
-    }
-    state_panel(rows, state, facts.time_s(), what, "")
+pub(super) fn run_panel(facts: &RunFacts, kind: Kind) -> Option<Panel> {
+    let row = |(name, robot): (&RobotName, &RobotFacts)| BandRow {
+        label: name.to_string(),
+        bands: states_of(robot, kind).bands.clone(),
+    };
+    let rows: Vec<BandRow> = facts.robots.iter().map(row).collect();
+    let has_states = rows.iter().any(|row| !row.bands.is_empty());
+    has_states.then(|| state_panel(rows, kind, facts.time_s(), ""))
 }
 
-/// Rows of states over time; `None` if there are no states.
-pub(super) fn state_panel(
-    rows: Vec<BandRow>,
-    state: State,
-    end_s: f64,
-    what: &str,
-    heading: &str,
-) -> Option<Panel> {
-    let bands = rows.iter().map(|row| row.bands.len()).sum::<usize>();
+/// Rows of states over time.
+pub(super) fn state_panel(rows: Vec<BandRow>, kind: Kind, end_s: f64, heading: &str) -> Panel {
     let chart = Bands {
-        title: format!("{what} over time {heading}").trim_end().to_owned(),
-        state,
+        title: format!("{} over time {heading}", states_in_words(kind)),
+        kind,
         end_s,
         rows,
     };
+    Panel::wide(heading, chart.draw())
+}
 
-    (bands > 0).then(|| Panel {
-        heading: heading.to_owned(),
-        svg: chart.draw(),
-        is_wide: true,
-    })
+/// What the states are.
+pub(super) fn states_in_words(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Emotion => "Emotions",
+        Kind::Behavior => "Behaviors",
+    }
 }
 
 /// The states of one kind.
-pub(super) fn states_of(robot: &RobotFacts, state: State) -> &States {
-    match state {
-        State::Emotion => &robot.emotions,
-        State::Behavior => &robot.behaviors,
+pub(super) fn states_of(robot: &RobotFacts, kind: Kind) -> &States {
+    match kind {
+        Kind::Emotion => &robot.emotions,
+        Kind::Behavior => &robot.behaviors,
     }
 }
 
@@ -99,11 +98,7 @@ pub(super) fn diagram_lines(
         };
         let svg = draw(files, window, options)?.svg;
         bytes += svg.len();
-        lines.push(Panel {
-            heading: String::new(),
-            svg,
-            is_wide: true,
-        });
+        lines.push(Panel::wide("", svg));
         next += length;
     }
     Ok(DiagramLines {

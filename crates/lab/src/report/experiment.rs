@@ -4,15 +4,17 @@ use std::path::Path;
 
 use miette::{IntoDiagnostic, miette};
 use observe::{Measure, Measured};
+use pictures::{Cell, Figure, Page, Table, Text};
 use protocol::RunName;
 use record::{EpochFiles, RunFolder};
-use pictures::{Cell, Column, Figure, Page, Part, State, Table};
+use timeline::Kind;
 
 use super::answer::{lead, sentences};
-use super::course::{diagram_lines, run_panel};
+use super::course::{READ_DIAGRAM, diagram_lines, run_panel};
 use super::facts::RunFacts;
-use super::figures::{Of, differences, distributions, estimates, heat_maps, survival, verdicts};
+use super::figures::{differences, distributions, estimates, heat_maps, survival, verdicts};
 use super::floor::occupancy;
+use super::quantity::Of;
 use super::study::{Study, label};
 use super::transitions::transitions;
 use super::words::{capitalized, counted, utc};
@@ -66,7 +68,7 @@ pub fn page_of_experiment(folder: &Path) -> miette::Result<Page> {
     let study = Study::of(&results);
 
     let mut page = Page::new("Experiment report", &results.plan.experiment.question);
-    page.lead(&lead(&study));
+    page.lead(lead(&study));
     write_answer(&mut page, &study);
     write_design(&mut page, &study);
     write_measures(&mut page, &study);
@@ -86,27 +88,27 @@ fn write_answer(page: &mut Page, study: &Study<'_>) {
     let results = study.results;
     let all = results.plan.units();
     if !results.missing.is_empty() {
-        page.remark(&[Part::text(format!(
+        page.remark(format!(
             "Only {} of {all} runs have been played: these results are preliminary.",
             results.outcomes.len()
-        ))]);
+        ));
     }
     if !results.failures.is_empty() {
-        page.remark(&[Part::text(format!(
+        page.remark(format!(
             "{} could not be played to the end and have no numbers: the results are those of the others.",
             counted(results.failures.len(), "run")
-        ))]);
+        ));
     }
 
     if !results.conflicts.is_empty() {
         let units: Vec<String> = results.conflicts.iter().map(usize::to_string).collect();
         let named = units.len().min(MAX_NAMED);
-        page.remark(&[Part::text(format!(
+        page.remark(format!(
             "{} gave different runs when they were played again, so the results are not reproducible: {}{}.",
             counted(units.len(), "unit"),
             units[..named].join(", "),
             if named < units.len() { " and more" } else { "" }
-        ))]);
+        ));
     }
 
     for measure in study.measures() {
@@ -125,10 +127,10 @@ fn write_design(page: &mut Page, study: &Study<'_>) {
     let explained = experiment.explained();
     let explained = explained.split_whitespace().collect::<Vec<_>>().join(" ");
     if !explained.is_empty() {
-        page.paragraph(&[Part::text(explained)]);
+        page.paragraph(explained);
     }
     let seeds = experiment.seeds.len();
-    page.paragraph(&[Part::text(format!(
+    page.paragraph(format!(
         "{}: {} under {}, with {} each, of {} s of simulated time. Runs with the same seed begin alike and have the same chance in \
          every arm, so arms are compared in pairs.",
         counted(study.results.plan.units(), "run"),
@@ -136,38 +138,31 @@ fn write_design(page: &mut Page, study: &Study<'_>) {
         counted(study.conditions.len(), "condition"),
         counted(seeds, "seed"),
         experiment.duration_s
-    ))]);
+    ));
 
-    let mut arms = Table::new(vec![Column::text("Arm"), Column::text("what it is")]);
+    let mut arms = Table::new("Arm | what it is");
     for arm in study.arms {
         let is_baseline = experiment.baseline.as_ref() == Some(&arm.name);
         let baseline = if is_baseline { " (baseline)" } else { "" };
-        arms.rows.push(vec![
-            Cell::text(format!("{}{baseline}", arm.name)),
-            Cell::text(&arm.what),
-        ]);
+        let name = format!("{}{baseline}", arm.name);
+        arms.row([name.into(), arm.what.as_str().into()]);
     }
     let mut caption = "The arms.".to_owned();
     if study.arms.len() < experiment.arms.len() {
-        caption += &format!(
-            " The first {} of {} are shown.",
-            study.arms.len(),
-            experiment.arms.len()
-        );
+        let (shown, all) = (study.arms.len(), experiment.arms.len());
+        caption += &format!(" The first {shown} of {all} are shown.");
     }
-    page.table(&[Part::text(caption)], &arms);
+    page.table(caption, &arms);
 
-    let mut conditions = Table::new(vec![Column::text("Condition"), Column::text("what it is")]);
+    let mut conditions = Table::new("Condition | what it is");
     for condition in study.conditions {
         if !condition.what.is_empty() {
             let name = study.heading(condition);
-            conditions
-                .rows
-                .push(vec![Cell::text(name), Cell::text(&condition.what)]);
+            conditions.row([name.into(), condition.what.as_str().into()]);
         }
     }
     if !conditions.rows.is_empty() {
-        page.table(&[Part::text("The conditions.")], &conditions);
+        page.table("The conditions.", &conditions);
     }
 }
 
@@ -183,10 +178,10 @@ fn write_measures(page: &mut Page, study: &Study<'_>) {
     }
 
     if !large.is_empty() {
-        page.remark(&[Part::text(format!(
+        page.remark(format!(
             "So that this page stays small, charts and tables of these measures are left out: {}.",
             large.join(", ")
-        ))]);
+        ));
     }
     let mut others = Vec::new();
     for measure in study.measures() {
@@ -195,16 +190,12 @@ fn write_measures(page: &mut Page, study: &Study<'_>) {
         }
     }
     if !others.is_empty() {
-        page.remark(&[
-            Part::text(format!(
-                "Also measured, and not shown by choice of the experiment file: {}. Their numbers are in ",
-                others.join(", ")
-            )),
-            Part::code("runs.csv"),
-            Part::text(" and "),
-            Part::code("results.json"),
-            Part::text("."),
-        ]);
+        let text = Text::from(format!(
+            "Also measured, and not shown by choice of the experiment file: {}. Their numbers are in ",
+            others.join(", ")
+        ));
+        let text = text.code("runs.csv").text(" and ");
+        page.remark(text.code("results.json").text("."));
     }
 }
 
@@ -221,12 +212,8 @@ fn write_measure(page: &mut Page, study: &Study<'_>, measure: &Measure) {
         figures.push(survival(study, measure));
     }
     if study.shows(Shown::Differences) {
-        let of: &[Of] = if is_time {
-            &[Of::Share, Of::Time]
-        } else {
-            &[Of::Mean]
-        };
-        figures.extend(of.iter().filter_map(|of| differences(study, measure, *of)));
+        let all = Of::all(measure).iter();
+        figures.extend(all.filter_map(|of| differences(study, measure, *of)));
     }
     let has_distributions = !is_time && study.shows(Shown::Distributions);
     if figures.is_empty() && !has_distributions {
@@ -235,7 +222,7 @@ fn write_measure(page: &mut Page, study: &Study<'_>, measure: &Measure) {
 
     page.section(&capitalized(label(measure)));
     if let Some(what) = &measure.what {
-        page.paragraph(&[Part::text(format!("{}.", capitalized(what)))]);
+        page.paragraph(format!("{}.", capitalized(what)));
     }
     for figure in &figures {
         page.figure(figure);
@@ -259,27 +246,18 @@ fn write_examples(page: &mut Page, study: &Study<'_>, folder: &Path) {
     let found = typical_and_worst(study, measure);
 
     page.section("Example runs");
-    let mut explained = Vec::new();
+    let (label, baseline) = (label(measure), baseline_name(study));
     if runs.contains(&Example::Typical) {
-        explained.extend([
-            Part::text("The typical run is that of the arm "),
-            Part::strong(baseline_name(study)),
-            Part::text(format!(
-                " whose {} is nearest to the median of all its runs. ",
-                label(measure)
-            )),
-        ]);
-    }
-    if runs.contains(&Example::Worst) {
-        explained.push(Part::text(format!(
-            "The worst run fails most expectations; where runs fail equally many, it is the one whose {} is farthest from the median \
-             of all runs of the arm {}.",
-            label(measure),
-            baseline_name(study)
+        let text = Text::from("The typical run is that of the arm ").strong(baseline);
+        page.paragraph(text.text(format!(
+            " whose {label} is nearest to the median of all its runs."
         )));
     }
-    if !explained.is_empty() {
-        page.paragraph(&explained);
+    if runs.contains(&Example::Worst) {
+        page.paragraph(format!(
+            "The worst run fails most expectations; where runs fail equally many, it is the one whose {label} is farthest from the \
+             median of all runs of the arm {baseline}."
+        ));
     }
     for run in runs {
         let (name, outcome) = match run {
@@ -294,7 +272,7 @@ fn write_examples(page: &mut Page, study: &Study<'_>, folder: &Path) {
         page.heading(&name);
         match outcome {
             Some(outcome) => write_example(page, study, folder, (measure, outcome)),
-            None => page.remark(&[Part::text("There are no results of it.")]),
+            None => page.remark("There are no results of it."),
         }
     }
 }
@@ -362,31 +340,23 @@ fn write_example(
         .measures
         .get(&measure.name)
         .map_or("missing".to_owned(), Measured::to_string);
-    page.paragraph(&[
-        Part::text(format!("Unit {}: arm ", outcome.unit)),
-        Part::strong(&outcome.arm),
-        Part::text(format!(
-            ", {}, seed {}; {} {measured}. To record it: ",
-            study.heading_of(&outcome.condition),
-            outcome.seed,
-            label(measure),
-        )),
-        Part::code(format!(
-            "cars experiment replay {} {}",
-            shell::path(folder),
-            outcome.unit
-        )),
-    ]);
+    let unit = outcome.unit;
+    let text = Text::from(format!("Unit {unit}: arm ")).strong(&outcome.arm);
+    let text = text.text(format!(
+        ", {}, seed {}; {} {measured}. To record it: ",
+        study.heading_of(&outcome.condition),
+        outcome.seed,
+        label(measure),
+    ));
+    let folder = shell::path(folder);
+    page.paragraph(text.code(format!("cars experiment replay {folder} {unit}")));
 
     if *study.results.plan.robots() != Robots::InProcess {
-        page.remark(&[Part::text(
+        page.remark(
             "Its robots are processes, which a report does not start: record it by the command above and report the run.",
-        )]);
-        return;
-    }
-
-    if let Err(error) = write_course(page, study, outcome) {
-        page.remark(&[Part::text(format!("It cannot be shown: {error}."))]);
+        );
+    } else if let Err(error) = write_course(page, study, outcome) {
+        page.remark(format!("It cannot be shown: {error}."));
     }
 }
 
@@ -425,10 +395,10 @@ fn write_course(page: &mut Page, study: &Study<'_>, outcome: &Outcome) -> miette
     let all = figures.len();
     for (index, figure) in figures.iter().enumerate() {
         if page.size() > MAX_BYTES_OF_EXAMPLES {
-            page.remark(&[Part::text(format!(
+            page.remark(format!(
                 "So that this page stays small, {} of this run are left out.",
                 counted(all - index, "figure")
-            ))]);
+            ));
             break;
         }
         page.figure(figure);
@@ -438,24 +408,19 @@ fn write_course(page: &mut Page, study: &Study<'_>, outcome: &Outcome) -> miette
 
 /// Emotions over time and the space-time diagram of a unit.
 fn course(outcome: &Outcome, facts: &RunFacts, files: &EpochFiles) -> miette::Result<Figure> {
-    let mut panels = Vec::new();
-    panels.extend(run_panel(facts, State::Emotion, "Emotions"));
+    let mut panels = Vec::from_iter(run_panel(facts, Kind::Emotion));
     let diagram = diagram_lines(&format!("unit {}", outcome.unit), facts, files)?;
     panels.extend(diagram.lines);
 
-    let mut caption = "Emotions over time, and the space-time diagram, to be read line by line: robots are lanes, with emotion above \
-         behavior; a slanted line is a command, from the tick it was sent to the tick it arrived; a cross is where one was lost. n = 1 run."
-        .to_owned();
-    if diagram.last < facts.last_tick {
-        caption += &format!(
-            " The diagram ends at tick {} of {}.",
-            diagram.last, facts.last_tick
-        );
+    let mut caption = format!("Emotions over time, and the space-time diagram, {READ_DIAGRAM}");
+    let (last, of) = (diagram.last, facts.last_tick);
+    if last < of {
+        caption += &format!(" The diagram ends at tick {last} of {of}.");
     }
 
     Ok(Figure {
         panels,
-        caption: vec![Part::text(caption)],
+        caption: caption.into(),
         table: None,
     })
 }
@@ -469,9 +434,9 @@ fn write_reproduction(
     let plan = &study.results.plan;
     let folder = shell::path(folder);
     page.section("Reproduction");
-    page.paragraph(&[Part::text(
+    page.paragraph(
         "The numbers, from the runs that were played; the numbers of every run as a table; one run, recorded; this page:",
-    )]);
+    );
     page.commands(&[
         format!("cars experiment merge {folder}"),
         format!("cat {folder}/runs.csv"),
@@ -479,10 +444,10 @@ fn write_reproduction(
         format!("cars report {folder} -o report.html"),
     ]);
 
-    let mut table = Table::new(vec![Column::text("What"), Column::text("")]);
-    let mut add = |name: &str, value: Cell| table.rows.push(vec![Cell::text(name), value]);
-    add("experiment", Cell::text(plan.name()));
-    add("program", Cell::text(format!("cars {}", plan.program())));
+    let mut table = Table::new("What | ");
+    let mut add = |name: &str, value: Cell| table.row([name.into(), value]);
+    add("experiment", plan.name().into());
+    add("program", format!("cars {}", plan.program()).into());
     if let Some(provenance) = provenance {
         let mut command = "cars".to_owned();
         for argument in &provenance.command {
@@ -496,10 +461,10 @@ fn write_reproduction(
             "{host}: {} {}, {} × {processor}",
             machine.os, machine.architecture, machine.processors
         );
-        add("machine", Cell::text(text));
-        add("written", Cell::text(utc(provenance.written_unix_s)));
+        add("machine", text.into());
+        add("written", utc(provenance.written_unix_s).into());
     }
-    page.table(&[Part::text("Where the numbers come from.")], &table);
+    page.table("Where the numbers come from.", &table);
 
     write_failures(page, study);
     let source = plan.experiment.source();
@@ -512,20 +477,14 @@ fn write_failures(page: &mut Page, study: &Study<'_>) {
         return;
     }
 
-    let mut table = Table::new(vec![
-        Column::number("Unit"),
-        Column::text("condition"),
-        Column::text("arm"),
-        Column::number("seed"),
-        Column::text("reason"),
-    ]);
+    let mut table = Table::new("Unit | condition | arm | seed | reason");
     for failure in failures.iter().take(MAX_NAMED) {
-        table.rows.push(vec![
-            Cell::Count(failure.unit as u64),
-            Cell::text(study.heading_of(&failure.condition)),
-            Cell::text(&failure.arm),
-            Cell::Count(failure.seed),
-            Cell::text(&failure.reason),
+        table.row([
+            failure.unit.into(),
+            study.heading_of(&failure.condition).into(),
+            failure.arm.as_str().into(),
+            failure.seed.into(),
+            failure.reason.as_str().into(),
         ]);
     }
 
@@ -534,5 +493,5 @@ fn write_failures(page: &mut Page, study: &Study<'_>) {
         table.rows.len(),
         failures.len()
     );
-    page.table(&[Part::text(caption)], &table);
+    page.table(caption, &table);
 }

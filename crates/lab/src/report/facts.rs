@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use config::FileError;
+use pictures::{Band, Floor};
 use protocol::messages::{End, Verdict};
 use protocol::time::time_s;
 use protocol::{Event, RobotName, Tick};
 use record::EpochFiles;
 use record::{Entry, Record};
 use recording::{Recording, RecordingError};
-use pictures::{Band, Floor};
 use timeline::{Counts, Kind, LinkCounts, Period, Span, StateCounts, Stay, Timeline};
 
 /// Parts of the floor along its longer side.

@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
+use pictures::{Cell, Figure, Floor, Panel, Table};
 use protocol::RobotName;
-use pictures::{Cell, Column, Figure, Floor, Panel, Part, Table};
 
 use super::facts::RunFacts;
-use super::limits::{MAX_PANELS, limited};
+use super::limits::panels;
 use super::words::counted;
 
 /// Where the robots of these runs were: a floor for each robot; `None` if no run has a recording.
@@ -15,6 +15,7 @@ pub(super) fn occupancy(runs: &[&RunFacts]) -> Option<Figure> {
     let mut others = 0;
     for (name, floor) in runs.iter().flat_map(|run| &run.floors) {
         let sum = floors.entry(name).or_insert_with(|| Floor {
+            title: format!("Where {name} was"),
             times_s: BTreeMap::new(),
             ..floor.clone()
         });
@@ -31,26 +32,13 @@ pub(super) fn occupancy(runs: &[&RunFacts]) -> Option<Figure> {
         return None;
     }
 
-    let mut panels = Vec::new();
-    let mut table = Table::new(vec![
-        Column::text("Robot"),
-        Column::number("parts visited"),
-        Column::number("time, s"),
-        Column::number("longest in a part, s"),
-        Column::number("at x, m"),
-        Column::number("at y, m"),
-    ]);
-    let all = floors.len();
-    for (name, mut floor) in floors.into_iter().take(MAX_PANELS) {
-        floor.title = format!("Where {name} was");
+    let mut table =
+        Table::new("Robot | parts visited | time, s | longest in a part, s | at x, m | at y, m");
+    let floors = floors.into_iter().collect();
+    let (panels, sentence) = panels("robots", floors, |(name, floor)| {
         add_row(&mut table, name, &floor);
-        panels.push(Panel {
-            heading: name.to_string(),
-            svg: floor.draw(),
-            is_wide: false,
-        });
-    }
-    let (panels, sentence) = limited(panels, all, "robots");
+        Panel::new(name.as_str(), floor.draw())
+    });
     let mut caption = format!(
         "Where the robots were, from above: the time that the center of a robot spent in each part of the floor. Darkness grows \
          with the square root of the time. Dark squares are obstacles. n = {}.{sentence}",
@@ -61,29 +49,29 @@ pub(super) fn occupancy(runs: &[&RunFacts]) -> Option<Figure> {
     }
     Some(Figure {
         panels,
-        caption: vec![Part::text(caption)],
+        caption: caption.into(),
         table: Some(table),
     })
 }
 
 fn add_row(table: &mut Table, name: &RobotName, floor: &Floor) {
-    let mut total_s = 0.0;
+    let total_s = floor.times_s.values().sum();
     let mut longest_s = 0.0;
     let mut place = (0, 0);
     for (part, time_s) in &floor.times_s {
-        total_s += time_s;
         if *time_s > longest_s {
             longest_s = *time_s;
             place = *part;
         }
     }
 
-    table.rows.push(vec![
-        Cell::text(name.as_str()),
-        Cell::Count(floor.times_s.len() as u64),
+    let center_m = |part: u32| Cell::Number((f64::from(part) + 0.5) * floor.part_m, 2);
+    table.row([
+        name.as_str().into(),
+        floor.times_s.len().into(),
         Cell::Number(total_s, 1),
         Cell::Number(longest_s, 1),
-        Cell::Number((f64::from(place.0) + 0.5) * floor.part_m, 2),
-        Cell::Number((f64::from(place.1) + 0.5) * floor.part_m, 2),
+        center_m(place.0),
+        center_m(place.1),
     ]);
 }

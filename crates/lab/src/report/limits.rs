@@ -3,28 +3,35 @@
 use pictures::Panel;
 
 /// Most panels of a figure.
-pub(super) const MAX_PANELS: usize = 24;
+const MAX_PANELS: usize = 24;
 /// Most bytes of the charts of a figure, beside its first one.
 const MAX_FIGURE_BYTES: usize = 600_000;
 
-/// The first panels of a figure, as many as are allowed, and a sentence about what is left out. `all` is how many there could be.
-pub(super) fn limited(panels: Vec<Panel>, all: usize, what: &str) -> (Vec<Panel>, String) {
-    let mut kept = Vec::new();
+/// The panels of a figure, one for each of these things, as many as are allowed, and a sentence about what is left out: empty, or
+/// with a space before it.
+pub(super) fn panels<T>(
+    what: &str,
+    things: Vec<T>,
+    mut draw: impl FnMut(T) -> Panel,
+) -> (Vec<Panel>, String) {
+    let all = things.len();
+    let mut panels = Vec::new();
     let mut bytes = 0;
-    for panel in panels {
+    for thing in things.into_iter().take(MAX_PANELS) {
+        let panel = draw(thing);
         bytes += panel.svg.len();
-        let fits = kept.is_empty() || bytes <= MAX_FIGURE_BYTES;
-        if !fits || kept.len() == MAX_PANELS {
+        if bytes > MAX_FIGURE_BYTES && !panels.is_empty() {
             break;
         }
-        kept.push(panel);
+        panels.push(panel);
     }
 
     let mut sentence = String::new();
-    if kept.len() < all {
-        sentence = format!(" The first {} of {all} {what} are drawn.", kept.len());
+    if panels.len() < all {
+        let drawn = panels.len();
+        sentence = format!(" The first {drawn} of {all} {what} are drawn.");
     }
-    (kept, sentence)
+    (panels, sentence)
 }
 
 #[cfg(test)]
@@ -33,21 +40,19 @@ mod tests {
 
     #[test]
     fn what_is_left_out_is_named() {
-        let panel = |bytes| Panel {
-            heading: String::new(),
-            svg: "x".repeat(bytes),
-            is_wide: false,
+        let of_sizes = |what, sizes: Vec<usize>| {
+            let (panels, sentence) = panels(what, sizes, |bytes| Panel::new("", "x".repeat(bytes)));
+            (panels.len(), sentence)
         };
-        let (kept, sentence) = limited(vec![panel(10), panel(10)], 2, "robots");
-        assert_eq!((kept.len(), sentence.as_str()), (2, ""));
+        let (count, sentence) = of_sizes("robots", vec![10, 10]);
+        assert_eq!((count, sentence.as_str()), (2, ""));
 
-        let (kept, sentence) = limited(vec![panel(900_000), panel(10)], 2, "robots");
-        assert_eq!(kept.len(), 1);
+        let (count, sentence) = of_sizes("robots", vec![900_000, 10]);
+        assert_eq!(count, 1);
         assert_eq!(sentence, " The first 1 of 2 robots are drawn.");
 
-        let many = (0..30).map(|_| panel(10)).collect();
-        let (kept, sentence) = limited(many, 60, "conditions");
-        assert_eq!(kept.len(), MAX_PANELS);
+        let (count, sentence) = of_sizes("conditions", vec![10; 60]);
+        assert_eq!(count, MAX_PANELS);
         assert_eq!(sentence, " The first 24 of 60 conditions are drawn.");
     }
 }

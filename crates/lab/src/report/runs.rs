@@ -4,16 +4,19 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use miette::miette;
+use pictures::{BandRow, Cell, Figure, Page, Panel, Table, Text};
 use protocol::messages::{End, Variable};
 use protocol::time::{self, tick_seconds, time_s};
 use protocol::{RobotName, Tick};
 use record::{EpochFiles, RunFolder, Summary};
-use pictures::{BandRow, Cell, Column, Figure, Page, Panel, Part, State, Table};
+use timeline::Kind;
 
-use super::course::{diagram_lines, run_panel, state_panel, states_of};
-use super::facts::{Disturbance, RunFacts};
+use super::course::{
+    READ_DIAGRAM, diagram_lines, run_panel, state_panel, states_in_words, states_of,
+};
+use super::facts::RunFacts;
 use super::floor::occupancy;
-use super::limits::{MAX_PANELS, limited};
+use super::limits::panels;
 use super::transitions::transitions;
 use super::words::counted;
 use crate::folder::{read_summary, recorded_epoch};
@@ -23,11 +26,8 @@ use crate::shell;
 pub const MAX_RUNS: usize = 64;
 /// Runs of which the space-time diagram is drawn.
 const MAX_DIAGRAMS: usize = 2;
-/// Most rows of a table of disturbances.
-const MAX_DISTURBANCES: usize = 200;
-
-/// Most rows of the table of verdicts.
-const MAX_VERDICTS: usize = 200;
+/// Most rows of a table of disturbances or verdicts.
+const MAX_ROWS: usize = 200;
 
 /// A run with its facts.
 struct Run {
@@ -113,48 +113,39 @@ impl Run {
             scenario,
         })
     }
-
-    /// How the run is called where several are told apart.
-    fn label(&self) -> String {
-        format!("{}, seed {}", self.name, self.facts.seed)
-    }
 }
 
 fn write_lead(page: &mut Page, runs: &[Run]) {
     if let [run] = runs {
         let facts = &run.facts;
-        let text = format!(
+        page.lead(format!(
             "The run {} after {} s of simulated time ({} ticks of {} s), with seed {} and {}.",
-            ending(facts.end),
+            ending(facts.end).0,
             tick_seconds(facts.last_tick, facts.tick_s),
             facts.last_tick,
             facts.tick_s,
             facts.seed,
             counted(facts.robots.len(), "robot"),
-        );
-        page.lead(&[Part::text(text)]);
-    } else {
-        let mut ends: BTreeMap<&str, usize> = BTreeMap::new();
-        for run in runs {
-            *ends.entry(ending(run.facts.end)).or_insert(0) += 1;
-        }
-
-        let mut parts = Vec::new();
-        for (end, count) in ends {
-            parts.push(format!("{count} {end}"));
-        }
-
-        let text = format!("Of these runs {}.", parts.join(", "));
-        page.lead(&[Part::text(text)]);
+        ));
+        return;
     }
+
+    let mut ends: BTreeMap<&str, usize> = BTreeMap::new();
+    for run in runs {
+        *ends.entry(ending(run.facts.end).0).or_insert(0) += 1;
+    }
+    let parts = ends.iter().map(|(end, count)| format!("{count} {end}"));
+    let parts: Vec<String> = parts.collect();
+    page.lead(format!("Of these runs {}.", parts.join(", ")));
 }
 
-fn ending(end: Option<End>) -> &'static str {
+/// How a run ended, in a sentence and in a table.
+fn ending(end: Option<End>) -> (&'static str, &'static str) {
     match end {
-        Some(End::Finished) => "finished",
-        Some(End::Stopped) => "was stopped",
-        Some(End::Aborted) => "was aborted",
-        None => "has no end, and is recorded",
+        Some(End::Finished) => ("finished", "finished"),
+        Some(End::Stopped) => ("was stopped", "stopped"),
+        Some(End::Aborted) => ("was aborted", "aborted"),
+        None => ("has no end, and is recorded", "none"),
     }
 }
 
@@ -162,47 +153,39 @@ fn write_summary(page: &mut Page, runs: &[Run]) {
     page.section("Summary");
     if let [run] = runs {
         let caption = "The robots. Commands are counted where they were sent, arrived, and were lost on the way to the robot.";
-        page.table(&[Part::text(caption)], &robots_table(run));
+        page.table(caption, &robots_table(run));
     } else {
         let caption = format!(
             "The {} runs. Commands and refused moves are those of all robots of a run together.",
             runs.len()
         );
-        page.table(&[Part::text(caption)], &runs_table(runs));
+        page.table(caption, &runs_table(runs));
     }
 
     let variables = variables_table(runs);
     if !variables.rows.is_empty() {
-        page.begin_details("State variables of the robots at the end");
-        let caption = match runs {
-            [_] => "The last state variables of the robots that are numbers.".to_owned(),
-            _ => "The last state variables of the robots that are numbers, over the runs that have a summary.".to_owned(),
+        let over = match runs {
+            [_] => "",
+            _ => ", over the runs that have a summary",
         };
-        page.table(&[Part::text(caption)], &variables);
+        page.begin_details("State variables of the robots at the end");
+        let caption = format!("The last state variables of the robots that are numbers{over}.");
+        page.table(caption, &variables);
         page.end_details();
     }
     for run in runs {
         for note in &run.facts.notes {
-            let name = if runs.len() > 1 {
-                format!("{}: ", run.name)
-            } else {
-                String::new()
-            };
-            page.remark(&[Part::text(format!("{name}{note}"))]);
+            page.remark(match runs {
+                [_] => note.clone(),
+                _ => format!("{}: {note}", run.name),
+            });
         }
     }
 }
 
 fn robots_table(run: &Run) -> Table {
-    let mut table = Table::new(vec![
-        Column::text("Robot"),
-        Column::number("sent"),
-        Column::number("arrived"),
-        Column::number("lost"),
-        Column::number("moves refused"),
-        Column::number("ticks missed"),
-        Column::number("returns"),
-    ]);
+    let mut table =
+        Table::new("Robot | sent | arrived | lost | moves refused | ticks missed | returns");
     for (name, robot) in &run.facts.robots {
         let mut sent = 0;
         let mut delivered = 0;
@@ -217,56 +200,34 @@ fn robots_table(run: &Run) -> Table {
             }
         }
 
-        table.rows.push(vec![
-            Cell::text(name.as_str()),
-            Cell::Count(sent),
-            Cell::Count(delivered),
-            Cell::Count(dropped),
-            Cell::Count(robot.blocked),
-            Cell::Count(robot.missed),
-            Cell::Count(robot.returns),
-        ]);
+        let mut row = vec![name.as_str().into()];
+        let of_robot = [robot.blocked, robot.missed, robot.returns];
+        row.extend([sent, delivered, dropped].map(Cell::Count));
+        row.extend(of_robot.map(Cell::Count));
+        table.row(row);
     }
-
     table
 }
 
 fn runs_table(runs: &[Run]) -> Table {
-    let mut table = Table::new(vec![
-        Column::text("Run"),
-        Column::number("seed"),
-        Column::text("end"),
-        Column::number("time, s"),
-        Column::number("sent"),
-        Column::number("arrived"),
-        Column::number("lost"),
-        Column::number("moves refused"),
-        Column::text("digest"),
-    ]);
+    let mut table =
+        Table::new("Run | seed | end | time, s | sent | arrived | lost | moves refused | digest");
     for run in runs {
         let facts = &run.facts;
         let commands = facts.commands();
-        let blocked = facts.robots.values().map(|robot| robot.blocked).sum();
-        let end = match facts.end {
-            Some(End::Finished) => "finished",
-            Some(End::Stopped) => "stopped",
-            Some(End::Aborted) => "aborted",
-            None => "none",
-        };
-
-        table.rows.push(vec![
-            Cell::text(&run.name),
-            Cell::Count(facts.seed),
-            Cell::text(end),
+        let blocked: u64 = facts.robots.values().map(|robot| robot.blocked).sum();
+        table.row([
+            run.name.as_str().into(),
+            facts.seed.into(),
+            ending(facts.end).1.into(),
             time_cell(facts.last_tick, facts.tick_s),
-            Cell::Count(commands.sent),
-            Cell::Count(commands.delivered),
-            Cell::Count(commands.dropped),
-            Cell::Count(blocked),
+            commands.sent.into(),
+            commands.delivered.into(),
+            commands.dropped.into(),
+            blocked.into(),
             Cell::Code(facts.digest.chars().take(12).collect()),
         ]);
     }
-
     table
 }
 
@@ -284,126 +245,98 @@ fn variables_table(runs: &[Run]) -> Table {
     }
 
     let is_one = runs.len() == 1;
-    let mut columns = vec![Column::text("Robot"), Column::text("variable")];
-    if is_one {
-        columns.push(Column::number("value"));
+    let mut table = Table::new(if is_one {
+        "Robot | variable | value"
     } else {
-        for name in ["n", "least", "median", "mean", "most"] {
-            columns.push(Column::number(name));
-        }
-    }
-    let mut table = Table::new(columns);
+        "Robot | variable | n | least | median | mean | most"
+    });
     for ((robot, name), mut values) in values {
-        let mut row = vec![Cell::text(robot.as_str()), Cell::text(name)];
+        let is_whole = values.iter().all(|value| value.fract() == 0.0);
+        let decimals = if is_whole { 0 } else { 3 };
+        let number = |value| Cell::Number(value, decimals);
+        let mut row = vec![robot.as_str().into(), name.into()];
         if is_one {
-            row.push(Cell::Number(values[0], decimals(&values)));
+            row.push(number(values[0]));
         } else {
             values.sort_by(f64::total_cmp);
             let count = values.len();
-            let decimals = decimals(&values);
+            // The same one twice, or the two in the middle.
+            let median = f64::midpoint(values[(count - 1) / 2], values[count / 2]);
             let mean = values.iter().sum::<f64>() / count as f64;
-            row.push(Cell::Count(count as u64));
-            row.push(Cell::Number(values[0], decimals));
-            row.push(Cell::Number(median(&values), decimals));
-            row.push(Cell::Number(mean, decimals.max(1)));
-            row.push(Cell::Number(values[count - 1], decimals));
+            row.extend([
+                count.into(),
+                number(values[0]),
+                number(median),
+                Cell::Number(mean, decimals.max(1)),
+                number(values[count - 1]),
+            ]);
         }
-        table.rows.push(row);
+        table.row(row);
     }
     table
-}
-
-/// The median of sorted values.
-fn median(values: &[f64]) -> f64 {
-    let middle = values.len() / 2;
-    if values.len().is_multiple_of(2) {
-        f64::midpoint(values[middle - 1], values[middle])
-    } else {
-        values[middle]
-    }
-}
-
-/// Whole numbers have no decimals.
-fn decimals(values: &[f64]) -> usize {
-    if values.iter().all(|value| value.fract() == 0.0) {
-        0
-    } else {
-        3
-    }
 }
 
 fn write_states(page: &mut Page, runs: &[Run]) {
     page.section("Emotions and behaviors");
 
-    for (state, what) in [(State::Emotion, "Emotions"), (State::Behavior, "Behaviors")] {
-        let panels = state_panels(runs, state, what);
+    for kind in [Kind::Emotion, Kind::Behavior] {
+        let (row, (panels, sentence)) = match runs {
+            [run] => {
+                let panel = run_panel(&run.facts, kind);
+                ("robot", (Vec::from_iter(panel), String::new()))
+            }
+            _ => ("run", state_panels(runs, kind)),
+        };
         if panels.is_empty() {
             continue;
         }
 
-        let all = if runs.len() == 1 {
-            1
-        } else {
-            all_robots(runs).len()
-        };
-        let (panels, sentence) = limited(panels, all, "robots");
-
-        let rows = if runs.len() == 1 { "robot" } else { "run" };
         let caption = format!(
-            "{what} over time, a row for each {rows}. The key has the share of the time in each. Time in which a robot took no part \
+            "{} over time, a row for each {row}. The key has the share of the time in each. Time in which a robot took no part \
              is empty. n = {}.{sentence}",
+            states_in_words(kind),
             counted(runs.len(), "run")
         );
         page.figure(&Figure {
             panels,
-            caption: vec![Part::text(caption)],
-            table: Some(states_table(runs, state)),
+            caption: caption.into(),
+            table: Some(states_table(runs, kind)),
         });
     }
 }
 
-/// One panel for one run, and one for each robot of several runs.
-fn state_panels(runs: &[Run], state: State, what: &str) -> Vec<Panel> {
-    let mut panels = Vec::new();
-    if let [run] = runs {
-        panels.extend(run_panel(&run.facts, state, what));
-        return panels;
-    }
-
-    let end_s = runs
-        .iter()
-        .map(|run| run.facts.time_s())
-        .fold(0.0, f64::max);
-    for name in all_robots(runs).into_iter().take(MAX_PANELS) {
+/// A panel for each robot of several runs, with a row for each run.
+fn state_panels(runs: &[Run], kind: Kind) -> (Vec<Panel>, String) {
+    let times_s = runs.iter().map(|run| run.facts.time_s());
+    let end_s = times_s.fold(0.0, f64::max);
+    let mut robots = Vec::new();
+    for name in all_robots(runs) {
         let mut rows = Vec::new();
         for run in runs {
             if let Some(robot) = run.facts.robots.get(name) {
                 rows.push(BandRow {
-                    label: run.label(),
-                    bands: states_of(robot, state).bands.clone(),
+                    label: format!("{}, seed {}", run.name, run.facts.seed),
+                    bands: states_of(robot, kind).bands.clone(),
                 });
             }
         }
-        panels.extend(state_panel(rows, state, end_s, what, name.as_str()));
+        if rows.iter().any(|row| !row.bands.is_empty()) {
+            robots.push((name, rows));
+        }
     }
-    panels
+    panels("robots", robots, |(name, rows)| {
+        state_panel(rows, kind, end_s, name.as_str())
+    })
 }
 
 fn all_robots(runs: &[Run]) -> BTreeSet<&RobotName> {
-    runs.iter()
-        .flat_map(|run| run.facts.robots.keys())
-        .collect()
+    let robots = runs.iter().flat_map(|run| run.facts.robots.keys());
+    robots.collect()
 }
 
 /// Time in each state over all runs.
-fn states_table(runs: &[Run], state: State) -> Table {
-    let mut table = Table::new(vec![
-        Column::text("Robot"),
-        Column::text("state"),
-        Column::number("time, s"),
-        Column::number("share, %"),
-        Column::number("times entered"),
-    ]);
+fn states_table(runs: &[Run], kind: Kind) -> Table {
+    let mut table = Table::new("Robot | state | time, s | share, % | times entered");
     for name in all_robots(runs) {
         let mut times: BTreeMap<String, (f64, u64)> = BTreeMap::new();
         let mut total_s = 0.0;
@@ -413,7 +346,7 @@ fn states_table(runs: &[Run], state: State) -> Table {
             };
             // A share is one of the whole run, as in `runs.csv`: a robot that takes no part is in no state.
             total_s += run.facts.time_s();
-            let states = states_of(robot, state);
+            let states = states_of(robot, kind);
             for (name, time_s) in states.times_s() {
                 times.entry(name).or_default().0 += time_s;
             }
@@ -425,47 +358,37 @@ fn states_table(runs: &[Run], state: State) -> Table {
         }
 
         for (of, (time_s, entered)) in times {
-            table.rows.push(vec![
-                Cell::text(name.as_str()),
-                Cell::text(of),
+            table.row([
+                name.as_str().into(),
+                of.into(),
                 Cell::Number(time_s, 1),
                 Cell::Number(100.0 * time_s / total_s, 1),
-                Cell::Count(entered),
+                entered.into(),
             ]);
         }
     }
-
     table
 }
 
 fn write_diagrams(page: &mut Page, runs: &[Run]) {
     page.section("Space-time diagram");
     for run in runs.iter().take(MAX_DIAGRAMS) {
-        let lines = diagram_lines(&run.name, &run.facts, &run.files);
-        let diagram = match lines {
+        let diagram = match diagram_lines(&run.name, &run.facts, &run.files) {
             Ok(diagram) => diagram,
             Err(error) => {
-                page.remark(&[Part::text(format!("{}: {error}.", run.name))]);
+                page.remark(format!("{}: {error}.", run.name));
                 continue;
             }
         };
-        let shown = diagram.last;
-        let mut caption = vec![Part::text(format!(
-            "Space-time diagram of {}, to be read line by line: robots are lanes, with emotion above behavior; a slanted line is a \
-             command, from the tick it was sent to the tick it arrived; a cross is where one was lost. n = 1 run.",
-            run.name
-        ))];
-        if shown < run.facts.last_tick {
-            caption.push(Part::text(format!(
-                " Ticks {} to {} are left out; the picture of another part: ",
-                shown + 1,
-                run.facts.last_tick
-            )));
-            caption.push(Part::code(format!(
-                "cars diagram {} --from {}",
-                shell::path(&run.path),
-                shown + 1
-            )));
+        let name = &run.name;
+        let mut caption = Text::from(format!("Space-time diagram of {name}, {READ_DIAGRAM}"));
+        if diagram.last < run.facts.last_tick {
+            let (next, last) = (diagram.last + 1, run.facts.last_tick);
+            let path = shell::path(&run.path);
+            caption = caption.text(format!(
+                " Ticks {next} to {last} are left out; the picture of another part: "
+            ));
+            caption = caption.code(format!("cars diagram {path} --from {next}"));
         }
         page.figure(&Figure {
             panels: diagram.lines,
@@ -475,97 +398,79 @@ fn write_diagrams(page: &mut Page, runs: &[Run]) {
     }
 
     if let Some(run) = runs.get(MAX_DIAGRAMS) {
-        page.remark(&[
-            Part::text(format!(
-                "The diagrams of the other {} runs are left out. Draw one with ",
-                runs.len() - MAX_DIAGRAMS
-            )),
-            Part::code(format!(
-                "cars diagram {} -o diagram.svg",
-                shell::path(&run.path)
-            )),
-            Part::text("."),
-        ]);
+        let text = Text::from(format!(
+            "The diagrams of the other {} runs are left out. Draw one with ",
+            runs.len() - MAX_DIAGRAMS
+        ));
+        let path = shell::path(&run.path);
+        let text = text.code(format!("cars diagram {path} -o diagram.svg"));
+        page.remark(text.text("."));
     }
 }
 
 fn write_disturbances(page: &mut Page, runs: &[Run]) {
     page.section("Faults and the network");
-    page.table(
-        &[Part::text(format!(
-            "Commands by sender and target. A doubled command arrives twice. n = {}.",
-            counted(runs.len(), "run")
-        ))],
-        &links_table(runs),
+    let caption = format!(
+        "Commands by sender and target. A doubled command arrives twice. n = {}.",
+        counted(runs.len(), "run")
     );
+    page.table(caption, &links_table(runs));
 
-    let mut table = Table::new(vec![
-        Column::text("Run"),
-        Column::text("what"),
-        Column::text("of"),
-        Column::number("from, s"),
-        Column::number("until, s"),
-    ]);
-    let mut count = 0;
+    let mut table = Table::new("Run | what | of | from, s | until, s");
     for run in runs {
+        let tick_s = run.facts.tick_s;
         for one in &run.facts.disturbances {
-            count += 1;
-            if table.rows.len() < MAX_DISTURBANCES {
-                table.rows.push(disturbance_row(run, one));
-            }
+            let end = one.end.map(|end| time_cell(end, tick_s));
+            table.row([
+                run.name.as_str().into(),
+                one.what.as_str().into(),
+                one.whom.as_str().into(),
+                time_cell(one.begin, tick_s),
+                end.unwrap_or("the end".into()),
+            ]);
         }
     }
     if table.rows.is_empty() {
-        page.paragraph(&[Part::text(
-            "No process failed and no link was cut in these runs.",
-        )]);
+        page.paragraph("No process failed and no link was cut in these runs.");
         return;
     }
-    let mut caption =
-        "Faults of processes, absences, cuts of links and changes of the scenario.".to_owned();
-    if count > table.rows.len() {
-        caption += &format!(" The first {} of {count} are shown.", table.rows.len());
-    }
-    page.table(&[Part::text(caption)], &table);
+    let caption = "Faults of processes, absences, cuts of links and changes of the scenario.";
+    write_first_rows(page, caption, table);
 }
 
 /// What the scenarios expect of the runs. Nothing is written if they expect nothing.
 fn write_expectations(page: &mut Page, runs: &[Run]) {
-    let mut table = Table::new(vec![
-        Column::text("Run"),
-        Column::text("expectation"),
-        Column::text("verdict"),
-        Column::number("decided at, s"),
-        Column::text("because"),
-    ]);
-    let mut count = 0;
+    let mut table = Table::new("Run | expectation | verdict | decided at, s | because");
     for run in runs {
         for one in &run.facts.judged {
-            count += 1;
-            if table.rows.len() < MAX_VERDICTS {
-                table.rows.push(vec![
-                    Cell::text(&run.name),
-                    Cell::text(&one.expectation),
-                    Cell::text(one.verdict.to_string()),
-                    time_cell(one.tick, run.facts.tick_s),
-                    Cell::text(&one.because),
-                ]);
-            }
+            table.row([
+                run.name.as_str().into(),
+                one.expectation.as_str().into(),
+                one.verdict.to_string().into(),
+                time_cell(one.tick, run.facts.tick_s),
+                one.because.as_str().into(),
+            ]);
         }
     }
-    if count == 0 {
+    if table.rows.is_empty() {
         return;
     }
 
     page.section("Expectations");
-    let mut caption =
-        "Verdicts about what the scenario expects. Undecided: the run ended before it was certain. \
-         Not asked: what it is expected after did not happen."
-            .to_owned();
-    if count > table.rows.len() {
-        caption += &format!(" The first {} of {count} are shown.", table.rows.len());
+    let caption = "Verdicts about what the scenario expects. Undecided: the run ended before it was certain. \
+                   Not asked: what it is expected after did not happen.";
+    write_first_rows(page, caption, table);
+}
+
+/// Writes the first rows of a table that can be long.
+fn write_first_rows(page: &mut Page, caption: &str, mut table: Table) {
+    let mut caption = caption.to_owned();
+    let count = table.rows.len();
+    if count > MAX_ROWS {
+        caption += &format!(" The first {MAX_ROWS} of {count} are shown.");
+        table.rows.truncate(MAX_ROWS);
     }
-    page.table(&[Part::text(caption)], &table);
+    page.table(caption, &table);
 }
 
 /// The time of a tick, with the decimals that it needs.
@@ -573,123 +478,72 @@ fn time_cell(tick: Tick, tick_s: f64) -> Cell {
     Cell::Number(time_s(tick, tick_s), time::decimals(tick_s))
 }
 
-fn disturbance_row(run: &Run, one: &Disturbance) -> Vec<Cell> {
-    let tick_s = run.facts.tick_s;
-    let end = match one.end {
-        Some(end) => time_cell(end, tick_s),
-        None => Cell::text("the end"),
-    };
-    vec![
-        Cell::text(&run.name),
-        Cell::text(&one.what),
-        Cell::text(&one.whom),
-        time_cell(one.begin, tick_s),
-        end,
-    ]
-}
-
 fn links_table(runs: &[Run]) -> Table {
     let mut links = BTreeMap::new();
-    for run in runs {
-        for (link, facts) in &run.facts.links {
-            let sum: &mut [u64; 5] = links.entry(link).or_default();
-            let counts = [
-                facts.sent,
-                facts.delivered,
-                facts.dropped,
-                facts.delayed,
-                facts.duplicated,
-            ];
-            for (sum, count) in sum.iter_mut().zip(counts) {
-                *sum += count;
-            }
+    for (link, facts) in runs.iter().flat_map(|run| &run.facts.links) {
+        let sum: &mut [u64; 5] = links.entry(link).or_default();
+        let counts = [
+            facts.sent,
+            facts.delivered,
+            facts.dropped,
+            facts.delayed,
+            facts.duplicated,
+        ];
+        for (sum, count) in sum.iter_mut().zip(counts) {
+            *sum += count;
         }
     }
 
-    let mut table = Table::new(vec![
-        Column::text("Link"),
-        Column::number("sent"),
-        Column::number("arrived"),
-        Column::number("lost"),
-        Column::number("held back"),
-        Column::number("doubled"),
-    ]);
+    let mut table = Table::new("Link | sent | arrived | lost | held back | doubled");
     for ((from, to), counts) in links {
-        let mut row = vec![Cell::text(format!("{from} → {to}"))];
+        let mut row = vec![format!("{from} → {to}").into()];
         row.extend(counts.map(Cell::Count));
-        table.rows.push(row);
+        table.row(row);
     }
     table
 }
 
 fn write_reproduction(page: &mut Page, runs: &[Run]) {
     page.section("Reproduction");
-    page.paragraph(&[Part::text(
+    page.paragraph(
         "This report, the check that a run is what its scenario and seed give, and its events and states as tables:",
-    )]);
-    let mut commands = vec!["cars report".to_owned()];
-    for run in runs {
-        commands[0] += &format!(" {}", shell::path(&run.path));
-    }
-    commands[0] += " -o report.html";
-    if let Some(run) = runs.first() {
-        commands.push(format!("cars verify {}", shell::path(&run.path)));
-        commands.push(format!(
-            "cars export {} --csv -o tables",
-            shell::path(&run.path)
-        ));
+    );
+    let paths: Vec<String> = runs.iter().map(|run| shell::path(&run.path)).collect();
+    let mut commands = vec![format!("cars report {} -o report.html", paths.join(" "))];
+    if let Some(path) = paths.first() {
+        commands.push(format!("cars verify {path}"));
+        commands.push(format!("cars export {path} --csv -o tables"));
     }
     page.commands(&commands);
 
-    let mut table = Table::new(vec![
-        Column::text("Run"),
-        Column::number("epoch"),
-        Column::number("seed"),
-        Column::text("version"),
-        Column::text("commit"),
-        Column::text("digest"),
-    ]);
+    let mut table = Table::new("Run | epoch | seed | version | commit | digest");
     for run in runs {
         let facts = &run.facts;
-        let commit = match &facts.commit {
-            Some(commit) => Cell::Code(commit.clone()),
-            None => Cell::text("unknown"),
-        };
-        table.rows.push(vec![
-            Cell::text(&run.name),
-            Cell::Count(u64::from(run.files.epoch)),
-            Cell::Count(facts.seed),
-            Cell::text(&facts.version),
-            commit,
+        let commit = facts.commit.clone().map(Cell::Code);
+        table.row([
+            run.name.as_str().into(),
+            u64::from(run.files.epoch).into(),
+            facts.seed.into(),
+            facts.version.as_str().into(),
+            commit.unwrap_or("unknown".into()),
             Cell::Code(facts.digest.clone()),
         ]);
     }
-    page.table(&[Part::text("What the runs were made with.")], &table);
+    page.table("What the runs were made with.", &table);
 
     let mut scenarios: BTreeMap<String, Vec<&Run>> = BTreeMap::new();
     for run in runs {
-        scenarios
-            .entry(without_seed(&run.scenario))
-            .or_default()
-            .push(run);
+        let lines = run.scenario.lines();
+        let without_seed: Vec<&str> = lines.filter(|line| !line.starts_with("seed = ")).collect();
+        let same = scenarios.entry(without_seed.join("\n")).or_default();
+        same.push(run);
     }
     for runs in scenarios.into_values() {
-        let [first, others @ ..] = &runs[..] else {
-            continue;
-        };
-        let name = match others.len() {
-            0 => format!("Scenario of {}", first.name),
-            count => format!(
-                "Scenario of {}; that of {count} more differs by the seed only",
-                first.name
-            ),
-        };
+        let (first, others) = (runs[0], runs.len() - 1);
+        let mut name = format!("Scenario of {}", first.name);
+        if others > 0 {
+            name += &format!("; that of {others} more differs by the seed only");
+        }
         page.file(&name, &first.scenario);
     }
-}
-
-/// A scenario without the line of its seed.
-fn without_seed(scenario: &str) -> String {
-    let lines = scenario.lines().filter(|line| !line.starts_with("seed = "));
-    lines.collect::<Vec<_>>().join("\n")
 }

@@ -1,17 +1,22 @@
 //! The results of an experiment as a report needs them: by condition, arm and measure.
 
 use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 
 use observe::{Measure, Measured};
-use pictures::Estimate;
+use pictures::{Estimate, Panel};
 use statistics::TimeTo;
 
+use super::limits::panels;
 use crate::experiment::{
     Arm, Cell, Condition, Contrast, Estimated, Outcome, Results, SHOWN_P, Shown,
 };
 
 /// Most arms that are shown.
 const MAX_ARMS: usize = 24;
+
+/// How many values a factor has of which lines are drawn.
+const LINE_LEVELS: RangeInclusive<usize> = 3..=60;
 
 /// The results of an experiment.
 pub(super) struct Study<'a> {
@@ -99,6 +104,52 @@ impl<'a> Study<'a> {
         self.factors.iter().position(|factor| factor == name)
     }
 
+    /// All cells of the design, arm by arm under each condition.
+    pub(super) fn places(&self) -> Vec<CellPlace> {
+        let conditions = 0..self.conditions.len();
+        let under = |condition| (0..self.arms.len()).map(move |arm| (condition, arm));
+        conditions.flat_map(under).collect()
+    }
+
+    /// A panel for each condition under which an arm has something to show, as many as are allowed, and a sentence about those
+    /// that are left out. `of` is what an arm shows, and `draw` draws what those of a condition show.
+    pub(super) fn panels<T>(
+        &self,
+        of: impl Fn(CellPlace) -> Option<T>,
+        draw: impl Fn(&str, Vec<T>) -> String,
+    ) -> (Vec<Panel>, String) {
+        let mut shown = Vec::new();
+        for (condition, name) in self.conditions.iter().enumerate() {
+            let arms = 0..self.arms.len();
+            let of_arms: Vec<T> = arms.filter_map(|arm| of((condition, arm))).collect();
+            if !of_arms.is_empty() {
+                shown.push((self.heading(name), of_arms));
+            }
+        }
+        panels("conditions", shown, |(heading, of_arms)| {
+            let svg = draw(&heading, of_arms);
+            Panel::new(heading, svg)
+        })
+    }
+
+    /// The name of the arm of a cell, and the index by which it has its color and marker: that of the baseline is the first one.
+    pub(super) fn arm(&self, (_, arm): CellPlace) -> (String, usize) {
+        let baseline = self.results.plan.experiment.baseline.as_ref();
+        let mut arms = self.arms.iter();
+        let look = match arms.position(|one| Some(&one.name) == baseline) {
+            Some(baseline) if arm == baseline => 0,
+            Some(baseline) if arm < baseline => arm + 1,
+            _ => arm,
+        };
+        (self.arms[arm].name.clone(), look)
+    }
+
+    /// The condition and the arm of a cell, for a table.
+    pub(super) fn place_cells(&self, (condition, arm): CellPlace) -> [pictures::Cell; 2] {
+        let condition = self.heading(&self.conditions[condition]);
+        [condition.into(), self.arms[arm].name.as_str().into()]
+    }
+
     /// The runs of an arm under a condition.
     pub(super) fn runs(&self, place: CellPlace) -> &[&'a Outcome] {
         self.cells.get(&place).map_or(&[], Vec::as_slice)
@@ -145,13 +196,12 @@ impl<'a> Study<'a> {
     pub(super) fn contrast(
         &self,
         measure: &Measure,
-        condition: &Condition,
-        arm: &Arm,
+        (condition, arm): CellPlace,
     ) -> Option<&Contrast> {
         self.contrasts.iter().find(|contrast| {
             contrast.measure == measure.name
-                && contrast.condition == condition.name
-                && contrast.arm == arm.name
+                && contrast.condition == self.conditions[condition].name
+                && contrast.arm == self.arms[arm].name
         })
     }
 
@@ -180,8 +230,64 @@ impl<'a> Study<'a> {
     }
 }
 
+/// The conditions along a factor whose values are numbers.
+pub(super) struct Line<'a> {
+    /// The factor.
+    pub(super) factor: &'a str,
+    /// The values of the other factors in words; empty if there are none.
+    pub(super) others: String,
+    /// The conditions, with growing values of the factor.
+    pub(super) levels: Vec<Level<'a>>,
+}
+
+/// A value of a factor.
+pub(super) struct Level<'a> {
+    pub(super) x: f64,
+    pub(super) name: &'a str,
+    /// Index of the condition that has it.
+    pub(super) condition: usize,
+}
+
+/// The conditions along the factor that the experiment file names, or the only factor if its values are numbers and enough for
+/// a line: a line for each combination of the other factors. Otherwise there are none.
+pub(super) fn lines<'a>(study: &Study<'a>) -> Vec<Line<'a>> {
+    let is_only = study.factors.len() == 1 && LINE_LEVELS.contains(&study.conditions.len());
+    let Some(factor) = study.named_axis().or(is_only.then_some(0)) else {
+        return Vec::new();
+    };
+
+    let mut lines: Vec<Line<'_>> = Vec::new();
+    for (index, condition) in study.conditions.iter().enumerate() {
+        let mut others = condition.levels.clone();
+        others.remove(factor);
+        let others = named(&others);
+        let (_, name) = &condition.levels[factor];
+        let Some(x) = level_number(name) else {
+            return Vec::new();
+        };
+
+        let level = Level {
+            x,
+            name,
+            condition: index,
+        };
+        match lines.iter_mut().find(|line| line.others == others) {
+            Some(line) => line.levels.push(level),
+            None => lines.push(Line {
+                factor: study.factors[factor],
+                others,
+                levels: vec![level],
+            }),
+        }
+    }
+    for line in &mut lines {
+        line.levels.sort_by(|a, b| a.x.total_cmp(&b.x));
+    }
+    lines
+}
+
 /// Names levels of factors. A named condition stands for itself.
-pub(super) fn named<'a>(levels: impl IntoIterator<Item = &'a (String, String)>) -> String {
+fn named<'a>(levels: impl IntoIterator<Item = &'a (String, String)>) -> String {
     let mut parts = Vec::new();
     for (factor, level) in levels {
         if factor == "condition" {
@@ -224,6 +330,6 @@ pub(super) fn axis(measure: &Measure) -> String {
 }
 
 /// The number that the value of a factor begins with.
-pub(super) fn level_number(level: &str) -> Option<f64> {
+fn level_number(level: &str) -> Option<f64> {
     level.split_whitespace().next()?.parse().ok()
 }

@@ -2,12 +2,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use pictures::{Cell, Figure, Matrix, MatrixCell, MatrixLabel, Panel, Table, state_class};
 use protocol::RobotName;
-use pictures::{Cell, Column, Figure, Matrix, MatrixCell, MatrixLabel, Panel, Part, State, Table};
+use timeline::Kind;
 
 use super::course::states_of;
 use super::facts::RunFacts;
-use super::limits::{MAX_PANELS, limited};
+use super::limits::panels;
 use super::words::counted;
 
 /// How often a state, the first one, was followed by another one.
@@ -16,116 +17,89 @@ type Counts = BTreeMap<(String, String), u64>;
 /// The transitions between emotions and those between behaviors, over these runs: a matrix for each robot. What has no
 /// transition has no figure.
 pub(super) fn transitions(runs: &[&RunFacts]) -> Vec<Figure> {
-    let mut figures = Vec::new();
-    for (state, what) in [(State::Emotion, "emotions"), (State::Behavior, "behaviors")] {
-        let mut panels = Vec::new();
-        let mut table = Table::new(vec![
-            Column::text("Robot"),
-            Column::text("from"),
-            Column::text("to"),
-            Column::number("count"),
-            Column::number("share of the row, %"),
-        ]);
-        let counts = counts(runs, state);
-        let all = counts.len();
-        for (name, counts) in counts.into_iter().take(MAX_PANELS) {
-            let chart = matrix(name, state, what, &counts);
-            panels.push(Panel {
-                heading: name.to_string(),
-                svg: chart.draw(),
-                is_wide: chart.is_wide(),
-            });
-            add_rows(&mut table, name, &counts);
-        }
-        if panels.is_empty() {
-            continue;
-        }
-
-        let (panels, sentence) = limited(panels, all, "robots");
-        let caption = format!(
-            "Transitions between {what}: how often the state of the row was followed by that of the column, and below it the share \
-             of all transitions from the row. Darker is a larger share. n = {}.{sentence}",
-            counted(runs.len(), "run")
-        );
-        figures.push(Figure {
-            panels,
-            caption: vec![Part::text(caption)],
-            table: Some(table),
-        });
-    }
-    figures
+    let kinds = [(Kind::Emotion, "emotions"), (Kind::Behavior, "behaviors")];
+    let figures = kinds.map(|(kind, what)| figure(runs, kind, what));
+    figures.into_iter().flatten().collect()
 }
 
-/// The transitions of each robot that has some.
-fn counts<'a>(runs: &[&'a RunFacts], state: State) -> BTreeMap<&'a RobotName, Counts> {
+fn figure(runs: &[&RunFacts], kind: Kind, what: &str) -> Option<Figure> {
     let mut counts: BTreeMap<&RobotName, Counts> = BTreeMap::new();
     for (name, robot) in runs.iter().flat_map(|run| &run.robots) {
-        for (transition, count) in &states_of(robot, state).transitions {
+        for (transition, count) in &states_of(robot, kind).transitions {
             let of_robot = counts.entry(name).or_default();
             *of_robot.entry(transition.clone()).or_insert(0) += count;
         }
     }
-    counts
-}
-
-/// Transitions from each state.
-fn row_sums(counts: &Counts) -> BTreeMap<&str, u64> {
-    let mut sums = BTreeMap::new();
-    for ((from, _), count) in counts {
-        *sums.entry(from.as_str()).or_insert(0) += count;
+    if counts.is_empty() {
+        return None;
     }
-    sums
+
+    let mut table = Table::new("Robot | from | to | count | share of the row, %");
+    let counts = counts.into_iter().collect();
+    let (panels, sentence) = panels("robots", counts, |(name, counts)| {
+        let title = format!("Transitions between {what} of {name}");
+        matrix(name, title, kind, &counts, &mut table)
+    });
+    let caption = format!(
+        "Transitions between {what}: how often the state of the row was followed by that of the column, and below it the share \
+         of all transitions from the row. Darker is a larger share. n = {}.{sentence}",
+        counted(runs.len(), "run")
+    );
+    Some(Figure {
+        panels,
+        caption: caption.into(),
+        table: Some(table),
+    })
 }
 
-fn matrix(name: &RobotName, state: State, what: &str, counts: &Counts) -> Matrix {
-    let sums = row_sums(counts);
+/// The matrix of a robot, whose numbers are added to the table.
+fn matrix(
+    name: &RobotName,
+    title: String,
+    kind: Kind,
+    counts: &Counts,
+    table: &mut Table,
+) -> Panel {
+    let mut sums: BTreeMap<&str, u64> = BTreeMap::new();
     let mut states = BTreeSet::new();
-    for (from, to) in counts.keys() {
-        states.insert(from.as_str());
-        states.insert(to.as_str());
+    for ((from, to), count) in counts {
+        *sums.entry(from).or_default() += count;
+        states.extend([from.as_str(), to]);
     }
 
-    let mut labels = Vec::new();
-    let mut cells = Vec::new();
-    for from in &states {
-        labels.push(MatrixLabel {
-            text: (*from).to_owned(),
-            color: Some(state.class(from)),
-        });
-        let mut row = Vec::new();
-        for to in &states {
-            let key = ((*from).to_owned(), (*to).to_owned());
-            row.push(counts.get(&key).map(|count| {
-                let share = *count as f64 / sums[from] as f64;
-                MatrixCell {
-                    share,
-                    text: count.to_string(),
-                    remark: format!("{:.0} %", 100.0 * share),
-                }
-            }));
+    let label = |state: &&str| MatrixLabel {
+        text: (*state).to_owned(),
+        color: Some(state_class(kind, state)),
+    };
+    let labels: Vec<MatrixLabel> = states.iter().map(label).collect();
+    let mut cells = vec![vec![None; states.len()]; states.len()];
+    let states: Vec<&str> = states.into_iter().collect();
+    for ((from, to), count) in counts {
+        let share = *count as f64 / sums[from.as_str()] as f64;
+        let place = |state: &String| states.binary_search(&state.as_str());
+        if let (Ok(row), Ok(column)) = (place(from), place(to)) {
+            cells[row][column] = Some(MatrixCell {
+                share,
+                text: count.to_string(),
+                remark: format!("{:.0} %", 100.0 * share),
+            });
         }
-        cells.push(row);
+        table.row([
+            name.as_str().into(),
+            from.as_str().into(),
+            to.as_str().into(),
+            (*count).into(),
+            Cell::Number(100.0 * share, 1),
+        ]);
     }
-    Matrix {
-        title: format!("Transitions between {what} of {name}"),
+
+    let chart = Matrix {
+        title,
         rows_title: "from".to_owned(),
         columns_title: "to".to_owned(),
         rows: labels.clone(),
         columns: labels,
         cells,
-    }
-}
-
-fn add_rows(table: &mut Table, name: &RobotName, counts: &Counts) {
-    let sums = row_sums(counts);
-    for ((from, to), count) in counts {
-        let share = *count as f64 / sums[from.as_str()] as f64;
-        table.rows.push(vec![
-            Cell::text(name.as_str()),
-            Cell::text(from),
-            Cell::text(to),
-            Cell::Count(*count),
-            Cell::Number(100.0 * share, 1),
-        ]);
-    }
+    };
+    chart.panel(name.as_str())
 }

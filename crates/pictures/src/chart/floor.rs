@@ -2,10 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::markup::number;
-
 use crate::axis::{draw_below, draw_left};
-use crate::canvas::{Chart, PANEL_PX};
+use crate::chart::{PANEL_PX, begin, end};
+use crate::markup::{Markup, number};
 use crate::palette::{HEAT_SHADES, level};
 use crate::scale::Scale;
 
@@ -15,7 +14,7 @@ const MAX_PX: f64 = 420.0;
 /// The time that a robot spent in each part of the floor.
 #[derive(Debug, Clone)]
 pub struct Floor {
-    /// Name of the chart.
+    /// Name of the svg.
     pub title: String,
     /// Width and height of the field, meters.
     pub field_m: [f64; 2],
@@ -44,16 +43,17 @@ impl Floor {
         let y = Scale::new(0.0, height_m, bottom, top);
 
         let description = self.description();
-        let mut chart = Chart::begin("floor", PANEL_PX, bottom + 64.0, &self.title, &description);
-        draw_below(&mut chart, &x, top, bottom, "x, m");
-        draw_left(&mut chart, &y, left, right);
+        let height = bottom + 64.0;
+        let mut svg = begin("floor", PANEL_PX, height, &self.title, &description);
+        draw_below(&mut svg, &x, top, bottom, "x, m");
+        draw_left(&mut svg, &y, left, right);
         let middle = f64::midpoint(top, bottom);
-        chart.upward("muted", 12.0, middle, "middle", "y, m");
-        self.draw_times(&mut chart, &x, &y);
-        self.draw_obstacles(&mut chart, &x, &y);
-        chart.rect("frame", left, top, right - left, bottom - top);
-        self.draw_key(&mut chart, left, bottom + 42.0);
-        chart.finish()
+        svg.upward("muted", 12.0, middle, "middle", "y, m");
+        self.draw_times(&mut svg, &x, &y);
+        self.draw_obstacles(&mut svg, &x, &y);
+        svg.rect("frame", (left, top), right - left, bottom - top);
+        self.draw_key(&mut svg, left, bottom + 42.0);
+        end(svg)
     }
 
     /// The longest time in one part, seconds.
@@ -73,33 +73,26 @@ impl Floor {
     }
 
     /// Darkness grows with the square root of the time, so that ways are seen beside places to wait.
-    fn draw_times(&self, chart: &mut Chart, x: &Scale, y: &Scale) {
+    fn draw_times(&self, svg: &mut Markup, x: &Scale, y: &Scale) {
         let most_s = self.most_s().max(f64::MIN_POSITIVE);
         let mut paths: BTreeMap<usize, String> = BTreeMap::new();
 
         for ((column, row), time_s) in &self.times_s {
-            let from_x = x.at(f64::from(*column) * self.part_m);
-            let to_x = x.at(f64::from(*column + 1) * self.part_m);
-            let from_y = y.at(f64::from(*row) * self.part_m);
-            let to_y = y.at(f64::from(*row + 1) * self.part_m);
-
+            let ends = |scale: &Scale, part: u32| {
+                [part, part + 1].map(|part| number(scale.at(f64::from(part) * self.part_m)))
+            };
+            let [left, right] = ends(x, *column);
+            let [bottom, top] = ends(y, *row);
             let path = paths.entry(level((time_s / most_s).sqrt())).or_default();
-            *path += &format!(
-                "M{} {}H{}V{}H{}z",
-                number(from_x),
-                number(to_y),
-                number(to_x),
-                number(from_y),
-                number(from_x)
-            );
+            *path += &format!("M{left} {top}H{right}V{bottom}H{left}z");
         }
 
         for (level, path) in paths {
-            chart.path(&format!("h{level}"), &path);
+            svg.path(&format!("h{level}"), &path);
         }
     }
 
-    fn draw_obstacles(&self, chart: &mut Chart, x: &Scale, y: &Scale) {
+    fn draw_obstacles(&self, svg: &mut Markup, x: &Scale, y: &Scale) {
         let half = self.body_m / 2.0;
         for [center_x, center_y] in &self.obstacles {
             let left = x.at(center_x - half);
@@ -107,25 +100,23 @@ impl Floor {
             let width = x.at(center_x + half) - left;
             let height = y.at(center_y - half) - top;
 
-            chart.group(
-                "obstacle",
-                &format!("obstacle at {center_x:.2} m, {center_y:.2} m"),
-            );
-            chart.rect("obstacle", left, top, width, height);
-            chart.close();
+            let title = format!("obstacle at {center_x:.2} m, {center_y:.2} m");
+            svg.group("obstacle", &title);
+            svg.rect("obstacle", (left, top), width, height);
+            svg.close("g");
         }
     }
 
-    fn draw_key(&self, chart: &mut Chart, left: f64, top: f64) {
+    fn draw_key(&self, svg: &mut Markup, left: f64, top: f64) {
         const STEP_PX: f64 = 14.0;
-        chart.text("muted", left, top + 11.0, "start", "0 s");
+        svg.text("muted", left, top + 11.0, "start", "0 s");
         let first = left + 24.0;
         for step in 1..HEAT_SHADES.len() {
             let x = first + (step - 1) as f64 * STEP_PX;
-            chart.rect(&format!("h{step}"), x, top + 2.0, STEP_PX, 10.0);
+            svg.rect(&format!("h{step}"), (x, top + 2.0), STEP_PX, 10.0);
         }
         let end = first + (HEAT_SHADES.len() - 1) as f64 * STEP_PX + 6.0;
         let text = format!("{:.1} s in a part of {:.2} m", self.most_s(), self.part_m);
-        chart.text("muted", end, top + 11.0, "start", &text);
+        svg.text("muted", end, top + 11.0, "start", &text);
     }
 }

@@ -1,30 +1,17 @@
 //! Estimates with their intervals, a row for each arm: means of arms, or differences to a baseline (a forest plot).
 
-use crate::diagram::{shortened, width_px};
-
 use crate::axis::draw_below;
-use crate::canvas::{Chart, LABEL_PX, PANEL_PX};
-use crate::number::typeset;
-use crate::palette::ARMS;
+use crate::chart::{Estimate, PANEL_PX, begin, draw_interval, draw_marker, end};
+use crate::labels::{shortened, widest_px, width_px};
+use crate::markup::Markup;
+use crate::number::{decimals_for, typeset};
 use crate::scale::Scale;
+use crate::shapes::LABEL_PX;
 
 /// Height of a row, pixels.
 const ROW_PX: f64 = 22.0;
-/// Font of the numbers, pixels.
-const NUMBERS_PX: f64 = 10.5;
 /// Most letters of a label.
 const LABEL_LETTERS: usize = 20;
-
-/// An estimate.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Estimate {
-    /// The estimate.
-    pub value: f64,
-    /// Lower and upper end of its interval, if there is one.
-    pub interval: Option<(f64, f64)>,
-    /// Size of the sample.
-    pub n: usize,
-}
 
 /// A row of the chart.
 #[derive(Debug, Clone)]
@@ -48,8 +35,6 @@ pub struct Intervals {
     pub axis: String,
     /// Ends of the axis, the same for charts that are compared.
     pub range: (f64, f64),
-    /// Decimals of the numbers.
-    pub decimals: usize,
     /// A value that is marked by a vertical line, such as no difference.
     pub reference: Option<f64>,
     /// The rows, from top to bottom.
@@ -60,69 +45,54 @@ impl Intervals {
     /// The chart as SVG.
     #[must_use]
     pub fn draw(&self) -> String {
-        let left = self.labels_px() + 18.0;
+        let labels = self.rows.iter().map(|row| &row.label);
+        let left = widest_px(labels, LABEL_LETTERS).max(30.0) + 18.0;
         let right = PANEL_PX - self.numbers_px() - 12.0;
         let top = 4.0;
         let bottom = top + self.rows.len().max(1) as f64 * ROW_PX;
 
-        let description = self.description();
-        let mut chart = Chart::begin(
-            "intervals",
-            PANEL_PX,
-            bottom + 36.0,
-            &self.title,
-            &description,
-        );
+        let titles: Vec<String> = self.rows.iter().map(|row| self.row_title(row)).collect();
+        let description = format!("{}. {}", self.axis, titles.join("; "));
+        let height = bottom + 36.0;
+        let mut svg = begin("intervals", PANEL_PX, height, &self.title, &description);
         let scale = Scale::new(self.range.0, self.range.1, left, right);
-        draw_below(&mut chart, &scale, top, bottom, &self.axis);
+        draw_below(&mut svg, &scale, top, bottom, &self.axis);
         if let Some(reference) = self.reference {
             let x = scale.at(reference);
-            chart.line("zero", (x, top), (x, bottom));
+            svg.line("zero", &[(x, top), (x, bottom)]);
         }
         for (index, row) in self.rows.iter().enumerate() {
             let middle = top + (index as f64 + 0.5) * ROW_PX;
-            self.draw_row(&mut chart, &scale, row, middle);
+            svg.group("row", &self.row_title(row));
+            self.draw_row(&mut svg, &scale, row, middle);
+            svg.close("g");
         }
-        chart.finish()
+        end(svg)
     }
 
-    fn draw_row(&self, chart: &mut Chart, scale: &Scale, row: &IntervalRow, middle: f64) {
-        chart.group("row", &self.row_title(row));
+    fn draw_row(&self, svg: &mut Markup, scale: &Scale, row: &IntervalRow, middle: f64) {
         let label = shortened(&row.label, LABEL_LETTERS);
-        chart.text("", scale.from_px - 12.0, middle + 4.0, "end", &label);
-
+        svg.text("", scale.from_px() - 12.0, middle + 4.0, "end", &label);
         if let Some(estimate) = row.estimate {
             if let Some((low, high)) = estimate.interval {
-                let class = format!("curve solid a{}", row.arm % ARMS);
-                chart.line(&class, (scale.at(low), middle), (scale.at(high), middle));
+                let ends = [low, high].map(|value| (scale.at(value), middle));
+                draw_interval(svg, row.arm, ends[0], ends[1]);
             }
             let place = (scale.at(estimate.value), middle);
-            chart.marker(row.arm, place, row.is_filled);
+            draw_marker(svg, row.arm, place, row.is_filled);
         }
 
-        chart.text(
-            "tick",
-            PANEL_PX - 1.0,
-            middle + 4.0,
-            "end",
-            &self.numbers(row),
-        );
-        chart.close();
+        let numbers = self.numbers(row);
+        svg.text("tick", PANEL_PX - 1.0, middle + 4.0, "end", &numbers);
+    }
+
+    fn decimals(&self) -> usize {
+        decimals_for(self.range.1 - self.range.0)
     }
 
     fn numbers(&self, row: &IntervalRow) -> String {
-        let Some(estimate) = row.estimate else {
-            return "none".to_owned();
-        };
-        let value = typeset(estimate.value, self.decimals);
-        match estimate.interval {
-            Some((low, high)) => {
-                let low = typeset(low, self.decimals);
-                let high = typeset(high, self.decimals);
-                format!("{value} [{low}, {high}]")
-            }
-            None => value,
-        }
+        let estimate = row.estimate;
+        estimate.map_or_else(|| "none".to_owned(), |one| one.words(self.decimals()))
     }
 
     fn row_title(&self, row: &IntervalRow) -> String {
@@ -130,31 +100,14 @@ impl Intervals {
         format!("{}: {}, n = {n}", row.label, self.numbers(row))
     }
 
-    fn description(&self) -> String {
-        let rows: Vec<String> = self.rows.iter().map(|row| self.row_title(row)).collect();
-        format!("{}. {}", self.axis, rows.join("; "))
-    }
-
-    fn labels_px(&self) -> f64 {
-        let mut widest: f64 = 30.0;
-        for row in &self.rows {
-            widest = widest.max(width_px(&shortened(&row.label, LABEL_LETTERS), LABEL_PX));
-        }
-        widest
-    }
-
     /// Width of the widest numbers that the axis allows, so that charts of one figure have their axes in one place.
     fn numbers_px(&self) -> f64 {
-        let (from, to) = self.range;
-        let mut widest: f64 = 0.0;
-        for end in [from, to] {
-            let end = typeset(end, self.decimals);
-            let numbers = format!("{end} [{end}, {end}]");
-            widest = widest.max(width_px(&numbers, NUMBERS_PX));
-        }
-        for row in &self.rows {
-            widest = widest.max(width_px(&self.numbers(row), NUMBERS_PX));
-        }
-        widest.min(150.0)
+        let ends = [self.range.0, self.range.1].map(|end| typeset(end, self.decimals()));
+        let possible = ends.map(|end| format!("{end} [{end}, {end}]"));
+        let shown = self.rows.iter().map(|row| self.numbers(row));
+        let widths = shown
+            .chain(possible)
+            .map(|numbers| width_px(&numbers, LABEL_PX));
+        widths.fold(0.0, f64::max).min(150.0)
     }
 }

@@ -1,9 +1,11 @@
 //! A matrix of shaded cells: transitions between states, or a measure over two factors.
 
-use crate::diagram::{shortened, width_px};
-
-use crate::canvas::{Chart, LABEL_PX, PANEL_PX, SMALL_PX, WIDE_PX};
+use crate::chart::{PANEL_PX, WIDE_PX, begin, end};
+use crate::labels::{shortened, widest_px, width_px};
+use crate::markup::Markup;
+use crate::page::Panel;
 use crate::palette::level;
+use crate::shapes::{LABEL_PX, Point, SMALL_PX};
 
 /// Most rows and columns that are drawn.
 const MOST: usize = 24;
@@ -21,6 +23,15 @@ pub struct MatrixLabel {
     pub text: String,
     /// Class of the color beside it; none if it has no color.
     pub color: Option<String>,
+}
+
+impl From<&str> for MatrixLabel {
+    fn from(text: &str) -> Self {
+        Self {
+            text: text.to_owned(),
+            color: None,
+        }
+    }
 }
 
 /// A cell.
@@ -52,6 +63,15 @@ pub struct Matrix {
 }
 
 impl Matrix {
+    /// The chart as a panel, which is as wide as its numbers need.
+    #[must_use]
+    pub fn panel(&self, heading: impl Into<String>) -> Panel {
+        Panel {
+            is_wide: self.is_wide(),
+            ..Panel::new(heading, self.draw())
+        }
+    }
+
     /// Whether its numbers need the width of the page.
     #[must_use]
     pub fn is_wide(&self) -> bool {
@@ -62,7 +82,7 @@ impl Matrix {
 
     /// Where the cells begin.
     fn left(&self) -> f64 {
-        labels_px(&self.rows[..self.rows.len().min(MOST)]).clamp(50.0, 130.0) + 20.0
+        labels_px(&self.rows).clamp(50.0, 130.0) + 20.0
     }
 
     /// Width of a cell in a chart of this width.
@@ -88,34 +108,44 @@ impl Matrix {
             38.0
         };
         let cell_px = self.cell_px(width);
-        let bottom = top + rows.len() as f64 * ROW_PX;
+        let height = top + rows.len() as f64 * ROW_PX + 6.0;
 
-        let description = self.description();
-        let mut chart = Chart::begin("matrix", width, bottom + 6.0, &self.title, &description);
-        let rows_title = format!("{} ↓", self.rows_title);
-        let columns_title = format!("{} →", self.columns_title);
-        chart.text("muted", left - 6.0, top - 5.0, "end", &rows_title);
-        chart.text("muted", left - 6.0, top - 19.0, "end", &columns_title);
+        let [of_rows, of_columns] = [&self.rows_title, &self.columns_title];
+        let description = format!(
+            "{} rows ({of_rows}) and {} columns ({of_columns}); darker cells are larger",
+            self.rows.len(),
+            self.columns.len()
+        );
+        let mut svg = begin("matrix", width, height, &self.title, &description);
+        let end_px = left - 6.0;
+        svg.text("muted", end_px, top - 5.0, "end", &format!("{of_rows} ↓"));
+        svg.text(
+            "muted",
+            end_px,
+            top - 19.0,
+            "end",
+            &format!("{of_columns} →"),
+        );
         for (index, label) in columns.iter().enumerate() {
             let middle = left + (index as f64 + 0.5) * cell_px;
             let text = shortened(&label.text, LABEL_LETTERS);
             if is_upward {
-                chart.upward("", middle + 4.0, top - names_px, "start", &text);
+                svg.upward("", middle + 4.0, top - names_px, "start", &text);
             } else {
-                chart.text("", middle, top - names_px, "middle", &text);
+                svg.text("", middle, top - names_px, "middle", &text);
             }
             if let Some(color) = &label.color {
-                chart.rect(color, middle - 5.0, top - 12.0, 10.0, 8.0);
+                svg.rect(color, (middle - 5.0, top - 12.0), 10.0, 8.0);
             }
         }
         for (index, label) in rows.iter().enumerate() {
             let middle = top + (index as f64 + 0.5) * ROW_PX;
             if let Some(color) = &label.color {
-                chart.rect(color, left - 14.0, middle - 5.0, 8.0, 10.0);
+                svg.rect(color, (left - 14.0, middle - 5.0), 8.0, 10.0);
             }
-            let end = left - if label.color.is_some() { 20.0 } else { 8.0 };
+            let end_px = left - if label.color.is_some() { 20.0 } else { 8.0 };
             let text = shortened(&label.text, LABEL_LETTERS);
-            chart.text("", end, middle + 4.0, "end", &text);
+            svg.text("", end_px, middle + 4.0, "end", &text);
         }
 
         for (row, cells) in self.cells.iter().take(rows.len()).enumerate() {
@@ -123,29 +153,16 @@ impl Matrix {
                 let x = left + column as f64 * cell_px;
                 let y = top + row as f64 * ROW_PX;
                 let title = format!("{} → {}", rows[row].text, columns[column].text);
-                draw_cell(&mut chart, cell.as_ref(), &title, (x, y), cell_px);
+                draw_cell(&mut svg, cell.as_ref(), &title, (x, y), cell_px);
             }
         }
-        chart.finish()
-    }
-
-    fn description(&self) -> String {
-        format!(
-            "{} rows ({}) and {} columns ({}); darker cells are larger",
-            self.rows.len(),
-            self.rows_title,
-            self.columns.len(),
-            self.columns_title
-        )
+        end(svg)
     }
 }
 
 fn labels_px(labels: &[MatrixLabel]) -> f64 {
-    let mut widest: f64 = 0.0;
-    for label in labels {
-        widest = widest.max(width_px(&shortened(&label.text, LABEL_LETTERS), LABEL_PX));
-    }
-    widest
+    let labels = labels.iter().take(MOST);
+    widest_px(labels.map(|label| &label.text), LABEL_LETTERS)
 }
 
 /// Whether the number of a cell is shown in this width.
@@ -153,31 +170,25 @@ fn fits(cell: &MatrixCell, width: f64) -> bool {
     width_px(&cell.text, LABEL_PX) <= width + 4.0
 }
 
-fn draw_cell(
-    chart: &mut Chart,
-    cell: Option<&MatrixCell>,
-    title: &str,
-    (x, y): (f64, f64),
-    width: f64,
-) {
+fn draw_cell(svg: &mut Markup, cell: Option<&MatrixCell>, title: &str, (x, y): Point, width: f64) {
     let Some(cell) = cell else {
-        chart.rect("none", x, y, width, ROW_PX);
+        svg.rect("none", (x, y), width, ROW_PX);
         return;
     };
 
     let level = level(cell.share);
     let title = format!("{title}: {} {}", cell.text, cell.remark);
-    chart.group("cell", title.trim_end());
-    chart.rect(&format!("box h{level}"), x, y, width, ROW_PX);
+    svg.group("cell", title.trim_end());
+    svg.rect(&format!("box h{level}"), (x, y), width, ROW_PX);
     let middle = x + width / 2.0;
     if fits(cell, width) {
         let up = if cell.remark.is_empty() { 0.0 } else { 4.0 };
         let class = format!("on-h{level}");
-        chart.text(&class, middle, y + 17.0 - up, "middle", &cell.text);
+        svg.text(&class, middle, y + 17.0 - up, "middle", &cell.text);
         if !cell.remark.is_empty() && width_px(&cell.remark, SMALL_PX) <= width + 2.0 {
-            let class = format!("small on-h{level}");
-            chart.text(&class, middle, y + 22.5, "middle", &cell.remark);
+            let class = format!("small {class}");
+            svg.text(&class, middle, y + 22.5, "middle", &cell.remark);
         }
     }
-    chart.close();
+    svg.close("g");
 }

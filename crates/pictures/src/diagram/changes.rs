@@ -4,7 +4,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use protocol::Tick;
-use toml::{Table, Value};
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use toml::Table;
 
 use crate::diagram::items::Change;
 
@@ -20,14 +22,43 @@ const MAX_LINKS: usize = 2;
 /// A link, in the direction of its messages.
 type Link = (String, String);
 
+/// An entry of `fault` of a scenario.
+#[derive(Deserialize, PartialEq)]
+struct Fault {
+    #[serde(rename = "do")]
+    kind: String,
+    robot: String,
+    at: Option<String>,
+    until: Option<String>,
+    #[serde(flatten)]
+    rest: Table,
+}
+
+/// An entry of `network.partition`.
+#[derive(Deserialize, PartialEq)]
+struct Partition {
+    groups: Vec<Vec<String>>,
+    #[serde(default)]
+    one_way: bool,
+    from: Option<String>,
+    until: Option<String>,
+}
+
+/// An entry of `network.lose`.
+#[derive(Deserialize, PartialEq)]
+struct Loss {
+    from: String,
+    to: String,
+    #[serde(flatten)]
+    rest: Table,
+}
+
 /// The changes of a tick in few words.
 pub(crate) fn in_words(changes: &[Change], tick_s: f64) -> String {
     let mut words = Vec::new();
     for change in changes {
-        match known(change, tick_s) {
-            Some(mut known) => words.append(&mut known),
-            None => words.push(elided(&change.set)),
-        }
+        let known = known(change, tick_s);
+        words.extend(known.unwrap_or_else(|| vec![elided(&change.set)]));
     }
 
     let count = words.len();
@@ -38,9 +69,7 @@ pub(crate) fn in_words(changes: &[Change], tick_s: f64) -> String {
             label += &format!(", +{}", count - index);
             break;
         }
-        if index > 0 {
-            label += ", ";
-        }
+        label += if index > 0 { ", " } else { "" };
         label += &word;
     }
     label
@@ -48,75 +77,91 @@ pub(crate) fn in_words(changes: &[Change], tick_s: f64) -> String {
 
 /// What a change of one of the lists of a scenario does; `None` if it is of something else.
 fn known(change: &Change, tick_s: f64) -> Option<Vec<String>> {
-    let (path, list) = parse(&change.set)?;
-    let before = change.before.as_deref().and_then(parse);
-    let changed = Changed {
-        list,
-        before: before.map(|(_, list)| list),
-        now: change.tick,
-        tick_s,
-    };
-
-    let words = match path {
-        "fault" => changed.faults()?,
-        "network.partition" => changed.partitions()?,
-        "network.lose" => changed.losses()?,
+    let (path, _) = change.set.split_once('=')?;
+    let (what, words, is_empty) = match path.trim() {
+        "fault" => {
+            let changed = Changed::<Fault>::read(change, tick_s)?;
+            ("faults", changed.words()?, changed.list.is_empty())
+        }
+        "network.partition" => {
+            let changed = Changed::<Partition>::read(change, tick_s)?;
+            ("partitions", changed.words()?, changed.list.is_empty())
+        }
+        "network.lose" => {
+            let changed = Changed::<Loss>::read(change, tick_s)?;
+            ("losses", changed.words(), changed.list.is_empty())
+        }
         _ => return None,
     };
-    if !words.is_empty() {
-        return Some(words);
-    }
-    let what = match path {
-        "fault" => "faults",
-        "network.partition" => "partitions",
-        _ => "losses",
-    };
-    let how = if changed.list.is_empty() {
-        format!("no {what}")
-    } else {
-        format!("{what} as before")
-    };
-    Some(vec![how])
-}
 
-/// Path and elements of a list of tables that is set; `None` if it is none.
-fn parse(set: &str) -> Option<(&str, Vec<Table>)> {
-    let (path, value) = set.split_once('=')?;
-    let mut parsed: Table = toml::from_str(&format!("value = {value}")).ok()?;
-    let Value::Array(values) = parsed.remove("value")? else {
-        return None;
-    };
-
-    let mut list = Vec::new();
-    for value in values {
-        let Value::Table(table) = value else {
-            return None;
-        };
-        list.push(table);
-    }
-    Some((path.trim(), list))
+    Some(match (words.is_empty(), is_empty) {
+        (false, _) => words,
+        (true, true) => vec![format!("no {what}")],
+        (true, false) => vec![format!("{what} as before")],
+    })
 }
 
 /// A list of a scenario that is set.
-struct Changed {
-    list: Vec<Table>,
+struct Changed<T> {
+    list: Vec<T>,
     /// The list that was set before, as far as a change has set it.
-    before: Option<Vec<Table>>,
+    before: Option<Vec<T>>,
     /// The tick from which on it is set.
     now: Tick,
     tick_s: f64,
 }
 
-impl Changed {
+impl<T: DeserializeOwned + PartialEq> Changed<T> {
+    /// `None` if what is set is not such a list.
+    fn read(change: &Change, tick_s: f64) -> Option<Self> {
+        let parse = |set: &str| {
+            let (_, value) = set.split_once('=')?;
+            let mut parsed: BTreeMap<String, Vec<T>> =
+                toml::from_str(&format!("list = {value}")).ok()?;
+            parsed.remove("list")
+        };
+        Some(Self {
+            list: parse(&change.set)?,
+            before: change.before.as_deref().and_then(parse),
+            now: change.tick,
+            tick_s,
+        })
+    }
+
+    /// The elements that were not in the list before.
+    fn added(&self) -> impl Iterator<Item = &T> {
+        let before = self.before.as_deref().unwrap_or_default();
+        self.list.iter().filter(|one| !before.contains(one))
+    }
+
+    /// A time as a tick, none for none; `None` if it cannot be read.
+    fn tick(&self, time: Option<&String>) -> Option<Option<Tick>> {
+        let Some(time) = time else {
+            return Some(None);
+        };
+
+        let (number, unit) = time.trim().split_once(' ')?;
+        let unit_s = match unit.trim() {
+            "ms" => 0.001,
+            "s" => 1.0,
+            "min" => 60.0,
+            "h" => 3600.0,
+            _ => return None,
+        };
+        let time_s = number.parse::<f64>().ok()? * unit_s;
+        Some(Some((time_s / self.tick_s).round() as Tick))
+    }
+}
+
+impl Changed<Fault> {
     /// What happens to processes now; if nothing does, what was added, or else removed.
-    fn faults(&self) -> Option<Vec<String>> {
+    fn words(&self) -> Option<Vec<String>> {
         let mut words = Vec::new();
         for fault in &self.list {
-            let kind = text(fault, "do")?;
-            let robot = text(fault, "robot")?;
-            if self.tick(fault, "at")? == Some(self.now) {
+            let Fault { kind, robot, .. } = fault;
+            if self.tick(fault.at.as_ref())? == Some(self.now) {
                 words.push(format!("{kind} {robot}"));
-            } else if self.tick(fault, "until")? == Some(self.now) {
+            } else if self.tick(fault.until.as_ref())? == Some(self.now) {
                 words.push(format!("recover {robot}"));
             }
         }
@@ -125,115 +170,73 @@ impl Changed {
         }
 
         for fault in self.added() {
-            let kind = text(fault, "do")?;
-            let robot = text(fault, "robot")?;
-            words.push(format!("{kind} {robot} at {}", text(fault, "at")?));
+            let at = fault.at.as_ref()?;
+            words.push(format!("{} {} at {at}", fault.kind, fault.robot));
         }
-        for fault in self.before.iter().flatten() {
-            if !self.list.contains(fault) && words.is_empty() {
-                words.push(format!(
-                    "no {} {}",
-                    text(fault, "do")?,
-                    text(fault, "robot")?
-                ));
-            }
+        if words.is_empty() {
+            let mut before = self.before.iter().flatten();
+            let removed = before.find(|fault| !self.list.contains(fault));
+            words.extend(removed.map(|fault| format!("no {} {}", fault.kind, fault.robot)));
         }
         Some(words)
     }
+}
 
+impl Changed<Partition> {
     /// The links that are cut and healed now; if none is, the partitions that were added.
-    fn partitions(&self) -> Option<Vec<String>> {
+    fn words(&self) -> Option<Vec<String>> {
         let before = self.before.as_ref().unwrap_or(&self.list);
         let before = self.cut_at(before, self.now.saturating_sub(1))?;
         let after = self.cut_at(&self.list, self.now)?;
 
         let mut words = Vec::new();
-        words.extend(links("cut", after.difference(&before).cloned().collect()));
-        words.extend(links("heal", before.difference(&after).cloned().collect()));
+        words.extend(links("cut", after.difference(&before).cloned()));
+        words.extend(links("heal", before.difference(&after).cloned()));
         if !words.is_empty() {
             return Some(words);
         }
 
         for partition in self.added() {
-            let cut = links("cut", separated(partition)?);
-            let until = text(partition, "until");
+            let until = partition.until.as_ref();
             let until = until.map_or(String::new(), |until| format!(" until {until}"));
+            let cut = links("cut", separated(partition));
             words.extend(cut.map(|cut| format!("{cut}{until}")));
         }
         Some(words)
     }
 
-    /// The links on which further commands are lost.
-    fn losses(&self) -> Option<Vec<String>> {
-        let mut losing = BTreeSet::new();
-        for lost in self.added() {
-            losing.insert((text(lost, "from")?.to_owned(), text(lost, "to")?.to_owned()));
-        }
-        Some(links("lose", losing).into_iter().collect())
-    }
-
-    /// The elements that were not in the list before.
-    fn added(&self) -> impl Iterator<Item = &Table> {
-        let before = self.before.as_deref().unwrap_or_default();
-        self.list.iter().filter(|one| !before.contains(one))
-    }
-
     /// The links that are cut in a tick.
-    fn cut_at(&self, partitions: &[Table], tick: Tick) -> Option<BTreeSet<Link>> {
+    fn cut_at(&self, partitions: &[Partition], tick: Tick) -> Option<BTreeSet<Link>> {
         let mut cut = BTreeSet::new();
         for partition in partitions {
-            let has_begun = self
-                .tick(partition, "from")?
-                .is_some_and(|from| from <= tick);
-            let is_over = self
-                .tick(partition, "until")?
-                .is_some_and(|until| until <= tick);
-
+            let from = self.tick(partition.from.as_ref())?;
+            let until = self.tick(partition.until.as_ref())?;
+            let has_begun = from.is_some_and(|from| from <= tick);
+            let is_over = until.is_some_and(|until| until <= tick);
             if has_begun && !is_over {
-                cut.extend(separated(partition)?);
+                cut.extend(separated(partition));
             }
         }
-
         Some(cut)
     }
+}
 
-    /// A time as a tick; `Some(None)` if the table does not have it.
-    fn tick(&self, table: &Table, key: &str) -> Option<Option<Tick>> {
-        let Some(value) = table.get(key) else {
-            return Some(None);
-        };
-
-        let (number, unit) = value.as_str()?.trim().split_once(' ')?;
-        let unit_s = match unit.trim() {
-            "ms" => 0.001,
-            "s" => 1.0,
-            "min" => 60.0,
-            "h" => 3600.0,
-            _ => return None,
-        };
-
-        let time_s = number.parse::<f64>().ok()? * unit_s;
-        Some(Some((time_s / self.tick_s).round() as Tick))
+impl Changed<Loss> {
+    /// The links on which further commands are lost.
+    fn words(&self) -> Vec<String> {
+        let added = self.added();
+        let losing = added.map(|loss| (loss.from.clone(), loss.to.clone()));
+        let losing: BTreeSet<Link> = losing.collect();
+        links("lose", losing).into_iter().collect()
     }
 }
 
 /// The links between the groups of a partition.
-fn separated(partition: &Table) -> Option<BTreeSet<Link>> {
-    let mut groups = Vec::new();
-    for group in partition.get("groups")?.as_array()? {
-        let mut names = Vec::new();
-        for name in group.as_array()? {
-            names.push(name.as_str()?.to_owned());
-        }
-        groups.push(names);
-    }
-    let is_one_way = partition.get("one_way").and_then(Value::as_bool);
-    let is_one_way = is_one_way.unwrap_or_default();
-
+fn separated(partition: &Partition) -> BTreeSet<Link> {
     let mut links = BTreeSet::new();
-    for (own, group) in groups.iter().enumerate() {
-        for (other, others) in groups.iter().enumerate() {
-            if own == other || (is_one_way && own > other) {
+    for (own, group) in partition.groups.iter().enumerate() {
+        for (other, others) in partition.groups.iter().enumerate() {
+            if own == other || (partition.one_way && own > other) {
                 continue;
             }
             for from in group {
@@ -241,16 +244,16 @@ fn separated(partition: &Table) -> Option<BTreeSet<Link>> {
             }
         }
     }
-    Some(links)
+    links
 }
 
-/// What is done to links, in few words; `None` without links.
-fn links(verb: &str, links: BTreeSet<Link>) -> Option<String> {
-    let count = links.len();
+/// What is done to links, each named once, in few words; `None` without links.
+fn links(verb: &str, links: impl IntoIterator<Item = Link>) -> Option<String> {
+    let mut count = 0;
     let mut pairs: BTreeMap<Link, &str> = BTreeMap::new();
     for (from, to) in links {
-        let back = (to.clone(), from.clone());
-        match pairs.get_mut(&back) {
+        count += 1;
+        match pairs.get_mut(&(to.clone(), from.clone())) {
             Some(arrow) => *arrow = "↔",
             None => {
                 pairs.insert((from, to), "→");
@@ -258,20 +261,13 @@ fn links(verb: &str, links: BTreeSet<Link>) -> Option<String> {
         }
     }
 
+    let named = pairs.iter();
+    let named = named.map(|((from, to), arrow)| format!("{from} {arrow} {to}"));
     match pairs.len() {
         0 => None,
-        1..=MAX_LINKS => {
-            let pairs = pairs.into_iter();
-            let named = pairs.map(|((from, to), arrow)| format!("{from} {arrow} {to}"));
-            let named: Vec<String> = named.collect();
-            Some(format!("{verb} {}", named.join(", ")))
-        }
+        1..=MAX_LINKS => Some(format!("{verb} {}", named.collect::<Vec<_>>().join(", "))),
         _ => Some(format!("{verb} {count} links")),
     }
-}
-
-fn text<'a>(table: &'a Table, key: &str) -> Option<&'a str> {
-    table.get(key)?.as_str()
 }
 
 /// A setting as it is; of one that is long, the beginning and the end.

@@ -6,9 +6,10 @@ use protocol::Tick;
 use protocol::event::Cause;
 
 use crate::diagram::items::{Command, CommandEnd, Items, QueriesLost};
-use crate::diagram::labels::Area;
-use crate::diagram::picture::{LABEL_PX, Label, OUTSIDE_PX, Picture};
-use crate::diagram::words::{self, width_px};
+use crate::diagram::picture::{OUTSIDE_PX, Picture, Place};
+use crate::diagram::words;
+use crate::labels::{Area, shortened};
+use crate::shapes::Point;
 
 /// Distance of the first wait from the target's lane, pixels.
 const WAIT_PX: f64 = 12.0;
@@ -18,14 +19,14 @@ const NEXT_WAIT_PX: f64 = 5.0;
 const MAX_WAITS: usize = 6;
 /// How far the two ends of a doubled command are from where it arrives, pixels.
 const FORK_PX: f64 = 4.0;
-
-/// A point of the picture, pixels.
-type Point = (f64, f64);
+/// Most letters of a command in a label.
+const LABEL_LETTERS: usize = 24;
 
 /// Where the waits at each lane end, by index of the lane and whether the commands come from above.
 type Waits = BTreeMap<(usize, bool), Vec<f64>>;
 
 /// The way of a command over the picture.
+#[derive(Default)]
 struct Route {
     /// To where it waits, arrives, forks or is lost.
     line: Vec<Point>,
@@ -73,17 +74,15 @@ fn draw_command<'a>(
         (false, true) => "delivered",
         (false, false) => "under-way",
     };
-    let mut class = format!("command {fate}");
     let comes_in = command.sent < picture.window.from;
+    let mut class = format!("command {fate}");
     for (applies, word) in [
         (command.until.is_some(), " delayed"),
         (command.is_doubled, " doubled"),
         (comes_in, " enters"),
         (!is_over, " leaves"),
     ] {
-        if applies {
-            class += word;
-        }
+        class += if applies { word } else { "" };
     }
 
     let title = picture.titles.command(command);
@@ -91,7 +90,7 @@ fn draw_command<'a>(
     picture
         .svg
         .tag("g")
-        .with("class", &class)
+        .class(&class)
         .count("data-tick", tick)
         .with("data-from", command.from.as_str())
         .with("data-to", command.to.as_str())
@@ -113,45 +112,28 @@ fn draw_command<'a>(
 }
 
 fn draw_route(picture: &mut Picture, route: &Route, comes_in: bool) {
-    let mut lines = Vec::new();
-    if !route.line.is_empty() {
-        picture.path("line", &route.line);
-        lines.extend(route.line.windows(2).map(|ends| [ends[0], ends[1]]));
-    }
-    if !route.wait.is_empty() {
-        picture.path("wait", &route.wait);
-        lines.extend(route.wait.windows(2).map(|ends| [ends[0], ends[1]]));
-    }
-    for branch in &route.branches {
-        picture.path("line", branch);
-        lines.push(*branch);
-    }
-    for [from, to] in lines {
-        picture.labels.avoid_line(from, to);
+    let mut lines: Vec<(&str, &[Point])> = vec![("line", &route.line), ("wait", &route.wait)];
+    lines.extend(route.branches.iter().map(|branch| ("line", &branch[..])));
+    for (class, points) in lines {
+        if !points.is_empty() {
+            picture.line(class, points);
+        }
+        for ends in points.windows(2) {
+            picture.labels.avoid_line(ends[0], ends[1]);
+        }
     }
 
     if !comes_in && let Some((x, y)) = route.line.first() {
-        picture
-            .svg
-            .tag("circle")
-            .with("class", "start")
-            .at("cx", *x)
-            .at("cy", *y)
-            .at("r", 2.0)
-            .empty();
+        let circle = picture.svg.tag("circle").class("start");
+        circle.at("cx", *x).at("cy", *y).at("r", 2.0).empty();
     }
     for [from, to] in &route.heads {
-        picture.triangle("head", *from, *to);
+        picture.svg.triangle("head", *from, *to);
     }
     for ((x, y), _) in &route.breaks {
-        picture.cross("break", *x, *y);
-        picture.labels.take(Area {
-            left: x - 5.0,
-            top: y - 5.0,
-            width: 10.0,
-            height: 10.0,
-            is_before: false,
-        });
+        picture.svg.cross("break", (*x, *y));
+        let area = Area::between((x - 5.0, y - 5.0), (x + 5.0, y + 5.0));
+        picture.labels.take(area);
     }
 }
 
@@ -182,9 +164,9 @@ fn course(picture: &Picture, command: &Command) -> Option<Course> {
     };
 
     let start_x = if command.sent < picture.window.from {
-        picture.scale.left_px() - OUTSIDE_PX
+        picture.scale.from_px() - OUTSIDE_PX
     } else {
-        picture.scale.x(command.sent)
+        picture.x(command.sent)
     };
     Some(Course {
         start: (start_x, start_y),
@@ -205,10 +187,7 @@ fn route(picture: &Picture, command: &Command, waits: &mut Waits) -> Option<Rout
     let course = course(picture, command)?;
     let mut route = Route {
         line: vec![course.start],
-        wait: Vec::new(),
-        branches: Vec::new(),
-        heads: Vec::new(),
-        breaks: Vec::new(),
+        ..Route::default()
     };
     match (command.until, last_end) {
         (Some(until), _) => {
@@ -216,7 +195,7 @@ fn route(picture: &Picture, command: &Command, waits: &mut Waits) -> Option<Rout
             add_wait(&mut route, picture, command, &course, over, waits);
         }
         (None, Some(tick)) => {
-            let end = (picture.scale.x(tick), course.end_y);
+            let end = (picture.x(tick), course.end_y);
             let mut turn = course.start;
             if course.is_to_itself {
                 // Down and up again.
@@ -226,7 +205,7 @@ fn route(picture: &Picture, command: &Command, waits: &mut Waits) -> Option<Rout
             add_ends(&mut route, command, turn, end, course.down);
         }
         (None, None) => {
-            let out_x = picture.scale.right_px() + OUTSIDE_PX;
+            let out_x = picture.scale.to_px() + OUTSIDE_PX;
             let half_y = (course.start.1 + course.end_y) / 2.0;
             route.line.push((out_x, half_y));
         }
@@ -250,12 +229,12 @@ fn add_wait(
     let begin_x = if waits_already {
         course.start.0
     } else {
-        picture.scale.x(command.sent + 1)
+        picture.x(command.sent + 1)
     };
     let end_x = if over > window.to {
-        picture.scale.right_px() + OUTSIDE_PX
+        picture.scale.to_px() + OUTSIDE_PX
     } else {
-        picture.scale.x(over)
+        picture.x(over)
     };
 
     let slot = take_slot(waits, course.waits_at, begin_x, end_x);
@@ -292,10 +271,7 @@ fn take_slot(waits: &mut Waits, key: (usize, bool), begin_x: f64, end_x: f64) ->
 fn add_ends(route: &mut Route, command: &Command, turn: Point, end: Point, down: f64) {
     let is_waiting = !route.wait.is_empty();
     let fork = if command.is_doubled && !is_waiting {
-        (
-            turn.0 + 0.6 * (end.0 - turn.0),
-            turn.1 + 0.6 * (end.1 - turn.1),
-        )
+        at_share(turn, end, 0.6)
     } else {
         turn
     };
@@ -337,58 +313,43 @@ pub(crate) fn place_labels(picture: &mut Picture, wanted: &[Wanted<'_>]) {
 }
 
 fn place_label(picture: &mut Picture, wanted: &Wanted<'_>) {
-    let command = wanted.command;
-    let text = words::label(command);
-    let text_px = width_px(&text, LABEL_PX);
-    let performative = command.performative.name();
-    let whole_px = width_px(performative, LABEL_PX) + width_px(" ", LABEL_PX) + text_px;
-
-    for (prefix, width) in [(performative, whole_px), ("", text_px)] {
-        let candidates = beside(wanted.beside, width);
-        if let Some(area) = picture.labels.place(&candidates) {
-            picture.placed.push(Label {
-                area,
-                class: "text",
-                tick: command.sent,
-                prefix,
-                text,
-            });
-            break;
-        }
+    let tick = wanted.command.sent;
+    let text = shortened(&wanted.command.text, LABEL_LETTERS);
+    let performative = wanted.command.performative.name();
+    let places = beside(wanted.beside);
+    // With the performative if there is enough space.
+    let is_placed = picture.label_with_prefix("text", tick, performative, text.clone(), &places);
+    if !is_placed {
+        picture.label("text", tick, text, &places);
     }
 
     for ((x, y), because) in &wanted.breaks {
-        let text = words::cause(*because);
-        let width = width_px(text, LABEL_PX);
-        let mut candidates = Vec::new();
+        let mut places = Vec::new();
         for middle in [*y, *y + 12.0, *y - 12.0] {
-            candidates.push(Area::of_label(x + 8.0, middle, width));
-            candidates.push(Area::of_label_before(x - 8.0, middle, width));
+            places.push(Place::After(x + 8.0, middle));
+            places.push(Place::Before(x - 8.0, middle));
         }
-        if let Some(area) = picture.labels.place(&candidates) {
-            picture.placed.push(Label {
-                area,
-                class: "reason",
-                tick: command.sent,
-                prefix: "",
-                text: text.to_owned(),
-            });
-        }
+        picture.label("reason", tick, words::cause(*because), &places);
     }
 }
 
 /// Places for a label beside a line.
-fn beside([from, to]: [Point; 2], width: f64) -> Vec<Area> {
-    let mut candidates = Vec::new();
+fn beside([from, to]: [Point; 2]) -> Vec<Place> {
+    let mut places = Vec::new();
     for distance in [6.0, 14.0] {
         for share in [0.5, 0.35, 0.65, 0.22, 0.78] {
-            let x = from.0 + share * (to.0 - from.0);
-            let y = from.1 + share * (to.1 - from.1);
-            candidates.push(Area::of_label(x + distance, y, width));
-            candidates.push(Area::of_label_before(x - distance, y, width));
+            let (x, y) = at_share(from, to, share);
+            places.push(Place::After(x + distance, y));
+            places.push(Place::Before(x - distance, y));
         }
     }
-    candidates
+    places
+}
+
+/// The point that is at this share of a line.
+fn at_share(from: Point, to: Point, share: f64) -> Point {
+    let x = from.0 + share * (to.0 - from.0);
+    (x, from.1 + share * (to.1 - from.1))
 }
 
 /// Draws the queries that were lost: dashes at the lane of the robot that would have asked, with a stub towards the other.
@@ -415,17 +376,7 @@ fn draw_lost_queries(picture: &mut Picture, lost: &QueriesLost) {
     };
 
     let title = picture.titles.queries(lost);
-    let begin = lost.period.begin;
-    let ticks = lost.period.end.map_or(1, |end| end - begin);
-    let tick = picture.shown(begin);
-    picture
-        .svg
-        .tag("g")
-        .with("class", "queries")
-        .count("data-tick", tick)
-        .count("data-ticks", ticks)
-        .open();
-    picture.svg.title(&title);
-    picture.path("query", &[(left, stub), (left, edge), (left + width, edge)]);
+    picture.open_ticks("queries", lost.period, &title);
+    picture.line("query", &[(left, stub), (left, edge), (left + width, edge)]);
     picture.close();
 }

@@ -54,6 +54,18 @@ impl Items {
         }
     }
 
+    /// When things began and were over.
+    pub(crate) fn periods(&self) -> impl Iterator<Item = Period> {
+        let states = self.bands.iter().map(|band| band.period);
+        let cuts = self.cuts.iter().map(|cut| cut.period);
+        let faults = self.faults.iter().map(|fault| fault.period);
+        let missed = self.missed.iter().map(|missed| missed.period);
+        let absences = self.absences.iter().map(|absence| absence.period);
+        let queries = self.queries.iter().map(|lost| lost.period);
+        let of_robots = states.chain(faults).chain(missed).chain(absences);
+        of_robots.chain(cuts).chain(queries)
+    }
+
     /// Adds those of another list.
     pub(crate) fn append(&mut self, mut other: Self) {
         self.bands.append(&mut other.bands);

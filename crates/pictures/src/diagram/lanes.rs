@@ -1,10 +1,11 @@
 //! The vertical layout: a lane for each robot, and a thin one for the operator if it sends commands.
 
 use std::collections::BTreeSet;
+use std::ops::Range;
 
 use protocol::RobotName;
 
-use crate::diagram::words::width_px;
+use crate::labels::width_px;
 
 /// Height of the process strip above the bands, pixels.
 pub(crate) const STRIP_PX: f64 = 5.0;
@@ -38,14 +39,6 @@ pub(crate) struct Lane {
 }
 
 impl Lane {
-    pub(crate) fn emotion_top(&self) -> f64 {
-        self.top + STRIP_PX
-    }
-
-    pub(crate) fn behavior_top(&self) -> f64 {
-        self.emotion_top() + EMOTION_PX
-    }
-
     pub(crate) fn middle(&self) -> f64 {
         (self.top + self.bottom) / 2.0
     }
@@ -64,13 +57,15 @@ pub(crate) struct Lanes {
 impl Lanes {
     /// Lanes with these names. Between those of `links` there are lines, which need space.
     pub(crate) fn new(names: &[RobotName], links: &BTreeSet<(&RobotName, &RobotName)>) -> Self {
-        let is_crossed = crossed(names, links);
-        let gaps = is_crossed
-            .iter()
-            .filter(|is_crossed| **is_crossed)
-            .count()
-            .max(1) as f64;
-        let gap_px = (GAPS_PX / gaps).clamp(MIN_GAP_PX, GAP_PX);
+        let mut is_crossed = vec![false; names.len()];
+        let index = |name: &RobotName| names.iter().position(|other| other == name);
+        for (from, to) in links {
+            if let (Some(from), Some(to)) = (index(from), index(to)) {
+                is_crossed[from.min(to)..from.max(to)].fill(true);
+            }
+        }
+        let gaps = is_crossed.iter().filter(|is_crossed| **is_crossed).count();
+        let gap_px = (GAPS_PX / gaps.max(1) as f64).clamp(MIN_GAP_PX, GAP_PX);
 
         let mut all = Vec::new();
         let mut names_px: f64 = 46.0;
@@ -111,18 +106,10 @@ impl Lanes {
     pub(crate) fn lane(&self, name: &RobotName) -> Option<&Lane> {
         self.all.iter().find(|lane| lane.name == *name)
     }
-}
 
-/// For each lane, whether lines cross the space below it.
-fn crossed(names: &[RobotName], links: &BTreeSet<(&RobotName, &RobotName)>) -> Vec<bool> {
-    let index = |name: &RobotName| names.iter().position(|other| other == name);
-    let mut is_crossed = vec![false; names.len()];
-    for (from, to) in links {
-        if let Some(from) = index(from)
-            && let Some(to) = index(to)
-        {
-            is_crossed[from.min(to)..from.max(to)].fill(true);
-        }
+    /// The lanes below which a line between two others crosses the space.
+    pub(crate) fn between(&self, from: &RobotName, to: &RobotName) -> Option<Range<usize>> {
+        let (from, to) = (self.index(from)?, self.index(to)?);
+        Some(from.min(to)..from.max(to))
     }
-    is_crossed
 }

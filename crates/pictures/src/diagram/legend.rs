@@ -3,208 +3,153 @@
 use std::collections::BTreeSet;
 
 use crate::diagram::items::{BandKind, Command, Items};
-use crate::diagram::picture::{CAPTION_PX, LABEL_PX, Picture};
-use crate::diagram::style::{behavior_class, emotion_class};
-use crate::diagram::words::{shortened, width_px};
+use crate::diagram::picture::{CAPTION_PX, Picture, Window};
+use crate::labels::{in_rows, shortened, width_px};
+use crate::markup::Markup;
+use crate::palette::state_class;
+use crate::shapes::LABEL_PX;
 
 /// Most letters of a name in the legend.
 const NAME_LETTERS: usize = 24;
+/// Most entries of a kind.
+const MAX_ENTRIES: usize = 40;
 /// Distance of two rows of entries, pixels.
 const ROW_PX: f64 = 16.0;
 /// Width of a sign, pixels.
 const SIGN_PX: f64 = 17.0;
 
-/// A sign that needs an explanation.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Sign {
-    Command,
-    Delayed,
-    Doubled,
-    Lost,
-    Cut,
-    Queries,
-    Missed,
-    HeldUp,
-}
+/// Draws a sign from `x` on; `y` is its middle.
+type Draw = fn(&mut Markup, f64, f64);
 
-impl Sign {
-    /// In the order of the legend.
-    const ALL: [Self; 8] = [
-        Self::Command,
-        Self::Delayed,
-        Self::Doubled,
-        Self::Lost,
-        Self::Cut,
-        Self::Queries,
-        Self::Missed,
-        Self::HeldUp,
-    ];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Command => "command",
-            Self::Delayed => "held back",
-            Self::Doubled => "doubled",
-            Self::Lost => "lost",
-            Self::Cut => "links cut",
-            Self::Queries => "query lost",
-            Self::Missed => "tick missed",
-            Self::HeldUp => "clock held",
-        }
-    }
-
-    /// Whether the window has it.
-    fn occurs(self, picture: &Picture, items: &Items) -> bool {
-        let window = picture.window;
-        let commands = &items.commands;
-
-        match self {
-            Self::Command => !commands.is_empty(),
-            Self::Delayed => commands.iter().any(|command| command.until.is_some()),
-            Self::Doubled => commands.iter().any(|command| command.is_doubled),
-            Self::Lost => commands.iter().any(Command::is_lost),
-            Self::Cut => !items.cuts.is_empty(),
-            Self::Queries => {
-                let mut queries = items.queries.iter();
-                queries.any(|lost| window.clip(lost.period).is_some())
-            }
-            Self::Missed => {
-                let mut missed = items.missed.iter();
-                missed.any(|missed| window.clip(missed.period).is_some())
-            }
-            Self::HeldUp => !items.held_up.is_empty(),
-        }
-    }
-
-    /// Draws it from `x` on; `y` is its middle.
-    fn draw(self, picture: &mut Picture, x: f64, y: f64) {
-        let end = x + SIGN_PX;
-
-        match self {
-            Self::Command => {
-                picture.path("line", &[(x, y), (end - 3.0, y)]);
-                picture.triangle("head-sign", (x, y), (end, y));
-            }
-            Self::Delayed => picture.path("wait", &[(x, y), (end, y)]),
-            Self::Doubled => {
-                picture.path("line", &[(end, y - 4.5), (x + 4.0, y), (x, y)]);
-                picture.path("line", &[(x + 4.0, y), (end, y + 4.5)]);
-            }
-            Self::Lost => {
-                picture.path("line", &[(x, y), (end - 3.0, y)]);
-                picture.cross("break-sign", end - 3.0, y);
-            }
-            Self::Cut => picture.rect("cut", x, y - 5.5, SIGN_PX, 11.0),
-            Self::Queries => picture.path("query", &[(x, y + 4.0), (x, y), (end, y)]),
-            Self::Missed => {
-                for step in [0.0, 5.0, 10.0] {
-                    let left = x + step;
-                    picture.path("hatch", &[(left, y + 4.5), (left + 5.0, y - 4.5)]);
+/// The signs that a window has, with their names.
+fn signs(window: Window, items: &Items) -> Vec<(&'static str, Draw)> {
+    let commands = &items.commands;
+    let mut queries = items.queries.iter();
+    let mut missed = items.missed.iter();
+    let signs: [(bool, &str, Draw); 8] = [
+        (!commands.is_empty(), "command", |svg, x, y| {
+            svg.line("line", &[(x, y), (x + SIGN_PX - 3.0, y)]);
+            svg.triangle("head-sign", (x, y), (x + SIGN_PX, y));
+        }),
+        (
+            commands.iter().any(|command| command.until.is_some()),
+            "held back",
+            |svg, x, y| svg.line("wait", &[(x, y), (x + SIGN_PX, y)]),
+        ),
+        (
+            commands.iter().any(|command| command.is_doubled),
+            "doubled",
+            |svg, x, y| {
+                let (fork, end) = ((x + 4.0, y), x + SIGN_PX);
+                svg.line("line", &[(end, y - 4.5), fork, (x, y)]);
+                svg.line("line", &[fork, (end, y + 4.5)]);
+            },
+        ),
+        (
+            commands.iter().any(Command::is_lost),
+            "lost",
+            |svg, x, y| {
+                let end = (x + SIGN_PX - 3.0, y);
+                svg.line("line", &[(x, y), end]);
+                svg.cross("break-sign", end);
+            },
+        ),
+        (!items.cuts.is_empty(), "links cut", |svg, x, y| {
+            svg.rect("cut", (x, y - 5.5), SIGN_PX, 11.0);
+        }),
+        (
+            queries.any(|lost| window.clip(lost.period).is_some()),
+            "query lost",
+            |svg, x, y| svg.line("query", &[(x, y + 4.0), (x, y), (x + SIGN_PX, y)]),
+        ),
+        (
+            missed.any(|missed| window.clip(missed.period).is_some()),
+            "tick missed",
+            |svg, x, y| {
+                for left in [x, x + 5.0, x + 10.0] {
+                    svg.line("hatch", &[(left, y + 4.5), (left + 5.0, y - 4.5)]);
                 }
-            }
-            Self::HeldUp => {
-                let middle = x + SIGN_PX / 2.0;
-                picture.triangle("held", (middle, y - 4.0), (middle, y + 4.0));
-            }
-        }
-    }
-}
-
-/// An entry of the legend of colors.
-struct Entry {
-    class: String,
-    name: String,
+            },
+        ),
+        (!items.held_up.is_empty(), "clock held", |svg, x, y| {
+            let middle = x + SIGN_PX / 2.0;
+            svg.triangle("held", (middle, y - 4.0), (middle, y + 4.0));
+        }),
+    ];
+    let occurring = signs.into_iter().filter(|(occurs, ..)| *occurs);
+    occurring.map(|(_, name, draw)| (name, draw)).collect()
 }
 
 /// Draws the legend below the axis. Returns the lower end of the picture.
 pub(crate) fn draw_legend(picture: &mut Picture, items: &Items) -> f64 {
-    let mut y = picture.lanes.bottom + 50.0;
-    let mut signs = Sign::ALL.to_vec();
-    signs.retain(|sign| sign.occurs(picture, items));
-    if !signs.is_empty() {
-        y = draw_signs(picture, &signs, y) + 17.0;
-    }
-
-    for (kind, caption) in [
-        (BandKind::Emotion, "emotion"),
-        (BandKind::Behavior, "behavior"),
-    ] {
-        let entries = entries(picture, items, kind);
-        if !entries.is_empty() {
-            y = draw_entries(picture, caption, &entries, y) + 17.0;
-        }
-    }
-    y - 4.0
+    let signs = signs(picture.window, items);
+    let names: Vec<&str> = signs.iter().map(|(name, _)| *name).collect();
+    let y = picture.lanes.bottom + 50.0;
+    let y = draw_entries(
+        picture,
+        "sign",
+        &names,
+        SIGN_PX + 6.0,
+        y,
+        |svg, index, x, y| {
+            (signs[index].1)(svg, x, y - 3.5);
+        },
+    );
+    let y = draw_colors(picture, items, BandKind::Emotion, "emotion", y);
+    draw_colors(picture, items, BandKind::Behavior, "behavior", y) - 4.0
 }
 
-/// Draws the signs in as many rows as they need, the first one with the base line `y`; returns that of the last one.
-fn draw_signs(picture: &mut Picture, signs: &[Sign], y: f64) -> f64 {
-    let left = picture.scale.left_px();
-    let right = picture.right_px;
-    picture.text("muted", left - CAPTION_PX, y, "end", "sign");
-
-    let mut x = left;
-    let mut y = y;
-    for sign in signs {
-        let width = SIGN_PX + 22.0 + width_px(sign.name(), LABEL_PX);
-        if x + width > right && x > left {
-            x = left;
-            y += ROW_PX;
+/// Draws the colors of the states of a kind; returns where the next entries are.
+fn draw_colors(picture: &mut Picture, items: &Items, kind: BandKind, caption: &str, y: f64) -> f64 {
+    let mut found = BTreeSet::new();
+    for band in &items.bands {
+        if band.kind == kind && picture.window.clip(band.period).is_some() {
+            let color = state_class(kind, &band.name);
+            found.insert((color, shortened(&band.name, NAME_LETTERS)));
         }
-        let class = if *sign == Sign::Lost {
+    }
+    let (colors, names): (Vec<_>, Vec<_>) = found.into_iter().take(MAX_ENTRIES).unzip();
+    draw_entries(picture, caption, &names, 16.0, y, |svg, index, x, y| {
+        let class = format!("band {}", colors[index]);
+        svg.rect(&class, (x, y - 9.0), 12.0, 11.0);
+    })
+}
+
+/// Draws entries in as many rows as they need, the first one with the base line `y`: what `draw` draws, in a width of `sign_px`,
+/// before the names. Returns the base line of what is below; without entries there is nothing.
+fn draw_entries<N: AsRef<str>>(
+    picture: &mut Picture,
+    caption: &str,
+    names: &[N],
+    sign_px: f64,
+    y: f64,
+    draw: impl Fn(&mut Markup, usize, f64, f64),
+) -> f64 {
+    if names.is_empty() {
+        return y;
+    }
+
+    let left = picture.scale.from_px();
+    let svg = &mut picture.svg;
+    svg.text("muted", left - CAPTION_PX, y, "end", caption);
+    let names = names.iter().map(AsRef::as_ref);
+    let widths = names
+        .clone()
+        .map(|name| sign_px + width_px(name, LABEL_PX) + 16.0);
+    let places = in_rows(widths, left, picture.right_px);
+    let last = places.last().map_or(0, |(_, row)| *row);
+    for (index, (name, (x, row))) in names.zip(places).enumerate() {
+        let y = y + row as f64 * ROW_PX;
+        // The colors of what is lost are those of its class.
+        let class = if name == "lost" {
             "legend lost"
         } else {
             "legend"
         };
-        picture.svg.tag("g").with("class", class).open();
-        sign.draw(picture, x, y - 3.5);
-        picture.text("", x + SIGN_PX + 6.0, y, "start", sign.name());
-        picture.close();
-        x += width;
+        svg.tag("g").class(class).open();
+        draw(svg, index, x, y);
+        svg.text("", x + sign_px, y, "start", name);
+        svg.close("g");
     }
-    y
-}
-
-fn entries(picture: &Picture, items: &Items, kind: BandKind) -> Vec<Entry> {
-    let mut found = BTreeSet::new();
-    for band in &items.bands {
-        if band.kind == kind && picture.window.clip(band.period).is_some() {
-            let color = match kind {
-                BandKind::Emotion => emotion_class(&band.name),
-                BandKind::Behavior => behavior_class(&band.name),
-            };
-            found.insert((color, shortened(&band.name, NAME_LETTERS)));
-        }
-    }
-
-    let mut entries = Vec::new();
-    for (color, name) in found {
-        let class = format!("band {color}");
-        entries.push(Entry { class, name });
-    }
-    entries
-}
-
-/// Draws entries in as many rows as they need; returns the base line of the last one.
-fn draw_entries(picture: &mut Picture, caption: &str, entries: &[Entry], y: f64) -> f64 {
-    const MAX_ENTRIES: usize = 40;
-    let left = picture.scale.left_px();
-    let right = picture.right_px;
-    picture.text("muted", left - CAPTION_PX, y, "end", caption);
-
-    let mut x = left;
-    let mut y = y;
-    for Entry { class, name } in entries.iter().take(MAX_ENTRIES) {
-        let width = 16.0 + width_px(name, LABEL_PX) + 14.0;
-        if x + width > right && x > left {
-            x = left;
-            y += ROW_PX;
-        }
-        picture.svg.tag("g").with("class", "legend").open();
-        picture.rect(class, x, y - 9.0, 12.0, 11.0);
-        picture.text("", x + 16.0, y, "start", name);
-        picture.close();
-        x += width;
-    }
-    y
+    y + last as f64 * ROW_PX + 17.0
 }

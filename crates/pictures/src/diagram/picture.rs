@@ -1,16 +1,15 @@
 //! A picture that is being drawn: where ticks and robots are, and labels that are placed at the end.
 
-use protocol::Tick;
+use protocol::{RobotName, Tick};
 
 use crate::diagram::items::Period;
-use crate::diagram::labels::{Area, Labels};
-use crate::diagram::lanes::Lanes;
-use crate::markup::{Markup, number};
-use crate::diagram::scale::Scale;
+use crate::diagram::lanes::{Lane, Lanes};
 use crate::diagram::words::Titles;
+use crate::labels::{Area, Labels, width_px};
+use crate::markup::Markup;
+use crate::scale::Scale;
+use crate::shapes::{LABEL_PX, Point};
 
-/// Font of labels, pixels.
-pub(crate) const LABEL_PX: f64 = 10.5;
 /// Distance of the captions below the lanes from where the lanes begin, pixels.
 pub(crate) const CAPTION_PX: f64 = 22.0;
 /// Font of the text above the lanes, pixels.
@@ -46,13 +45,20 @@ impl Window {
 
 /// A label that has its place.
 #[derive(Debug)]
-pub(crate) struct Label {
-    pub(crate) area: Area,
-    pub(crate) class: &'static str,
-    pub(crate) tick: Tick,
+struct Label {
+    area: Area,
+    class: &'static str,
+    tick: Tick,
     /// Put before the text, less prominently.
-    pub(crate) prefix: &'static str,
-    pub(crate) text: String,
+    prefix: &'static str,
+    text: String,
+}
+
+/// A place for a label: its left or its right end, and its middle.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Place {
+    After(f64, f64),
+    Before(f64, f64),
 }
 
 /// A picture that is being drawn.
@@ -65,17 +71,51 @@ pub(crate) struct Picture {
     pub(crate) right_px: f64,
     pub(crate) labels: Labels,
     /// Labels are drawn after everything else.
-    pub(crate) placed: Vec<Label>,
+    placed: Vec<Label>,
     pub(crate) window: Window,
     pub(crate) titles: Titles,
 }
 
 impl Picture {
+    /// A picture in which nothing is drawn yet. What is above and below the lanes has at least `least_px`.
+    pub(crate) fn new(lanes: Lanes, scale: Scale, least_px: f64, window: Window) -> Self {
+        let (left, right) = (scale.from_px(), scale.to_px());
+        let right_px = right.max(left + least_px);
+        let mut labels = Labels::between(left, right_px + OUTSIDE_PX);
+        for lane in &lanes.all {
+            labels.take(Area::between((left, lane.top), (right, lane.bottom)));
+        }
+
+        Self {
+            svg: Markup::default(),
+            lanes,
+            scale,
+            right_px,
+            labels,
+            placed: Vec::new(),
+            window,
+            titles: Titles {
+                tick_s: window.tick_s,
+            },
+        }
+    }
+
+    /// Where a tick begins. Ticks outside of the window are at its edges.
+    pub(crate) fn x(&self, tick: Tick) -> f64 {
+        self.scale.at(tick as f64)
+    }
+
     /// The left edge and the width of a period, pixels; `None` if it is not in the window.
     pub(crate) fn extent(&self, period: Period) -> Option<(f64, f64)> {
         let (begin, end) = self.window.clip(period)?;
-        let left = self.scale.x(begin);
-        Some((left, self.scale.x(end) - left))
+        let left = self.x(begin);
+        Some((left, (self.x(end) - left).max(0.3)))
+    }
+
+    /// The lane of a robot with the left edge and the width of a period on it; `None` if it is not in the picture.
+    pub(crate) fn on_lane(&self, robot: &RobotName, period: Period) -> Option<(Lane, f64, f64)> {
+        let (left, width) = self.extent(period)?;
+        Some((self.lanes.lane(robot)?.clone(), left, width))
     }
 
     /// The tick that a click on something that began at `begin` shows.
@@ -86,10 +126,17 @@ impl Picture {
     /// Opens a group of elements that belong to one thing.
     pub(crate) fn open(&mut self, class: &str, begin: Tick, title: &str) {
         let tick = self.shown(begin);
-        self.svg
-            .tag("g")
-            .with("class", class)
-            .count("data-tick", tick)
+        let tag = self.svg.tag("g").class(class);
+        tag.count("data-tick", tick).open();
+        self.svg.title(title);
+    }
+
+    /// Opens a group of elements that belong to consecutive ticks.
+    pub(crate) fn open_ticks(&mut self, class: &str, period: Period, title: &str) {
+        let tick = self.shown(period.begin);
+        let tag = self.svg.tag("g").class(class);
+        tag.count("data-tick", tick)
+            .count("data-ticks", period.ticks(period.begin + 1))
             .open();
         self.svg.title(title);
     }
@@ -99,83 +146,51 @@ impl Picture {
     }
 
     /// Straight lines through these points.
-    pub(crate) fn path(&mut self, class: &str, points: &[(f64, f64)]) {
-        let mut d = String::new();
-        for (index, (x, y)) in points.iter().enumerate() {
-            let letter = if index == 0 { 'M' } else { 'L' };
-            d.push(letter);
-            d += &number(*x);
-            d.push(' ');
-            d += &number(*y);
+    pub(crate) fn line(&mut self, class: &str, points: &[Point]) {
+        self.svg.line(class, points);
+    }
+
+    /// Puts a label at the first of these places that is free. Without one it is left out.
+    pub(crate) fn label(
+        &mut self,
+        class: &'static str,
+        tick: Tick,
+        text: impl Into<String>,
+        places: &[Place],
+    ) {
+        self.label_with_prefix(class, tick, "", text.into(), places);
+    }
+
+    /// Puts a label with a prefix at the first of these places that is free; returns whether there is one.
+    pub(crate) fn label_with_prefix(
+        &mut self,
+        class: &'static str,
+        tick: Tick,
+        prefix: &'static str,
+        text: String,
+        places: &[Place],
+    ) -> bool {
+        let mut width = width_px(&text, LABEL_PX);
+        if !prefix.is_empty() {
+            width += width_px(prefix, LABEL_PX) + width_px(" ", LABEL_PX);
+        }
+        let mut candidates = Vec::new();
+        for place in places {
+            candidates.push(match *place {
+                Place::After(left, middle) => Area::after(left, middle, width),
+                Place::Before(right, middle) => Area::before(right, middle, width),
+            });
         }
 
-        self.svg
-            .tag("path")
-            .with("class", class)
-            .with("d", &d)
-            .empty();
-    }
-
-    /// A cross.
-    pub(crate) fn cross(&mut self, class: &str, x: f64, y: f64) {
-        const ARM_PX: f64 = 4.0;
-
-        let d = format!(
-            "M{} {}l8 8M{} {}l8 -8",
-            number(x - ARM_PX),
-            number(y - ARM_PX),
-            number(x - ARM_PX),
-            number(y + ARM_PX)
-        );
-        self.svg
-            .tag("path")
-            .with("class", class)
-            .with("d", &d)
-            .empty();
-    }
-
-    /// A filled triangle whose tip is at `tip`, in the direction from `base`.
-    pub(crate) fn triangle(&mut self, class: &str, base: (f64, f64), tip: (f64, f64)) {
-        const LENGTH_PX: f64 = 7.0;
-        const HALF_WIDTH_PX: f64 = 3.0;
-        let dx = tip.0 - base.0;
-        let dy = tip.1 - base.1;
-        let length = (dx * dx + dy * dy).sqrt().max(0.1);
-        // Of length 1, along the line.
-        let along = (dx / length, dy / length);
-
-        let foot_x = tip.0 - LENGTH_PX * along.0;
-        let foot_y = tip.1 - LENGTH_PX * along.1;
-        let aside_x = HALF_WIDTH_PX * along.1;
-        let aside_y = HALF_WIDTH_PX * along.0;
-        let one = (foot_x - aside_x, foot_y + aside_y);
-        let other = (foot_x + aside_x, foot_y - aside_y);
-        self.path(class, &[tip, one, other]);
-    }
-
-    pub(crate) fn rect(&mut self, class: &str, left: f64, top: f64, width: f64, height: f64) {
-        self.svg
-            .tag("rect")
-            .with("class", class)
-            .at("x", left)
-            .at("y", top)
-            .at("width", width.max(0.3))
-            .at("height", height)
-            .empty();
-    }
-
-    /// A text; `anchor` is its alignment as in SVG.
-    pub(crate) fn text(&mut self, class: &str, x: f64, y: f64, anchor: &str, text: &str) {
-        let mut tag = self
-            .svg
-            .tag("text")
-            .with("class", class)
-            .at("x", x)
-            .at("y", y);
-        if anchor != "start" {
-            tag = tag.with("text-anchor", anchor);
-        }
-        tag.content(text);
+        let area = self.labels.place(&candidates);
+        self.placed.extend(area.map(|area| Label {
+            area,
+            class,
+            tick,
+            prefix,
+            text,
+        }));
+        area.is_some()
     }
 
     /// Draws the labels.
@@ -188,32 +203,24 @@ impl Picture {
     fn draw_label(&mut self, label: &Label) {
         let tick = self.shown(label.tick);
         let area = label.area;
-        let x = if area.is_before {
-            area.left + area.width
+        let (x, anchor) = if area.is_before {
+            (area.left + area.width, "end")
         } else {
-            area.left
+            (area.left, "start")
         };
 
-        let mut tag = self
-            .svg
-            .tag("text")
-            .with("class", &format!("label {}", label.class))
-            .at("x", x)
-            .at("y", area.top + 10.0)
-            .count("data-tick", tick);
-        if area.is_before {
-            tag = tag.with("text-anchor", "end");
-        }
+        let tag = self.svg.tag("text");
+        let tag = tag.class(&format!("label {}", label.class));
+        let tag = tag.at("x", x).at("y", area.top + 10.0);
+        let tag = tag.count("data-tick", tick).anchor(anchor);
         if label.prefix.is_empty() {
             tag.content(&label.text);
             return;
         }
 
         tag.open();
-        self.svg
-            .tag("tspan")
-            .with("class", "performative")
-            .content(&format!("{} ", label.prefix));
+        let prefix = self.svg.tag("tspan").class("performative");
+        prefix.content(&format!("{} ", label.prefix));
         self.svg.tag("tspan").content(&label.text);
         self.svg.close("text");
     }

@@ -1,4 +1,4 @@
-//! Texts of a diagram: names and times, and what is said of each thing in its title.
+//! What is said of each thing in its title.
 
 use protocol::Tick;
 use protocol::event::Cause;
@@ -6,46 +6,15 @@ use protocol::messages::FaultKind;
 use protocol::time::time_s;
 
 use crate::diagram::items::{
-    Absence, Band, BandKind, Change, Command, CommandEnd, Cut, Fault, HeldUp, Joined, Missed,
-    Period, QueriesLost,
+    Absence, Band, BandKind, Change, Command, Cut, Fault, HeldUp, Joined, Missed, Period,
+    QueriesLost,
 };
+use crate::labels::shortened;
 
-/// Most letters of a command in a label.
-const LABEL_LETTERS: usize = 24;
 /// Most letters of a text from a robot in a title.
 const TITLE_LETTERS: usize = 300;
-
-/// Approximate width of a letter in ems of a sans-serif font. Rather too wide, because fonts differ.
-fn letter_em(c: char) -> f64 {
-    match c {
-        'i' | 'j' | 'l' | '.' | ',' | ':' | ';' | '\'' | '|' | ' ' | 'I' => 0.32,
-        'f' | 'r' | 't' | '(' | ')' | '-' => 0.42,
-        'm' | 'w' | 'M' | 'W' | '@' | '%' => 0.9,
-        'A'..='Z' => 0.7,
-        c if c.is_ascii() => 0.6,
-        _ => 1.05,
-    }
-}
-
-/// Approximate width of a text in a sans-serif font, pixels. Rather too wide, because fonts differ.
-#[must_use]
-pub fn width_px(text: &str, font_px: f64) -> f64 {
-    text.chars().map(letter_em).sum::<f64>() * font_px
-}
-
-/// The beginning of a text, with an ellipsis if letters are left out.
-#[must_use]
-pub fn shortened(text: &str, most: usize) -> String {
-    match text.char_indices().nth(most) {
-        Some((end, _)) => format!("{}…", &text[..end]),
-        None => text.to_owned(),
-    }
-}
-
-/// The text of a command in a label.
-pub(crate) fn label(command: &Command) -> String {
-    shortened(&command.text, LABEL_LETTERS)
-}
+/// Most links that the title of a cut names.
+const MAX_CUTS: usize = 12;
 
 /// Simulated seconds, in the fewest digits: to the millisecond, unless ticks are shorter.
 pub(crate) fn seconds(tick: Tick, tick_s: f64) -> String {
@@ -53,7 +22,6 @@ pub(crate) fn seconds(tick: Tick, tick_s: f64) -> String {
     if tick_s < 0.001 {
         return format!("{time_s} s");
     }
-
     format!("{} s", (time_s * 1000.0).round() / 1000.0)
 }
 
@@ -71,7 +39,7 @@ pub(crate) fn cause(cause: Cause) -> &'static str {
 }
 
 /// What happened to a process.
-pub(crate) fn fault(kind: FaultKind) -> &'static str {
+pub(crate) fn fault_name(kind: FaultKind) -> &'static str {
     match kind {
         FaultKind::Crash => "crash",
         FaultKind::Hang => "hang",
@@ -105,21 +73,13 @@ impl Titles {
             BandKind::Behavior => "behavior",
         };
         let name = shortened(&band.name, TITLE_LETTERS);
-        format!(
-            "{}: {kind} {name}, {}",
-            band.robot,
-            self.period(band.period)
-        )
+        let period = self.period(band.period);
+        format!("{}: {kind} {name}, {period}", band.robot)
     }
 
     pub(crate) fn command(self, command: &Command) -> String {
-        let Command {
-            from,
-            to,
-            seq,
-            performative,
-            ..
-        } = command;
+        let (from, to, seq) = (&command.from, &command.to, command.seq);
+        let performative = command.performative;
         let text = shortened(&command.text, TITLE_LETTERS);
         let sent = self.tick(command.sent);
         let mut title =
@@ -131,10 +91,11 @@ impl Titles {
         if command.is_doubled {
             title += "; doubled";
         }
-        for CommandEnd { tick, lost } in &command.ends {
-            title += &match lost {
-                None => format!("; arrives in {}", self.tick(*tick)),
-                Some(because) => format!("; lost in {}, {because}", self.tick(*tick)),
+        for end in &command.ends {
+            let tick = self.tick(end.tick);
+            title += &match end.lost {
+                None => format!("; arrives in {tick}"),
+                Some(because) => format!("; lost in {tick}, {because}"),
             };
         }
         if command.ends.len() < command.copies() {
@@ -144,82 +105,63 @@ impl Titles {
     }
 
     pub(crate) fn cuts(self, cuts: &[&Cut]) -> String {
-        const MOST: usize = 12;
-
         let mut title = "cut:".to_owned();
-        for cut in cuts.iter().take(MOST) {
+        for cut in cuts.iter().take(MAX_CUTS) {
             let what = match (cut.commands, cut.queries) {
                 (true, true) => "commands and queries",
                 (true, false) => "commands",
                 _ => "queries",
             };
-            title += &format!(
-                " {} → {}, {what}, {};",
-                cut.from,
-                cut.to,
-                self.period(cut.period)
-            );
+            let period = self.period(cut.period);
+            title += &format!(" {} → {}, {what}, {period};", cut.from, cut.to);
         }
-
-        if cuts.len() > MOST {
-            title += &format!(" and {} more links", cuts.len() - MOST);
+        if cuts.len() > MAX_CUTS {
+            title += &format!(" and {} more links", cuts.len() - MAX_CUTS);
         }
-
         title
     }
 
     pub(crate) fn fault(self, fault: &Fault) -> String {
         let what = match fault.kind {
-            FaultKind::Crash => "crash: the process is killed, and started again at the end",
-            FaultKind::Hang => "hang: the process is stopped",
-            FaultKind::Slow => "slow: the process is stopped for most of the time",
-            FaultKind::Restart => "restart: the process is killed and started again",
+            FaultKind::Crash => "the process is killed, and started again at the end",
+            FaultKind::Hang => "the process is stopped",
+            FaultKind::Slow => "the process is stopped for most of the time",
+            FaultKind::Restart => "the process is killed and started again",
         };
-        format!("{}: {what}; {}", fault.robot, self.period(fault.period))
+        let (name, period) = (fault_name(fault.kind), self.period(fault.period));
+        format!("{}: {name}: {what}; {period}", fault.robot)
     }
 
     pub(crate) fn missed(self, missed: &Missed) -> String {
-        let Period { begin, end } = missed.period;
-        let last = end.map_or(begin, |end| end - 1);
+        let begin = missed.period.begin;
+        let last = begin + missed.period.ticks(begin + 1) - 1;
+        let (robot, first) = (&missed.robot, self.tick(begin));
         if last == begin {
-            return format!("{}: missed {}", missed.robot, self.tick(begin));
+            return format!("{robot}: missed {first}");
         }
         format!(
-            "{}: missed every tick from {} to {}",
-            missed.robot,
-            self.tick(begin),
+            "{robot}: missed every tick from {first} to {}",
             self.tick(last)
         )
     }
 
     pub(crate) fn absence(self, absence: &Absence) -> String {
-        format!(
-            "{}: lost, takes no part; {}",
-            absence.robot,
-            self.period(absence.period)
-        )
+        let period = self.period(absence.period);
+        format!("{}: lost, takes no part; {period}", absence.robot)
     }
 
     pub(crate) fn joined(self, joined: &Joined) -> String {
-        let tick = self.tick(joined.tick);
+        let (robot, tick) = (&joined.robot, self.tick(joined.tick));
         match joined.generation {
-            Some(generation) => format!(
-                "{}: back as incarnation {generation} in {tick}",
-                joined.robot
-            ),
-            None => format!("{}: takes part from {tick} on", joined.robot),
+            Some(generation) => format!("{robot}: back as incarnation {generation} in {tick}"),
+            None => format!("{robot}: takes part from {tick} on"),
         }
     }
 
     pub(crate) fn queries(self, lost: &QueriesLost) -> String {
-        let QueriesLost {
-            from,
-            to,
-            because,
-            period,
-        } = lost;
-        let ticks = period.end.map_or(1, |end| end - period.begin);
-        let tick = self.tick(period.begin);
+        let (from, to, because) = (&lost.from, &lost.to, lost.because);
+        let ticks = lost.period.ticks(lost.period.begin + 1);
+        let tick = self.tick(lost.period.begin);
         format!("{from} cannot query {to}, {because}: {ticks} ticks from {tick} on")
     }
 
@@ -228,10 +170,10 @@ impl Titles {
     }
 
     pub(crate) fn held_up(self, held: &HeldUp) -> String {
-        let HeldUp { tick, awaited } = held;
+        let awaited = &held.awaited;
         format!(
             "{}: the clock was held for {:.1} s of wall clock, because {} {}. Wall clock differs from run to run.",
-            self.tick(*tick),
+            self.tick(held.tick),
             awaited.since_s,
             awaited.name,
             awaited.because
@@ -250,11 +192,5 @@ mod tests {
         assert_eq!(seconds(3, 0.025), "0.075 s");
         assert_eq!(seconds(1, 1.0 / 3.0), "0.333 s");
         assert_eq!(seconds(3, 0.000_5), "0.0015 s");
-    }
-
-    #[test]
-    fn long_texts_are_shortened_between_letters() {
-        assert_eq!(shortened("äöü", 3), "äöü");
-        assert_eq!(shortened("äöüß", 3), "äöü…");
     }
 }

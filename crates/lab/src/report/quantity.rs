@@ -1,0 +1,215 @@
+//! What is drawn of a measure for each arm under each condition: its estimates, or its differences to the baseline.
+
+use std::collections::BTreeMap;
+
+use observe::Measure;
+use pictures::{
+    Estimate, IntervalRow, Intervals, Panel, Trend, TrendLine, TrendPoint, round_range,
+};
+
+use super::study::{CellPlace, Line, Study, axis, drawn, is_shown, label};
+use super::words::capitalized;
+use crate::experiment::{Contrast, Difference};
+
+/// Of what a difference is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Of {
+    /// Means.
+    Mean,
+    /// The percentages of runs with an event.
+    Share,
+    /// Mean times to an event.
+    Time,
+}
+
+impl Of {
+    /// The differences in a measure; the first one is that of its estimates.
+    pub(super) fn all(measure: &Measure) -> &'static [Self] {
+        if measure.is_time() {
+            &[Self::Share, Self::Time]
+        } else {
+            &[Self::Mean]
+        }
+    }
+
+    /// How the intervals of such differences are made.
+    pub(super) fn interval(self) -> &'static str {
+        match self {
+            Self::Mean => "Student's t",
+            Self::Share => "Tango's score interval",
+            Self::Time => "Student's t, and Hall's transformation where pairs are skewed",
+        }
+    }
+}
+
+/// The numbers of the arms under the conditions.
+pub(super) struct Quantity {
+    /// Name of its charts.
+    title: String,
+    /// Name and unit of its axis.
+    axis: String,
+    /// What differences are called; estimates have no name.
+    name: Option<String>,
+    /// Ends of the axis: of all intervals.
+    pub(super) range: (f64, f64),
+    /// A value that is marked.
+    reference: Option<f64>,
+    /// The number of each arm that is shown, and whether its marker is filled.
+    cells: BTreeMap<CellPlace, (Option<Estimate>, bool)>,
+}
+
+impl Quantity {
+    /// The estimates of a measure.
+    pub(super) fn estimates(study: &Study<'_>, measure: &Measure) -> Self {
+        let mut cells = BTreeMap::new();
+        for place in study.places() {
+            cells.insert(place, (study.estimate(measure, place), true));
+        }
+        let range = match measure.is_time() {
+            true => (0.0, 100.0),
+            false => widened(&ends(&cells), true),
+        };
+        Self {
+            title: axis(measure),
+            axis: axis(measure),
+            name: None,
+            range,
+            reference: None,
+            cells,
+        }
+    }
+
+    /// The differences of the arms to the baseline; `None` if there are none.
+    pub(super) fn differences(study: &Study<'_>, measure: &Measure, of: Of) -> Option<Self> {
+        let mut cells = BTreeMap::new();
+        for place in study.places() {
+            if let Some(contrast) = study.contrast(measure, place) {
+                let estimate = difference(contrast, of).as_ref().map(drawn);
+                cells.insert(place, (estimate, is_shown(contrast)));
+            }
+        }
+        let baseline = &study.contrasts_of(measure).first()?.baseline;
+        let axis = match of {
+            Of::Mean => format!("{} minus {baseline}", axis(measure)),
+            Of::Share => format!("{}, points, minus {baseline}", label(measure)),
+            Of::Time => format!("mean time to {}, s, minus {baseline}", label(measure)),
+        };
+        Some(Self {
+            title: format!("Differences in {}", label(measure)),
+            axis,
+            name: Some(format!("differences to {baseline}")),
+            range: widened(&ends(&cells), false),
+            reference: Some(0.0),
+            cells,
+        })
+    }
+
+    /// The number of an arm under a condition.
+    pub(super) fn estimate(&self, place: CellPlace) -> Option<Estimate> {
+        self.cells.get(&place)?.0
+    }
+
+    /// A chart for each condition, with a row for each arm.
+    pub(super) fn intervals(&self, study: &Study<'_>) -> (Vec<Panel>, String) {
+        let row = |place: CellPlace| {
+            let (estimate, is_filled) = *self.cells.get(&place)?;
+            let (label, arm) = study.arm(place);
+            Some(IntervalRow {
+                label,
+                arm,
+                estimate,
+                is_filled,
+            })
+        };
+        study.panels(row, |heading, rows| {
+            let chart = Intervals {
+                title: format!("{} {heading}", self.title),
+                axis: self.axis.clone(),
+                range: self.range,
+                reference: self.reference,
+                rows,
+            };
+            chart.draw()
+        })
+    }
+
+    /// A chart over the values of a factor, with a line for each arm, and its heading; `None` if there is nothing to draw.
+    pub(super) fn trend(&self, study: &Study<'_>, line: &Line<'_>) -> Option<(String, Trend)> {
+        let mut lines = Vec::new();
+        for arm in 0..study.arms.len() {
+            let mut points = Vec::new();
+            for level in &line.levels {
+                let cell = self.cells.get(&(level.condition, arm));
+                if let Some((Some(estimate), is_filled)) = cell {
+                    points.push(TrendPoint {
+                        x: level.x,
+                        estimate: *estimate,
+                        is_filled: *is_filled,
+                    });
+                }
+            }
+            if !points.is_empty() || self.name.is_none() {
+                let (label, arm) = study.arm((0, arm));
+                lines.push(TrendLine { label, arm, points });
+            }
+        }
+        if lines.is_empty() {
+            return None;
+        }
+
+        let (factor, others) = (line.factor, &line.others);
+        let heading = match (others.is_empty(), &self.name) {
+            (true, None) => "Arms".to_owned(),
+            (true, Some(name)) => capitalized(name),
+            (false, None) => others.clone(),
+            (false, Some(name)) => format!("{others}: {name}"),
+        };
+        let levels = line.levels.iter();
+        let chart = Trend {
+            title: format!("{} over {factor} {others}", self.title),
+            x_axis: factor.to_owned(),
+            y_axis: self.axis.clone(),
+            levels: levels
+                .map(|level| (level.x, level.name.to_owned()))
+                .collect(),
+            range: self.range,
+            reference: self.reference,
+            lines,
+        };
+        Some((heading, chart))
+    }
+}
+
+/// The difference of a contrast, shares in percentage points; `None` if there is none.
+pub(super) fn difference(contrast: &Contrast, of: Of) -> Option<statistics::Estimate> {
+    match &contrast.difference {
+        Difference::Number { mean, .. } => Some(*mean),
+        Difference::Time { share, .. } if of == Of::Share => Some(share.scaled(100.0)),
+        Difference::Time {
+            restricted_mean_s, ..
+        } => Some(*restricted_mean_s),
+        Difference::NoPair | Difference::NotFinite => None,
+    }
+}
+
+/// The ends of all intervals.
+fn ends(cells: &BTreeMap<CellPlace, (Option<Estimate>, bool)>) -> Vec<f64> {
+    let estimates = cells.values().filter_map(|(estimate, _)| estimate.as_ref());
+    estimates.flat_map(Estimate::ends).collect()
+}
+
+/// A range with round ends around values. If it would begin not far above zero it begins there; one that is not of amounts has
+/// zero in it.
+pub(super) fn widened(values: &[f64], is_of_amounts: bool) -> (f64, f64) {
+    let mut from = values.iter().copied().fold(f64::INFINITY, f64::min);
+    let mut to = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if !from.is_finite() || !to.is_finite() {
+        return (0.0, 1.0);
+    }
+
+    if !is_of_amounts || (from >= 0.0 && from < 0.6 * to) {
+        from = from.min(0.0);
+        to = to.max(0.0);
+    }
+    round_range(from, to, 6)
+}
