@@ -8,6 +8,7 @@
 mod declared;
 pub mod endpoint;
 mod error;
+mod inbox;
 mod middleware;
 mod protection;
 mod qos;
@@ -22,6 +23,7 @@ pub use protocol::DEFAULT_ENDPOINT;
 
 pub use declared::Declared;
 pub use error::BusError;
+pub use inbox::{Inbox, OnArrival, Worker, WorkerThread};
 pub use middleware::{Bus, Publisher, Query, check_exposure, check_run};
 pub use protection::check_key_file;
 pub use qos::Qos;

@@ -2,18 +2,18 @@
 //! lock-step ([`lockstep::Participant`]). Robots of one process share a session.
 //!
 //! What arrives is fed to the participants where it arrives, on the middleware's thread: so a query is answered at once,
-//! also while a robot computes. What the participants want done is carried out by the host's own thread, which also runs the
-//! robots; or, if all its robots are quick ([`Robot::is_quick`]), their ticks are run by the middleware's thread, soon after the
-//! clock arrives there.
+//! also while a robot computes. What the participants want done goes through a [`bus::Inbox`], whose worker is the host: it is
+//! carried out by the host's own thread, which also runs the robots; or, if all its robots are quick ([`Robot::is_quick`]), their
+//! ticks are run by the middleware's thread, soon after the clock arrives there.
 
-mod shared;
+mod participants;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use bus::{Bus, BusError, Declared, Publisher, Role};
+use bus::{Bus, BusError, Declared, Inbox, OnArrival, Publisher, Role, Worker, WorkerThread};
 use lockstep::{Action, Admission, Begin, IncarnationNotice, Leave, StateQuery, Timeouts, Turn};
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{
@@ -26,12 +26,12 @@ use crate::cri::Robot;
 use crate::error::RobotError;
 use crate::network::{Network, Undelivered};
 use crate::runner::{Done, Runner};
-use shared::{HostAction, HostAnswer, Shared, Thread, Waited};
+use participants::{Actions, Allowance, Asked, HostAction, HostAnswer, Participants};
 
 /// Most robots for which a publisher of commands is declared. Without one, zenoh compares each command's key with all keys that
 /// anyone has declared in the network; with one, it does so once.
 const MAX_COMMANDED: usize = 64;
-/// A panel is for eyes: it is put no more often than this.
+/// Panels are put no more often than this: people look at them.
 const PANEL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// How to reach a run.
@@ -110,26 +110,25 @@ pub struct Host {
     options: HostOptions,
     bus: Bus,
     keys: Keys,
-    shared: Arc<Shared>,
+    participants: Arc<Participants>,
+    actions: Actions,
     members: BTreeMap<RobotName, Member>,
     declared: Vec<Declared>,
     /// Subscriptions to other robots' states, by subscriber and robot.
     followed: BTreeMap<(RobotName, RobotName), Declared>,
-    /// How the run ended, or why the host cannot go on.
-    outcome: Option<Result<End, HostError>>,
 }
 
 /// Ends [`Host::run`] from another thread: for a signal, or when what a robot needs is gone.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct Stopper {
-    shared: Arc<Shared>,
+    participants: Arc<Participants>,
 }
 
 impl Stopper {
     /// Ends the loop, where it waits or after the tick that is under way, with [`HostError::Stopped`]. Queries that the
     /// tick still makes are interrupted.
     pub fn stop(&self) {
-        self.shared.each(lockstep::Participant::stop);
+        self.participants.each(lockstep::Participant::stop);
     }
 }
 
@@ -142,8 +141,6 @@ struct Member {
     welcome: Option<Welcome>,
     /// Whether it perceives all bodies around it.
     senses_bodies: bool,
-    /// Whether its ticks may run on the middleware's thread.
-    is_quick: bool,
     explanation: String,
     report: Publisher,
     state: Publisher,
@@ -186,12 +183,17 @@ impl Host {
             gone: options.gone_patience,
         };
         let names: Vec<RobotName> = robots.iter().map(|(name, _)| name.clone()).collect();
-        let shared = Arc::new(Shared::new(&names, timeouts));
+        let are_quick = robots.iter().all(|(_, robot)| robot.is_quick());
+        let actions = Inbox::new(if are_quick {
+            OnArrival::WorkSoon
+        } else {
+            OnArrival::Wake
+        });
+        let participants = Arc::new(Participants::new(&names, timeouts, actions.clone()));
         let mut members = BTreeMap::new();
         for (name, robot) in robots {
             let member = Member {
                 senses_bodies: robot.senses_bodies(),
-                is_quick: robot.is_quick(),
                 robot: Some(robot),
                 runner: None,
                 welcome: None,
@@ -210,11 +212,11 @@ impl Host {
             options,
             bus,
             keys,
-            shared,
+            participants,
+            actions,
             members,
             declared: Vec::new(),
             followed: BTreeMap::new(),
-            outcome: None,
         };
         for name in &names {
             host.declare(name)?;
@@ -225,13 +227,13 @@ impl Host {
 
     /// Declares what belongs to one robot: the subscriber to its news, and the queryables of its state.
     fn declare(&mut self, name: &RobotName) -> Result<(), BusError> {
-        let shared = self.shared.clone();
+        let participants = self.participants.clone();
         let own = name.clone();
         let news = self
             .bus
             .subscribe(&self.keys.news(name), move |key, bytes| {
                 match decode::<News>(key, "simulator", bytes) {
-                    Ok(news) => shared.with(&own, |participant, actions| {
+                    Ok(news) => participants.with(&own, |participant, actions| {
                         let notice = IncarnationNotice::from(&news);
                         participant.news(news.epoch, news.tick, notice, news, actions);
                     }),
@@ -241,14 +243,14 @@ impl Host {
         self.declared.push(news);
 
         for what in QUERIES.iter().chain([&STATE]) {
-            let shared = self.shared.clone();
+            let participants = self.participants.clone();
             let own = name.clone();
             let queryable = self
                 .bus
                 .queryable(
                     &self.keys.query(name, what),
                     move |query| match StateQuery::read(|name| query.parameter(name))
-                        .and_then(|asked| shared.state(&own, asked))
+                        .and_then(|asked| participants.state(&own, asked))
                     {
                         Ok(state) => reply(&query, &state),
                         Err(reason) => query.reply_err(&reason),
@@ -288,17 +290,17 @@ impl Host {
 
     /// Declares what the robots of the process share: the subscriber to the clock, and to the simulator's token.
     fn declare_common(&mut self) -> Result<(), BusError> {
-        let shared = self.shared.clone();
+        let participants = self.participants.clone();
         let clock = self.bus.subscribe(&self.keys.clock(), move |key, bytes| {
             match decode::<Clock>(key, "simulator", bytes) {
                 Ok(clock) => {
-                    shared.each(|participant, actions| participant.clock(clock, actions));
+                    participants.each(|participant, actions| participant.clock(clock, actions));
                 }
                 Err(error) => tracing::warn!("{error}"),
             }
         })?;
 
-        let shared = self.shared.clone();
+        let participants = self.participants.clone();
         let patience_s = self.options.gone_patience.as_secs_f64();
         let simulator = self
             .bus
@@ -308,7 +310,7 @@ impl Host {
                         "the simulator, or the link to it, is gone: waiting for it up to {patience_s} s"
                     );
                 }
-                shared.simulator(is_present);
+                participants.simulator(is_present);
             })?;
         self.declared.extend([clock, simulator]);
         Ok(())
@@ -318,7 +320,7 @@ impl Host {
     #[must_use]
     pub fn stopper(&self) -> Stopper {
         Stopper {
-            shared: self.shared.clone(),
+            participants: self.participants.clone(),
         }
     }
 
@@ -327,53 +329,16 @@ impl Host {
     /// # Errors
     /// [`HostError`] if it cannot go on.
     pub fn run(self) -> Result<End, HostError> {
-        let shared = self.shared.clone();
-        let is_quick = self.members.values().all(|member| member.is_quick);
-        let host = Arc::new(Mutex::new(self));
-        if is_quick {
-            let host = Arc::downgrade(&host);
-            shared.run_on_arrival(Box::new(move || {
-                let host = host.clone();
-                let work = move || {
-                    if let Some(host) = host.upgrade() {
-                        work_here(&host);
-                    }
-                };
-                bus::runtime::run_soon(work).is_ok()
-            }));
-        }
+        let actions = self.actions.clone();
+        let (mut host, outcome) = actions.run(self);
 
-        // Both threads carry actions out under this lock, and take them from one queue: so actions are carried out in the order in
-        // which participants wanted them, whichever thread is faster.
-        loop {
-            let Ok(mut working) = host.lock() else {
-                panic!("a robot panicked in its tick");
-            };
-            working.work(Thread::Own);
-            if let Some(outcome) = working.outcome.take() {
-                for runner in working
-                    .members
-                    .values()
-                    .filter_map(|member| member.runner.as_ref())
-                {
-                    runner.report_left_out();
-                }
-                working.leave_bus();
-                return outcome;
+        for member in host.members.values() {
+            if let Some(runner) = &member.runner {
+                runner.report_left_out();
             }
-            drop(working);
-
-            shared.sleep();
         }
-    }
-
-    /// Carries out all that is for this thread.
-    fn work(&mut self, mut thread: Thread) {
-        while self.outcome.is_none()
-            && let Some((name, action)) = self.shared.next(&mut thread)
-        {
-            self.outcome = self.carry_out(&name, action).transpose();
-        }
+        host.leave_bus();
+        outcome
     }
 
     fn leave_bus(&mut self) {
@@ -420,7 +385,7 @@ impl Host {
                 let waiting = Waiting { epoch, tick, on };
                 self.bus.put(&self.keys.waiting(name), encode(&waiting))?;
             }
-            // Timers are the shared part's, and the other two are the caller's.
+            // Timers are set by the participants' side, and the other two are the caller's.
             Action::SetTimer(..) | Action::Run(_) | Action::Leave(_) => {}
         }
 
@@ -455,7 +420,7 @@ impl Host {
         if let Some(member) = self.members.get_mut(name) {
             member.runner = Some(runner);
         }
-        self.shared.file(name, |participant, actions| {
+        self.participants.file(name, |participant, actions| {
             participant.done(commands, state, bytes.into(), actions);
         });
         Ok(())
@@ -476,7 +441,8 @@ impl Host {
         };
         let key = self.keys.join_as(name);
         let Some(answer) = self.bus.get(&key, "", Some(encode(&request)))? else {
-            self.shared.with(name, lockstep::Participant::unanswered);
+            self.participants
+                .with(name, lockstep::Participant::unanswered);
             return Ok(());
         };
 
@@ -486,7 +452,7 @@ impl Host {
                 let admission = Admission::from(welcome.as_ref());
                 let states = welcome.states_before();
                 member.welcome = Some(*welcome);
-                self.shared.with(name, |participant, actions| {
+                self.participants.with(name, |participant, actions| {
                     participant.admitted(admission, states, actions);
                 });
             }
@@ -495,7 +461,7 @@ impl Host {
                 explanation,
             } => {
                 member.explanation = explanation;
-                self.shared.with(name, |participant, actions| {
+                self.participants.with(name, |participant, actions| {
                     participant.refused(reason, actions);
                 });
             }
@@ -544,13 +510,13 @@ impl Host {
     /// the next query finds its answer here already.
     fn query(&mut self, name: &RobotName, of: &RobotName, asked: &str) -> Result<(), BusError> {
         let key = self.keys.query(of, STATE);
-        let shared = self.shared.clone();
+        let participants = self.participants.clone();
         let own = name.clone();
         let other = of.clone();
         self.bus.get_then(&key, asked, move |reply| {
             let Some(reply) = reply else { return };
             match reply.result {
-                Ok(bytes) => hear(&shared, &own, &other, &reply.key, &bytes),
+                Ok(bytes) => file_state(&participants, &own, &other, &reply.key, &bytes),
                 Err(reason) => tracing::debug!(%other, reason, "a query was refused"),
             }
         })?;
@@ -559,10 +525,10 @@ impl Host {
         // same, and the participant keeps one.
         let follows = (name.clone(), of.clone());
         if !self.followed.contains_key(&follows) {
-            let shared = self.shared.clone();
+            let participants = self.participants.clone();
             let (own, other) = follows.clone();
             let subscriber = self.bus.subscribe(&key, move |key, bytes| {
-                hear(&shared, &own, &other, key, bytes);
+                file_state(&participants, &own, &other, key, bytes);
             })?;
             self.followed.insert(follows, subscriber);
         }
@@ -581,7 +547,7 @@ impl Host {
                     .map(|member| member.explanation.clone())
                     .unwrap_or_default(),
             },
-            Leave::NoSimulator if self.shared.has_simulator() => HostError::NotAdmitted {
+            Leave::NoSimulator if self.participants.has_simulator() => HostError::NotAdmitted {
                 name: name.clone(),
                 run: self.options.run.clone(),
                 connect: self.options.connect.clone(),
@@ -597,27 +563,27 @@ impl Host {
     }
 }
 
-/// Runs what may run on the middleware's thread, unless another thread is at it.
-fn work_here(host: &Mutex<Host>) {
-    let Ok(mut working) = host.try_lock() else {
-        return; // The host's own thread finds what is left when it is done, and another one leaves it to that.
-    };
-    let shared = working.shared.clone();
-    let alarm = scopeguard::guard(&shared, |shared| {
-        // The host's own thread finds out that a robot panicked here, and the process ends.
-        if std::thread::panicking() {
-            shared.end();
-        }
-    });
-    working.work(Thread::middleware());
-    let is_over = working.outcome.is_some();
-    drop(working);
-    drop(alarm);
+impl Worker for Host {
+    type Exit = Result<End, HostError>;
 
-    if is_over {
-        shared.end();
-    } else {
-        shared.leave_rest();
+    fn work(&mut self, thread: WorkerThread) -> Result<Option<Duration>, Self::Exit> {
+        let mut allowance = Allowance::of(thread);
+        loop {
+            // On a thread of arrival timers wait: most of what they want done is not for it.
+            if thread == WorkerThread::Owner {
+                self.participants.fire_timers();
+            }
+            // Both threads take actions in one order, with the worker in their hands: so actions are carried out in the order in
+            // which participants wanted them. One that is not for this thread holds those after it back.
+            let next = self.actions.take_if(|(_, action)| allowance.takes(action));
+            let Some((name, action)) = next else { break };
+            if let Some(outcome) = self.carry_out(&name, action).transpose() {
+                return Err(outcome);
+            }
+        }
+
+        let due = self.participants.next_timer();
+        Ok(due.map(|due| due.saturating_duration_since(Instant::now())))
     }
 }
 
@@ -660,33 +626,50 @@ impl<'a> HostNetwork<'a> {
 
 impl Network for HostNetwork<'_> {
     fn state_of(&mut self, target: &RobotName) -> Result<Arc<PublicState>, Undelivered> {
-        let shared = self.host.shared.clone();
-        if shared.has(target) {
-            return shared
+        let participants = self.host.participants.clone();
+        if participants.has(target) {
+            return participants
                 .state(target, self.query)
                 .map_err(|_| Undelivered::Lost);
         }
 
         loop {
-            match shared.wait_for(self.name, target) {
-                Waited::Found(state) => return Ok(state),
-                Waited::Interrupted => return Err(Undelivered::Interrupted),
-                Waited::Act(name, action) => {
-                    let carried_out = bus::runtime::block(|| self.host.carry_out_io(&name, action));
-                    if let Err(error) = carried_out {
-                        self.failed = Some(error);
-                        return Err(Undelivered::Interrupted);
-                    }
-                }
+            participants.fire_timers();
+            match participants.ask(self.name, target) {
+                Asked::Found(state) => return Ok(state),
+                Asked::Interrupted => return Err(Undelivered::Interrupted),
+                Asked::Pending => {}
+            }
+
+            // Other robots of the process run later, on this thread.
+            let next = self
+                .host
+                .actions
+                .take_first(|(_, action)| !matches!(action, Action::Run(_) | Action::Leave(_)));
+            let Some((name, action)) = next else {
+                // What arrives after the look above ends the wait at once.
+                self.host.actions.wait(participants.next_timer());
+                continue;
+            };
+            let carried_out = bus::runtime::block(|| self.host.carry_out_io(&name, action));
+            if let Err(error) = carried_out {
+                self.failed = Some(error);
+                return Err(Undelivered::Interrupted);
             }
         }
     }
 }
 
 /// Files another robot's state.
-fn hear(shared: &Shared, own: &RobotName, other: &RobotName, key: &str, bytes: &[u8]) {
+fn file_state(
+    participants: &Participants,
+    own: &RobotName,
+    other: &RobotName,
+    key: &str,
+    bytes: &[u8],
+) {
     match decode::<PublicState>(key, other.as_str(), bytes) {
-        Ok(state) => shared.with(own, |participant, _| {
+        Ok(state) => participants.with(own, |participant, _| {
             participant.heard(other.clone(), state.epoch, state.tick, Arc::new(state));
         }),
         Err(error) => tracing::warn!("{error}"),
