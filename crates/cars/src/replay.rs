@@ -14,7 +14,7 @@ use record::RunLock;
 use record::names::ENDPOINT;
 use record::{EpochFiles, RunFolder};
 use recording::Recording;
-use simulator::server::{Replay, ReplayOptions};
+use simulator::server::{Event, Options, REPEAT_AFTER, Server, Stay};
 use terminal::OutputError;
 
 /// `cars replay`.
@@ -62,14 +62,16 @@ pub(crate) fn replay(args: &ReplayArgs) -> miette::Result<ExitCode> {
     };
     let bus = Bus::open(&role, None).into_diagnostic()?;
     let run = args.run.clone().unwrap_or_else(|| recorded.clone());
-    let options = ReplayOptions {
+    let options = Options {
         run: run.clone(),
         speed: args.speed.0,
         is_paused: args.paused,
+        stay: Stay::Always,
+        repeat_after: REPEAT_AFTER,
     };
-    let replay = Replay::open(bus, recording, options).into_diagnostic()?;
-    let stop = replay.stopper();
-    ctrlc::set_handler(stop).into_diagnostic()?;
+    let server = Server::replay(bus, recording, options).into_diagnostic()?;
+    let send = server.sender();
+    ctrlc::set_handler(move || send(Event::Terminate)).into_diagnostic()?;
 
     let endpoint = connectable(&args.listen);
     // Nothing is written through a link.
@@ -80,7 +82,7 @@ pub(crate) fn replay(args: &ReplayArgs) -> miette::Result<ExitCode> {
         files.epoch
     ));
     OutputError::unless_closed(printed)?; // It is replayed also where its line is not read.
-    replay.run();
+    server.run_replay();
 
     if note.is_some()
         && let Err(error) = std::fs::remove_file(folder.file(ENDPOINT))

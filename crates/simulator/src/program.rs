@@ -162,7 +162,7 @@ fn run(args: &Args) -> miette::Result<ExitCode> {
         stay: args.stay.map_or(Stay::Never, Stay::from),
         repeat_after: REPEAT_AFTER,
     };
-    let server = Server::open(bus, &scenario, options).into_diagnostic()?;
+    let server = Server::open(bus, scenario, options, &folder, past).into_diagnostic()?;
     let send = server.sender();
     ctrlc::set_handler(move || send(Event::Terminate)).into_diagnostic()?;
 
@@ -172,7 +172,7 @@ fn run(args: &Args) -> miette::Result<ExitCode> {
     }
 
     folder.write_line(ENDPOINT, &connectable(&args.listen))?;
-    let summary = server.run(scenario, &folder, past).into_diagnostic();
+    let summary = server.run().into_diagnostic();
 
     for name in [ENDPOINT, OPERATOR_CONFIG]
         .map(|name| folder.file(name))

@@ -1,32 +1,43 @@
 //! The simulator as a process: it translates between the bus, the lock-step ([`lockstep::Barrier`]) and the
 //! [`Simulation`](crate::Simulation).
 //!
-//! One queue. Everything that can happen is an [`Event`], and one thread at a time works on them: the one on which an event
-//! arrives, or the server's own. Control is answered in the same way, also while the clock is held, because no work ever
-//! waits for a robot.
+//! A [`Server`] has one [`bus::Inbox`]. Everything that can happen is an [`Event`], and one thread at a time works on them: the
+//! one on which an event arrives, or the server's own. Control is answered in the same way, also while the clock is held, because
+//! no work ever waits for a robot.
 //!
-//! A [`Replay`] is in the simulator's place, too, with a recording instead of a simulation.
+//! What observers and clients see (`frontend`, `control`, `pace`) is the same wherever the ticks come from (`source`): they take
+//! place now ([`LiveRun`]), or are those of a recording ([`RecordedRun`]).
 
-mod answer;
 mod control;
 mod departed;
 mod ended;
+mod event;
 mod faults;
-mod inbox;
+mod frame;
+mod frontend;
 mod join;
+mod live;
+mod messages;
 mod observers;
 mod offers;
+mod options;
 mod orders;
 mod pace;
-mod past;
 mod player;
 mod process;
-mod replay;
-mod returns;
+mod record;
+mod recorded;
+mod rejoins;
+mod replay_log;
+mod requests;
+mod source;
 mod timers;
 mod viewers;
 mod watchdog;
 
-pub use past::ReplayLog;
-pub use process::{Event, Interrupt, Options, REPEAT_AFTER, Server, ServerError, Stay};
-pub use replay::{Replay, ReplayError, ReplayOptions};
+pub use event::{Event, ServerError};
+pub use live::LiveRun;
+pub use options::{Options, REPEAT_AFTER, Stay};
+pub use process::Server;
+pub use recorded::RecordedRun;
+pub use replay_log::ReplayLog;

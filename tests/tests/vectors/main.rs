@@ -218,12 +218,13 @@ fn echo_over_zenoh() {
         repeat_after: REPEAT_AFTER,
     };
     let scenario = Scenario::load(&root().join(ECHO), &Changes::default()).unwrap();
-    let server = Server::open(Bus::open(&role, None).unwrap(), &scenario, options).unwrap();
     let run_folder = RunFolder::new(folder.path(), &run);
     let lock = run_folder.create(&scenario).unwrap();
+    let bus = Bus::open(&role, None).unwrap();
+    let server = Server::open(bus, scenario, options, &run_folder, None).unwrap();
     let simulator = std::thread::spawn(move || {
         let _lock = lock;
-        server.run(scenario, &run_folder, None).unwrap();
+        server.run().unwrap();
     });
 
     let witness = Witness::new(&endpoint, &run, "Echo", "Caller");

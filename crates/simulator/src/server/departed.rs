@@ -55,7 +55,7 @@ impl Departed {
 /// Whether the clock waits for a robot that does not come.
 pub(super) enum Wait {
     /// It does not.
-    Sound,
+    Bounded,
     /// It does, unless a process that stands by joins within this time.
     Standby(Duration),
     /// It does, and would do so for ever.

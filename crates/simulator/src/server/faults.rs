@@ -7,26 +7,24 @@ use bus::BusError;
 use protocol::messages::{FaultKind, FaultOrder, ProcessOrder};
 use protocol::{Epoch, RobotName, Tick, encode};
 
+use super::live::{LiveRun, WaitsFor};
+use super::options::REPEAT_AFTER;
 use super::orders::PendingOrders;
-use super::process::{REPEAT_AFTER, Server, Stage};
-use crate::simulation::Simulation;
 
 /// Longest wait for a launcher to carry out an order, and for a robot to go or to come back; then the run goes on and logs
 /// that it did.
-pub(super) const PATIENCE: Duration = Duration::from_secs(30);
+pub(super) const TIMEOUT: Duration = Duration::from_secs(30);
 /// Longest wait for a launcher to subscribe: it starts the simulator first, and a fast run may be ahead of it.
-const LAUNCHER_PATIENCE: Duration = Duration::from_secs(10);
-/// While waiting, the loop looks this often whether what it waits for has come about.
-pub(super) const LOOK: Duration = Duration::from_millis(20);
+const LAUNCHER_TIMEOUT: Duration = Duration::from_secs(10);
+/// How often to check whether what the clock is held for has happened: a robot that goes or comes back sends no event.
+pub(super) const POLL_INTERVAL: Duration = Duration::from_millis(20);
 /// A robot whose hang is over is asked to join again this often, and counts as back when it has joined.
-pub(super) const NUDGE: Duration = Duration::from_millis(100);
+pub(super) const REJOIN_INTERVAL: Duration = Duration::from_millis(100);
 
-impl Server {
+impl LiveRun {
     /// Begins to have the faults carried out that are due before the next tick, and the restarts, if there are any.
-    pub(super) fn order_faults(
-        &mut self,
-        simulation: &mut Simulation,
-    ) -> Result<Option<PendingOrders>, BusError> {
+    pub(super) fn order_faults(&mut self) -> Option<PendingOrders> {
+        let simulation = &mut self.epoch.simulation;
         let mut orders = simulation.faults_due();
         let lateness = self.barrier.lateness();
         simulation.note_faults(&orders, |robot| lateness.of(robot));
@@ -37,7 +35,7 @@ impl Server {
             then.push(restart_order(&robot, false));
         }
         let next = (simulation.epoch(), simulation.tick() + 1);
-        Ok((!orders.is_empty()).then(|| self.pending_orders(next, orders, then)))
+        (!orders.is_empty()).then(|| self.pending_orders(next, orders, then))
     }
 
     /// Begins to end the faults of an epoch that is over, before tick 0 of the next one, if there are any.
@@ -55,8 +53,8 @@ impl Server {
         &mut self,
         robot: &RobotName,
         kind: FaultKind,
-        simulation: &Simulation,
     ) -> Result<(), BusError> {
+        let simulation = &self.epoch.simulation;
         let orders = vec![ProcessOrder {
             robot: robot.clone(),
             kind,
@@ -94,13 +92,13 @@ impl Server {
             then,
             begun: now,
             put: None,
-            nudged: now,
+            repeated: now,
         }
     }
 
-    /// Goes on with the order under way. Returns how long to wait before looking again; `None` when it is carried out.
+    /// Goes on with the order that is pending. Returns how long to wait before looking again; `None` when it is carried out.
     pub(super) fn await_faults(&mut self) -> Result<Option<Duration>, BusError> {
-        let Stage::Faults(pending_orders) = &mut self.stage else {
+        let WaitsFor::Faults(pending_orders) = &mut self.epoch.waits_for else {
             return Ok(None);
         };
         let Some(put) = pending_orders.put else {
@@ -108,7 +106,7 @@ impl Server {
             return self.await_launcher(begun);
         };
         let tick = pending_orders.order.tick;
-        if pending_orders.begun.elapsed() > PATIENCE {
+        if pending_orders.begun.elapsed() > TIMEOUT {
             tracing::error!("the faults before tick {tick} were not carried out in time");
             return Ok(None);
         }
@@ -131,37 +129,37 @@ impl Server {
             }
             let before = (pending_orders.order.epoch, tick);
             let pending_orders = self.pending_orders(before, then, Vec::new());
-            self.stage = Stage::Faults(pending_orders);
+            self.epoch.waits_for = WaitsFor::Faults(pending_orders);
             return Ok(Some(Duration::ZERO));
         }
-        if is_done && pending_orders.nudged.elapsed() > NUDGE {
-            pending_orders.nudged = Instant::now();
+        if is_done && pending_orders.repeated.elapsed() > REJOIN_INTERVAL {
+            pending_orders.repeated = Instant::now();
             self.barrier.repeat(&mut self.outputs);
         }
-        Ok(Some(LOOK))
+        Ok(Some(POLL_INTERVAL))
     }
 
     /// Puts the order as soon as a launcher subscribes. If none does in time, the run goes on and has logged it.
     fn await_launcher(&mut self, begun: Instant) -> Result<Option<Duration>, BusError> {
         if self.orders.publisher.has_subscribers() {
-            if let Stage::Faults(pending_orders) = &mut self.stage {
+            if let WaitsFor::Faults(pending_orders) = &mut self.epoch.waits_for {
                 pending_orders.put = Some(Instant::now());
                 self.orders.publisher.put(encode(&pending_orders.order))?;
             }
-            return Ok(Some(LOOK));
+            return Ok(Some(POLL_INTERVAL));
         }
 
         if self.orders.has_complained {
             return Ok(None);
         }
-        if begun.elapsed() > LAUNCHER_PATIENCE {
+        if begun.elapsed() > LAUNCHER_TIMEOUT {
             self.orders.has_complained = true;
             tracing::error!(
                 "the scenario has faults of processes, and there is no launcher to carry them out"
             );
         }
 
-        Ok(Some(LOOK))
+        Ok(Some(POLL_INTERVAL))
     }
 }
 

@@ -4,10 +4,10 @@ use bus::Query;
 use lockstep::Refused;
 use protocol::keys::Keys;
 use protocol::messages::{JoinAnswer, JoinRequest, Refusal};
-use protocol::{PROTOCOL_VERSION, RobotName, decode, encode};
+use protocol::{PROTOCOL_VERSION, RobotName, RunName, decode, encode};
 
-use super::process::Server;
-use crate::simulation::Simulation;
+use super::frontend::Frontend;
+use super::live::LiveRun;
 
 /// Why a robot may not take part.
 struct NotAdmitted {
@@ -24,9 +24,9 @@ impl NotAdmitted {
     }
 }
 
-impl Server {
-    pub(super) fn on_join(&mut self, query: &Query, simulation: &mut Simulation) {
-        let answer = match self.judge_join(query, simulation) {
+impl LiveRun {
+    pub(super) fn on_join(&mut self, query: &Query, frontend: &Frontend) {
+        let answer = match self.judge_join(query, &frontend.run) {
             Ok(answer) => answer,
             Err(NotAdmitted {
                 reason,
@@ -43,70 +43,40 @@ impl Server {
         query.reply(query.key(), encode(&answer));
     }
 
-    fn judge_join(
-        &mut self,
-        query: &Query,
-        simulation: &mut Simulation,
-    ) -> Result<JoinAnswer, NotAdmitted> {
+    fn judge_join(&mut self, query: &Query, run: &RunName) -> Result<JoinAnswer, NotAdmitted> {
         let request: JoinRequest = decode(query.key(), "a robot", &query.body())
             .map_err(|error| NotAdmitted::new(Refusal::Malformed, error.to_string()))?;
-        self.check_request(query, &request)?;
+        check_request(query, &request, run)?;
 
         let name = &request.name;
-        let run = self.options.run.clone();
         let admission = self
             .barrier
             .join(name, &request.instance, &mut self.outputs);
         if admission == Err(Refused::NameTaken) {
             self.departed.refused(name);
         }
-        let admission = admission.map_err(|refused| self.explain(refused, name))?;
+        let admission = admission.map_err(|refused| self.explain(refused, name, run))?;
         self.orders.joined(name);
         if request.bodies {
             self.with_bodies.insert(name.clone());
         } else {
             self.with_bodies.remove(name);
         }
+        let simulation = &mut self.epoch.simulation;
         simulation.list_bodies(name, request.bodies);
 
         let open = self.barrier.open_report(name).map(AsRef::as_ref);
-        let welcome = simulation.welcome(&run, name, admission.generation, open);
+        let welcome = simulation.welcome(run, name, admission.generation, open);
         match welcome {
             Some(welcome) => Ok(JoinAnswer::Welcome(Box::new(welcome))),
-            None => Err(self.explain(Refused::UnknownName, name)),
+            None => Err(self.explain(Refused::UnknownName, name, run)),
         }
     }
 
-    /// Checks what does not depend on the other robots.
-    fn check_request(&self, query: &Query, request: &JoinRequest) -> Result<(), NotAdmitted> {
-        let name = &request.name;
-        let run = &self.options.run;
-
-        // Access control sees keys and not messages: both must name the same robot.
-        let asker = Keys::joins_as(query.key());
-        if let Some(asker) = asker.filter(|asker| *asker != name.as_str()) {
-            let explanation = format!("{asker} cannot join as {name}");
-            return Err(NotAdmitted::new(Refusal::Malformed, explanation));
-        }
-        if request.protocol != PROTOCOL_VERSION {
-            let explanation = format!(
-                "{name} speaks version {} of the protocol, this simulator version {PROTOCOL_VERSION}: update the older one",
-                request.protocol
-            );
-            return Err(NotAdmitted::new(Refusal::OtherProtocol, explanation));
-        }
-        if request.run != *run {
-            let explanation = format!("{name} means run {}, this is run {run}", request.run);
-            return Err(NotAdmitted::new(Refusal::OtherRun, explanation));
-        }
-
-        Ok(())
-    }
-
-    fn explain(&self, refused: Refused, name: &RobotName) -> NotAdmitted {
+    fn explain(&self, refused: Refused, name: &RobotName, run: &RunName) -> NotAdmitted {
         match refused {
             Refused::Ended => {
-                let explanation = format!("run {} is over", self.options.run);
+                let explanation = format!("run {run} is over");
                 NotAdmitted::new(Refusal::Ended, explanation)
             }
             Refused::NameTaken => {
@@ -123,4 +93,29 @@ impl Server {
             }
         }
     }
+}
+
+/// Checks what does not depend on the other robots.
+fn check_request(query: &Query, request: &JoinRequest, run: &RunName) -> Result<(), NotAdmitted> {
+    let name = &request.name;
+
+    // Access control sees keys and not messages: both must name the same robot.
+    let asker = Keys::joins_as(query.key());
+    if let Some(asker) = asker.filter(|asker| *asker != name.as_str()) {
+        let explanation = format!("{asker} cannot join as {name}");
+        return Err(NotAdmitted::new(Refusal::Malformed, explanation));
+    }
+    if request.protocol != PROTOCOL_VERSION {
+        let explanation = format!(
+            "{name} speaks version {} of the protocol, this simulator version {PROTOCOL_VERSION}: update the older one",
+            request.protocol
+        );
+        return Err(NotAdmitted::new(Refusal::OtherProtocol, explanation));
+    }
+    if request.run != *run {
+        let explanation = format!("{name} means run {}, this is run {run}", request.run);
+        return Err(NotAdmitted::new(Refusal::OtherRun, explanation));
+    }
+
+    Ok(())
 }

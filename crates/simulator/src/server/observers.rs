@@ -7,19 +7,14 @@ use bus::{Bus, BusError, Publisher, Query};
 use protocol::encode;
 use protocol::keys::Keys;
 use protocol::messages::{
-    Awaited, ControlAnswer, Flight, LogKind, LogRecord, MAX_ENTRIES, MAX_FLIGHTS, Presence,
-    RobotFrame, Status, WorldFrame,
+    Awaited, ControlAnswer, Flight, LogKind, LogRecord, MAX_ENTRIES, MAX_FLIGHTS, Status,
+    WorldFrame,
 };
 use protocol::time::seconds;
-use protocol::{Event, RobotName, Tick};
+use protocol::{Event, Tick};
 
-use crate::simulation::Simulation;
-
-/// Pictures are for eyes: no more often than this.
+/// Frames are put no more often than this: people look at them.
 pub(super) const FRAME_INTERVAL: Duration = Duration::from_millis(33);
-
-/// In every tick the clock waits a short time for each robot.
-const LATE_S: f64 = 0.5;
 
 /// Most bytes of texts among the lines of the log that are kept: with escapes and the other fields, all of them fit into one
 /// message.
@@ -28,9 +23,9 @@ const MAX_PAST_BYTES: usize = 128 << 10;
 pub(super) struct Observers {
     world: Publisher,
     log: Publisher,
-    painted: Instant,
+    last_frame: Instant,
     /// Whether a tick is complete that no frame has shown.
-    is_owed: bool,
+    is_frame_due: bool,
     /// For observers that come later.
     past_lines: PastLines,
     /// What became of commands since the last frame.
@@ -42,8 +37,8 @@ impl Observers {
         Ok(Self {
             world: bus.observer_publisher(&keys.world())?,
             log: bus.observer_publisher(&keys.log())?,
-            painted: Instant::now(),
-            is_owed: false,
+            last_frame: Instant::now(),
+            is_frame_due: false,
             past_lines: PastLines::default(),
             flights: VecDeque::new(),
         })
@@ -54,18 +49,14 @@ impl Observers {
     }
 
     /// A tick is complete: observers see it, unless another one is complete before it is time for a frame.
-    pub(super) fn owe_frame(&mut self) {
-        self.is_owed = self.world.has_subscribers();
+    pub(super) fn request_frame(&mut self) {
+        self.is_frame_due = self.world.has_subscribers();
     }
 
-    /// After how long it is time for the frame that observers are owed; `None` if there is none.
+    /// After how long it is time for the frame that was requested; `None` if none was.
     pub(super) fn frame_due_in(&self) -> Option<Duration> {
-        let rest = FRAME_INTERVAL.saturating_sub(self.painted.elapsed());
-        self.is_owed.then_some(rest)
-    }
-
-    pub(super) fn frame(&mut self, simulation: &Simulation, status: &Status) {
-        self.put(paint(simulation, status));
+        let rest = FRAME_INTERVAL.saturating_sub(self.last_frame.elapsed());
+        self.is_frame_due.then_some(rest)
     }
 
     /// Forgets what the next frame would show of earlier ticks.
@@ -75,10 +66,10 @@ impl Observers {
 
     /// Puts a frame, with the flights since the one before.
     pub(super) fn put(&mut self, mut frame: WorldFrame) {
-        self.painted = Instant::now();
-        self.is_owed = false;
+        self.last_frame = Instant::now();
+        self.is_frame_due = false;
         frame.flights = std::mem::take(&mut self.flights).into();
-        show(&self.world, encode(&frame));
+        put_lossy(&self.world, encode(&frame));
     }
 
     /// Notes what the next frame shows of the events of a tick.
@@ -99,7 +90,9 @@ impl Observers {
             self.past_lines.add(line);
         }
         if self.log.has_subscribers() {
-            lines.iter().for_each(|line| show(&self.log, encode(line)));
+            lines
+                .iter()
+                .for_each(|line| put_lossy(&self.log, encode(line)));
         }
     }
 
@@ -110,39 +103,36 @@ impl Observers {
         query.reply(query.key(), encode(&answer));
     }
 
-    /// The clock is held: say for whom. Returns the line of the log.
-    pub(super) fn held(&mut self, simulation: &Simulation, status: &Status) -> Option<LogRecord> {
+    /// Logs that the clock is held, and for whom. Returns the line.
+    pub(super) fn log_held(&mut self, status: &Status) -> Option<LogRecord> {
         if status.awaiting.is_empty() {
             return None;
         }
         let text = format!(
             "the clock is held at {} s: waiting for {}",
-            seconds(status.time_s, simulation.scenario().tick_s),
+            seconds(status.time_s, status.tick_s),
             name_all(&status.awaiting)
         );
-        let line = self.late(simulation, &text);
-        self.frame(simulation, status);
-        Some(line)
-    }
-
-    /// The clock goes on. Returns the line of the log.
-    pub(super) fn released(&mut self, simulation: &Simulation, status: &Status) -> LogRecord {
-        let line = self.late(simulation, "the clock goes on");
-        self.frame(simulation, status);
-        line
-    }
-
-    fn late(&mut self, simulation: &Simulation, text: &str) -> LogRecord {
         tracing::warn!("{text}");
+        Some(self.log_line(status, LogKind::Late, &text))
+    }
 
-        let tick = simulation.tick();
+    /// Logs that the clock goes on. Returns the line.
+    pub(super) fn log_released(&mut self, status: &Status) -> LogRecord {
+        let text = "the clock goes on";
+        tracing::warn!("{text}");
+        self.log_line(status, LogKind::Late, text)
+    }
+
+    /// Logs something about how things stand. Returns the line.
+    pub(super) fn log_line(&mut self, status: &Status, kind: LogKind, text: &str) -> LogRecord {
         let line = LogRecord {
-            epoch: simulation.epoch(),
-            tick,
-            time_s: simulation.time_s(tick),
-            tick_s: simulation.scenario().tick_s,
+            epoch: status.epoch,
+            tick: status.tick,
+            time_s: status.time_s,
+            tick_s: status.tick_s,
             source: "simulator".to_owned(),
-            kind: LogKind::Late,
+            kind,
             text: text.to_owned(),
         };
         let line = line.fitted();
@@ -171,8 +161,8 @@ impl PastLines {
     }
 }
 
-/// Watchers come and go; a picture that cannot be shown is not worth more than a note.
-fn show(to: &Publisher, message: Vec<u8>) {
+/// Puts what observers receive: what cannot be put is worth no more than a note.
+pub(super) fn put_lossy(to: &Publisher, message: Vec<u8>) {
     if let Err(error) = to.put(message) {
         tracing::debug!("{error}");
     }
@@ -186,84 +176,4 @@ fn name_all(awaiting: &[Awaited]) -> String {
         )
     };
     awaiting.iter().map(one).collect::<Vec<_>>().join(", ")
-}
-
-/// The field now, without flights.
-fn paint(simulation: &Simulation, status: &Status) -> WorldFrame {
-    let world = simulation.world();
-    let scenario = simulation.scenario();
-
-    let mut late = Vec::new();
-    for awaited in &status.awaiting {
-        if awaited.since_s > LATE_S {
-            late.push(awaited.name.clone());
-        }
-    }
-
-    let mut robots = Vec::with_capacity(simulation.names().len());
-    for name in simulation.names() {
-        robots.push(robot_frame(simulation, status, name));
-    }
-
-    WorldFrame {
-        run: status.run.clone(),
-        epoch: status.epoch,
-        tick: status.tick,
-        time_s: status.time_s,
-        duration_s: status.duration_s,
-        tick_s: scenario.tick_s,
-        seed: status.seed,
-        replay_of: None,
-        speed: status.speed,
-        phase: status.phase,
-        awaiting: status.awaiting.clone(),
-        field_m: scenario.field_m,
-        body_m: scenario.body_m,
-        robots,
-        // In whole millimeters, as in the recording: a tick looks the same live and recorded.
-        guests: world
-            .guests()
-            .iter()
-            .map(|guest| [millimeters(guest.x), millimeters(guest.y)])
-            .collect(),
-        obstacles: world
-            .obstacles()
-            .iter()
-            .map(|obstacle| [obstacle.x, obstacle.y])
-            .collect(),
-        flights: Vec::new(),
-        cuts: simulation.cuts(),
-        faults: simulation.held_processes(&late),
-        expectations: simulation.standings(),
-    }
-}
-
-/// A robot now.
-fn robot_frame(simulation: &Simulation, status: &Status, name: &RobotName) -> RobotFrame {
-    let report = simulation.report(name);
-    let process = status.robots.iter().find(|robot| robot.name == *name);
-
-    RobotFrame {
-        name: name.clone(),
-        location: simulation.location(name).unwrap_or_default(),
-        speed_mps: report.map_or(0.0, |report| report.speed_mps),
-        direction_rad: report.map_or(0.0, |report| report.direction_rad),
-        blocked: simulation.is_blocked(name),
-        emotion_state: report
-            .map(|report| report.emotion_state.clone())
-            .unwrap_or_default(),
-        behavior_state: report
-            .map(|report| report.behavior_state.clone())
-            .unwrap_or_default(),
-        state_variables: report
-            .map(|report| report.state_variables.clone())
-            .unwrap_or_default(),
-        generation: process.map_or(0, |process| process.generation),
-        presence: process.map_or(Presence::Gone, |process| process.presence),
-    }
-}
-
-/// A length in meters, rounded to whole millimeters.
-fn millimeters(length_m: f64) -> f64 {
-    (length_m * 1000.0).round() / 1000.0
 }

@@ -9,20 +9,22 @@ use protocol::keys::Keys;
 use protocol::messages::{Control, Intervention, Parameters, ParametersAnswer, ParametersOffer};
 use protocol::{RobotName, decode, encode};
 
-use super::control::load;
-use super::process::{Event, Server};
-use crate::simulation::Simulation;
+use super::event::Event;
+use super::frontend::Frontend;
+use super::live::LiveRun;
+use super::requests::load;
 
 /// How long robots may take to answer, all together. One that cannot check its parameters has no queryable and costs nothing; one
 /// that is stopped finds out when it begins.
-const PATIENCE: Duration = Duration::from_secs(2);
+const TIMEOUT: Duration = Duration::from_secs(2);
 
 /// Parameters, and the robot that would get them.
 type Offer = (RobotName, Parameters);
 
-impl Server {
+impl LiveRun {
     /// The parameters that a request would give to robots.
-    pub(super) fn offers(control: &Control, simulation: &Simulation) -> Vec<Offer> {
+    pub(super) fn offers(&self, control: &Control) -> Vec<Offer> {
+        let simulation = &self.epoch.simulation;
         match control {
             Control::Intervene { what } if matches!(what, Intervention::Set { .. }) => {
                 simulation.parameters_set_by(what)
@@ -33,16 +35,16 @@ impl Server {
         }
     }
 
-    /// Asks the robots, on a thread of its own: nothing may wait for them here. The request comes back as [`Event::Offered`].
-    pub(super) fn offer(&self, query: Query, control: Control, offers: Vec<Offer>) {
-        let bus = self.bus.clone();
-        let keys = self.keys.clone();
-        let send = self.sender();
+    /// Asks the robots, on a thread of its own: nothing may wait for them here. The request is then handled as [`Event::Offered`].
+    pub(super) fn offer(query: Query, control: Control, offers: Vec<Offer>, frontend: &Frontend) {
+        let bus = frontend.bus.clone();
+        let keys = frontend.keys.clone();
+        let inbox = frontend.inbox.clone();
         let asking = thread::Builder::new()
             .name("offers".to_owned())
             .spawn(move || {
                 let refusal = ask_all(&bus, &keys, &offers).err();
-                send(Event::Offered {
+                inbox.send(Event::Offered {
                     query,
                     control: Box::new(control),
                     refusal,
@@ -59,10 +61,10 @@ impl Server {
 /// # Errors
 /// The first refusal, in words.
 fn ask_all(bus: &Bus, keys: &Keys, offers: &[Offer]) -> Result<(), String> {
-    let deadline = Instant::now() + PATIENCE;
+    let deadline = Instant::now() + TIMEOUT;
     for (robot, parameters) in offers {
-        let patience = deadline.saturating_duration_since(Instant::now());
-        if patience.is_zero() {
+        let left = deadline.saturating_duration_since(Instant::now());
+        if left.is_zero() {
             tracing::warn!("not all robots have been asked about their parameters in time");
             break;
         }
@@ -71,7 +73,7 @@ fn ask_all(bus: &Bus, keys: &Keys, offers: &[Offer]) -> Result<(), String> {
         let offer = ParametersOffer {
             parameters: parameters.clone(),
         };
-        match bus.get_within(&key, "", Some(encode(&offer)), patience) {
+        match bus.get_within(&key, "", Some(encode(&offer)), left) {
             Ok(Some(reply)) => judge(robot, &key, reply.result)?,
             Ok(None) => {}
             Err(error) => tracing::warn!("{error}"),

@@ -80,5 +80,6 @@ pub(super) struct PendingOrders {
     pub(super) begun: Instant,
     /// When it was put last; `None` while no launcher subscribes.
     pub(super) put: Option<Instant>,
-    pub(super) nudged: Instant,
+    /// When the clock was repeated last, so that robots join again.
+    pub(super) repeated: Instant,
 }

@@ -20,7 +20,7 @@ pub(super) struct Pace {
     pub(super) speed: Option<f64>,
     pub(super) due: Instant,
     pub(super) pending_steps: u64,
-    /// Who asked to step, and the tick at which the answer is due.
+    /// The client that waits for steps, and the tick at which the answer is due.
     pub(super) stepping: Option<(Query, Tick)>,
 }
 
@@ -86,6 +86,17 @@ impl Pace {
         Ok(())
     }
 
+    /// Holds the clock at the end of a recording, or before a tick of it that cannot be read.
+    pub(super) fn hold(&mut self) {
+        self.phase = Phase::Paused;
+        self.pending_steps = 0;
+    }
+
+    /// Whether the clock stays where it is until a request.
+    pub(super) fn is_held(&self) -> bool {
+        self.phase != Phase::Running && self.pending_steps == 0
+    }
+
     /// Changes the speed from now on.
     pub(super) fn set_speed(&mut self, speed: Option<f64>) -> Result<(), String> {
         if speed.is_some_and(|speed| speed <= 0.0) {
@@ -114,17 +125,18 @@ impl Pace {
         Ok(())
     }
 
-    /// Whether the next tick is due as soon as one is complete, and no one waits for a step.
+    /// Whether the next tick is due as soon as one is complete, and no client waits for a step.
     pub(super) fn is_at_full_speed(&self) -> bool {
         self.phase == Phase::Running && self.speed.is_none() && self.stepping.is_none()
     }
 
-    /// Who is to be told that a tick is reached.
-    pub(super) fn reached(&mut self, tick: Tick) -> Option<(Query, Tick)> {
-        self.stepping.take_if(|(_, until)| tick >= *until)
+    /// The client whose steps are done at this tick.
+    pub(super) fn reached(&mut self, tick: Tick) -> Option<Query> {
+        let stepping = self.stepping.take_if(|(_, until)| tick >= *until);
+        stepping.map(|(query, _)| query)
     }
 
-    /// Who is to be told that stepping hangs.
+    /// The client that waits for steps, which is answered before they are done.
     pub(super) fn give_up_stepping(&mut self) -> Option<Query> {
         self.stepping.take().map(|(query, _)| query)
     }

@@ -11,27 +11,25 @@ use lockstep::Outcome;
 use protocol::RobotName;
 use protocol::messages::{CommandText, Report};
 
-use super::faults::{LOOK, NUDGE, PATIENCE};
-use super::past::{RejoinWait, ReplayLog};
-use super::process::{Server, Stage};
-use crate::simulation::Simulation;
+use super::faults::{POLL_INTERVAL, REJOIN_INTERVAL, TIMEOUT};
+use super::live::{LiveRun, RejoinWait, WaitsFor};
+use super::replay_log::ReplayLog;
 
-impl Server {
-    /// Says who takes part in the tick that is opened next, while the run is executed again.
-    pub(super) fn recall(&mut self) {
-        let attendance = self.past.as_ref().map(ReplayLog::attendance);
+impl LiveRun {
+    /// Tells the barrier who takes part in the tick that is opened next, while the run is executed again.
+    pub(super) fn recall_attendance(&mut self) {
+        let attendance = self.epoch.record.replay_log().map(ReplayLog::attendance);
         self.barrier.recall(attendance);
     }
 
-    /// Takes the answers away that came too late when the tick was recorded.
-    pub(super) fn take_late(
-        &self,
-        outcome: &mut Outcome<Arc<Report>, CommandText>,
-        simulation: &mut Simulation,
-    ) {
-        let Some(past) = &self.past else { return };
+    /// Drops the answers that came too late when the tick was recorded.
+    pub(super) fn drop_late(&mut self, outcome: &mut Outcome<Arc<Report>, CommandText>) {
+        let Some(replay_log) = self.epoch.record.replay_log() else {
+            return;
+        };
+        let simulation = &mut self.epoch.simulation;
         outcome.reports.retain(|robot, (report, _)| {
-            let is_late = past.is_done_late(robot, report.tick);
+            let is_late = replay_log.is_done_late(robot, report.tick);
             if is_late {
                 simulation.done_late(robot, report.tick);
             }
@@ -41,49 +39,53 @@ impl Server {
 
     /// Holds the clock until the robots are back that take part in the next tick as further incarnations; after the last tick
     /// of the record, until all are back. Those whose processes the scenario keeps from running come back as it has it.
-    pub(super) fn hold_for_returns(&mut self) {
-        let mut robots: BTreeSet<RobotName> = match &self.past {
-            Some(past) => past.joined().cloned().collect(),
+    pub(super) fn hold_for_rejoins(&mut self) {
+        let replay_log = self.epoch.record.replay_log();
+        let mut robots: BTreeSet<RobotName> = match replay_log {
+            Some(replay_log) => replay_log.joined().cloned().collect(),
             None => self.barrier.roster().cloned().collect(),
         };
         robots.retain(|robot| !self.barrier.is_stopped(robot));
 
-        if self.is_repeating() {
+        if replay_log.is_some() {
             // One that is here, and was killed and replaced between two ticks then, has not been asked yet.
             for robot in &robots {
                 self.barrier.ask_to_rejoin(robot);
             }
         }
 
-        self.stage = Stage::Returns(RejoinWait {
+        self.epoch.waits_for = WaitsFor::Rejoins(RejoinWait {
             robots,
             begun: Instant::now(),
             asked: None,
         });
     }
 
-    /// Looks whether the robots are back for which the clock is held. Returns how long to wait before looking again; `None` if
+    /// Checks whether the robots are back for which the clock is held. Returns how long to wait before looking again; `None` if
     /// they are, or have not come in time.
-    pub(super) fn await_returns(&mut self) -> Option<Duration> {
-        let Stage::Returns(returning) = &mut self.stage else {
+    pub(super) fn await_rejoins(&mut self) -> Option<Duration> {
+        let WaitsFor::Rejoins(wait) = &mut self.epoch.waits_for else {
             return None;
         };
         let barrier = &self.barrier;
-        returning.robots.retain(|robot| !barrier.is_back(robot));
-        if returning.robots.is_empty() {
+        wait.robots.retain(|robot| !barrier.is_back(robot));
+        if wait.robots.is_empty() {
             return None;
         }
-        if returning.begun.elapsed() > PATIENCE {
-            for robot in &returning.robots {
+        if wait.begun.elapsed() > TIMEOUT {
+            for robot in &wait.robots {
                 tracing::error!("{robot} has not joined again in time");
             }
             return None;
         }
 
-        if returning.asked.is_none_or(|asked| asked.elapsed() > NUDGE) {
-            returning.asked = Some(Instant::now());
+        if wait
+            .asked
+            .is_none_or(|asked| asked.elapsed() > REJOIN_INTERVAL)
+        {
+            wait.asked = Some(Instant::now());
             self.barrier.repeat(&mut self.outputs);
         }
-        Some(LOOK)
+        Some(POLL_INTERVAL)
     }
 }

@@ -3,7 +3,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
-use std::time::Instant;
 
 use config::FileError;
 use lockstep::Attendance;
@@ -22,14 +21,6 @@ pub struct ReplayLog {
     next: Option<Entry>,
     /// Robots that did a tick too late, by tick. The record says it where they took part again, which is later.
     done_late: BTreeMap<Tick, BTreeSet<RobotName>>,
-}
-
-/// The robots for which the clock is held until they have joined again.
-pub(super) struct RejoinWait {
-    pub(super) robots: BTreeSet<RobotName>,
-    pub(super) begun: Instant,
-    /// When they were asked last; `None` if they have not been.
-    pub(super) asked: Option<Instant>,
 }
 
 /// How a tick that was executed again compares with the record.

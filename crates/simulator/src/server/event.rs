@@ -1,0 +1,132 @@
+//! What can happen to a server, and why it stops.
+
+use bus::{BusError, Query};
+use config::diagnostic::FileError;
+use protocol::messages::{Command, Control, End, Panel, Report, Waiting};
+use protocol::{Malformed, RobotName, RunName};
+use record::difference::Difference;
+use recording::RecordingError;
+use scenario::Scenario;
+
+/// Everything that can happen to a server.
+pub enum Event {
+    /// A robot has done its tick.
+    Report {
+        /// The robot that the key names.
+        robot: String,
+        /// What it put.
+        report: Report,
+    },
+    /// A robot, or the operator, sent a command.
+    Command {
+        /// The sender that the key names.
+        from: String,
+        /// The target that the key names.
+        to: String,
+        /// What was put.
+        command: Command,
+    },
+    /// A robot waits for another robot's answer.
+    Waiting {
+        /// The robot that the key names.
+        robot: String,
+        /// What it put.
+        waiting: Waiting,
+    },
+    /// A robot shows a panel.
+    Panel {
+        /// The robot that the key names.
+        robot: String,
+        /// What it put.
+        panel: Panel,
+    },
+    /// A message that cannot be decoded.
+    Malformed(Malformed),
+    /// A robot asks to take part.
+    Join(Query),
+    /// An operator asks for something.
+    Control(Query),
+    /// Robots have been asked about the parameters that an operator wants to set.
+    Offered {
+        /// The request.
+        query: Query,
+        /// What it asks for.
+        control: Box<Control>,
+        /// Why a robot refuses its parameters, if one does.
+        refusal: Option<String>,
+    },
+    /// An observer asks for the state of a robot of a recording.
+    State(RobotName, Query),
+    /// A robot's liveliness token was declared or undeclared.
+    Token {
+        /// The robot that the key names.
+        robot: String,
+        /// Whether it is declared.
+        is_present: bool,
+    },
+    /// A console declares, or declares no more, that a browser shows the run.
+    Viewer {
+        /// Whether one does.
+        is_present: bool,
+    },
+    /// The process is asked to end.
+    Terminate,
+}
+
+/// Why a server ended before its time, or cannot begin.
+#[derive(Debug, thiserror::Error)]
+pub enum ServerError {
+    /// The bus failed.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+    /// The record cannot be written.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The environment cannot be set up.
+    #[error(transparent)]
+    Hall(#[from] world::HallError),
+    /// A run that is resumed does not go as its record.
+    #[error(
+        "the run cannot be resumed: executed again, it differs from its record at {0} (recorded: {recorded}; now: {now}). \
+         The record is as it was",
+        recorded = .0.value(0),
+        now = .0.value(1)
+    )]
+    NotRepeated(Box<Difference>),
+    /// A recording cannot be read.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// A recording has no tick.
+    #[error("the recording of run {0} has no complete tick")]
+    Empty(RunName),
+}
+
+/// Why a server stops.
+#[derive(Debug)]
+pub(super) enum Exit {
+    /// The run ends.
+    End(End),
+    /// The process cannot go on.
+    Failed(ServerError),
+}
+
+impl<E: Into<ServerError>> From<E> for Exit {
+    fn from(error: E) -> Self {
+        Self::Failed(error.into())
+    }
+}
+
+/// Why an epoch of a run stops.
+#[derive(Debug)]
+pub(super) enum Interrupt {
+    /// Another one begins with this scenario.
+    Init(Box<Scenario>),
+    /// The server stops.
+    Exit(Exit),
+}
+
+impl<E: Into<Exit>> From<E> for Interrupt {
+    fn from(exit: E) -> Self {
+        Self::Exit(exit.into())
+    }
+}

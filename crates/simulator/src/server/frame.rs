@@ -1,0 +1,89 @@
+//! The field of a run in progress, as observers see it.
+
+use protocol::RobotName;
+use protocol::messages::{Presence, RobotFrame, Status, WorldFrame};
+
+use crate::simulation::Simulation;
+
+/// In every tick the clock waits a short time for each robot.
+const LATE_S: f64 = 0.5;
+
+/// The field now, without flights.
+pub(super) fn frame(simulation: &Simulation, status: &Status) -> WorldFrame {
+    let world = simulation.world();
+    let scenario = simulation.scenario();
+
+    let mut late = Vec::new();
+    for awaited in &status.awaiting {
+        if awaited.since_s > LATE_S {
+            late.push(awaited.name.clone());
+        }
+    }
+
+    let mut robots = Vec::with_capacity(simulation.names().len());
+    for name in simulation.names() {
+        robots.push(robot_frame(simulation, status, name));
+    }
+
+    WorldFrame {
+        run: status.run.clone(),
+        epoch: status.epoch,
+        tick: status.tick,
+        time_s: status.time_s,
+        duration_s: status.duration_s,
+        tick_s: scenario.tick_s,
+        seed: status.seed,
+        replay_of: None,
+        speed: status.speed,
+        phase: status.phase,
+        awaiting: status.awaiting.clone(),
+        field_m: scenario.field_m,
+        body_m: scenario.body_m,
+        robots,
+        // In whole millimeters, as in the recording: a tick looks the same live and recorded.
+        guests: world
+            .guests()
+            .iter()
+            .map(|guest| [millimeters(guest.x), millimeters(guest.y)])
+            .collect(),
+        obstacles: world
+            .obstacles()
+            .iter()
+            .map(|obstacle| [obstacle.x, obstacle.y])
+            .collect(),
+        flights: Vec::new(),
+        cuts: simulation.cuts(),
+        faults: simulation.held_processes(&late),
+        expectations: simulation.standings(),
+    }
+}
+
+/// A robot now.
+fn robot_frame(simulation: &Simulation, status: &Status, name: &RobotName) -> RobotFrame {
+    let report = simulation.report(name);
+    let process = status.robots.iter().find(|robot| robot.name == *name);
+
+    RobotFrame {
+        name: name.clone(),
+        location: simulation.location(name).unwrap_or_default(),
+        speed_mps: report.map_or(0.0, |report| report.speed_mps),
+        direction_rad: report.map_or(0.0, |report| report.direction_rad),
+        blocked: simulation.is_blocked(name),
+        emotion_state: report
+            .map(|report| report.emotion_state.clone())
+            .unwrap_or_default(),
+        behavior_state: report
+            .map(|report| report.behavior_state.clone())
+            .unwrap_or_default(),
+        state_variables: report
+            .map(|report| report.state_variables.clone())
+            .unwrap_or_default(),
+        generation: process.map_or(0, |process| process.generation),
+        presence: process.map_or(Presence::Gone, |process| process.presence),
+    }
+}
+
+/// A length in meters, rounded to whole millimeters.
+fn millimeters(length_m: f64) -> f64 {
+    (length_m * 1000.0).round() / 1000.0
+}

@@ -1,0 +1,142 @@
+//! What a run is to those that observe and control it, wherever its ticks come from: its keys, its publishers and its pace.
+
+use bus::{Bus, BusError, Declared, Inbox, OnArrival, Query};
+use protocol::keys::Keys;
+use protocol::messages::{ControlAnswer, FieldError, Status};
+use protocol::{Message, RunName, decode, encode};
+
+use super::event::Event;
+use super::observers::Observers;
+use super::pace::Pace;
+
+/// The side of a server that speaks to the bus.
+pub(super) struct Frontend {
+    pub(super) run: RunName,
+    pub(super) bus: Bus,
+    pub(super) keys: Keys,
+    pub(super) inbox: Inbox<Event>,
+    pub(super) observers: Observers,
+    pub(super) pace: Pace,
+    declared: Vec<Declared>,
+}
+
+impl Frontend {
+    pub(super) fn new(
+        bus: Bus,
+        run: RunName,
+        speed: Option<f64>,
+        is_paused: bool,
+    ) -> Result<Self, BusError> {
+        let keys = Keys::new(&run);
+        // Only where the process stays connected while it works on the middleware's thread.
+        let on_arrival = if bus::runtime::has_own_sender() {
+            OnArrival::Work
+        } else {
+            OnArrival::Wake
+        };
+        Ok(Self {
+            run,
+            observers: Observers::new(&bus, &keys)?,
+            bus,
+            keys,
+            inbox: Inbox::new(on_arrival),
+            pace: Pace::new(speed, is_paused),
+            declared: Vec::new(),
+        })
+    }
+
+    /// A declaration that lasts as long as the session.
+    pub(super) fn keep(&mut self, declared: Declared) {
+        self.declared.push(declared);
+    }
+
+    /// Subscribes to what robots put on keys that name them.
+    pub(super) fn subscribe<M: Message + 'static>(
+        &self,
+        keys: &str,
+        event: fn(String, M) -> Event,
+    ) -> Result<Declared, BusError> {
+        let inbox = self.inbox.clone();
+        self.bus.subscribe(keys, move |key, bytes| {
+            let robot = Keys::robot_of(key).unwrap_or_default().to_owned();
+            inbox.send_and_work(match decode(key, &robot, bytes) {
+                Ok(message) => event(robot, message),
+                Err(error) => Event::Malformed(error),
+            });
+        })
+    }
+
+    /// Declares a queryable, which is answered by the server.
+    pub(super) fn declare_queryable(
+        &mut self,
+        key: &str,
+        event: impl Fn(Query) -> Event + Send + Sync + 'static,
+    ) -> Result<(), BusError> {
+        let inbox = self.inbox.clone();
+        let queryable = self
+            .bus
+            .queryable(key, move |query| inbox.send(event(query)))?;
+        self.keep(queryable);
+        Ok(())
+    }
+
+    /// Declares where robots join and where control is answered, and then the simulator's token: when that is seen, everything
+    /// declared before is in effect.
+    pub(super) fn declare_simulator(&mut self) -> Result<(), BusError> {
+        self.declare_queryable(&self.keys.join(), Event::Join)?;
+        self.declare_queryable(&self.keys.joins(), Event::Join)?;
+        self.declare_queryable(&self.keys.control(), Event::Control)?;
+        let token = self.bus.token(&self.keys.alive_sim())?;
+        self.keep(token);
+        Ok(())
+    }
+
+    /// Ends this side of the contract.
+    pub(super) fn close(mut self) {
+        self.declared.clear();
+        self.bus.close();
+    }
+}
+
+/// Why something is not done.
+pub(super) struct Refusal {
+    pub(super) explanation: String,
+    pub(super) fields: Vec<FieldError>,
+}
+
+impl From<String> for Refusal {
+    fn from(explanation: String) -> Self {
+        Self {
+            explanation,
+            fields: Vec::new(),
+        }
+    }
+}
+
+impl From<Refusal> for ControlAnswer {
+    fn from(
+        Refusal {
+            explanation,
+            fields,
+        }: Refusal,
+    ) -> Self {
+        Self::Refused {
+            explanation,
+            fields,
+        }
+    }
+}
+
+/// Refuses a request with the reason.
+pub(super) fn refuse(query: &Query, explanation: &str) {
+    answer(query, &Refusal::from(explanation.to_owned()).into());
+}
+
+/// Answers a request with how things stand.
+pub(super) fn answer_status(query: &Query, status: Status) {
+    answer(query, &ControlAnswer::Done(Box::new(status)));
+}
+
+pub(super) fn answer(query: &Query, answer: &ControlAnswer) {
+    query.reply(query.key(), encode(answer));
+}

@@ -1,0 +1,684 @@
+//! A run whose ticks take place now: robots in lock-step ([`lockstep::Barrier`]), and the [`Simulation`].
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use bus::{Bus, BusError, Declared, Publisher, Query};
+use config::diagnostic::FileError;
+use lockstep::{Barrier, IncarnationNotice, Outcome, Output, Timing};
+use protocol::keys::{Keys, STATE};
+use protocol::messages::{
+    Clock, CommandText, Control, End, MAX_ENTRIES, Reason, Report, RobotStatus, Status,
+};
+use protocol::{Epoch, RobotName, Tick, decode, encode};
+use record::RunFolder;
+use record::summary::{Summary, Wall};
+use scenario::Scenario;
+
+use super::control::on_control;
+use super::departed::{Departed, Wait};
+use super::event::{Event, Exit, Interrupt, ServerError};
+use super::frame::frame;
+use super::frontend::{Frontend, refuse};
+use super::options::{Options, Stay};
+use super::orders::{Orders, PendingOrders};
+use super::process::{Server, run_to_exit};
+use super::record::EpochRecord;
+use super::replay_log::ReplayLog;
+use super::source::{Next, TickSource};
+use super::timers::Timers;
+use super::viewers::Viewers;
+use super::watchdog::{Activity, Watchdog};
+use crate::simulation::Simulation;
+
+/// Most ticks that wait for no robot and are granted in one go: the thread that does it may be the one that receives.
+const MAX_TICKS_AT_ONCE: Tick = 16;
+
+/// A run whose ticks take place now.
+pub struct LiveRun {
+    pub(super) stay: Stay,
+    pub(super) repeat_after: Duration,
+    folder: RunFolder,
+    pub(super) clock: Publisher,
+    news: BTreeMap<RobotName, Publisher>,
+    /// The subscriber to panels, while they are recorded: robots put them only if there is one.
+    panels: Option<Declared>,
+    pub(super) viewers: Viewers,
+    watchdog: Watchdog,
+
+    // What is known of the robots' processes, which outlive an epoch.
+    pub(super) barrier: Barrier<Arc<Report>, CommandText>,
+    pub(super) outputs: Vec<Output<Arc<Report>, CommandText>>,
+    timers: Timers,
+    pub(super) departed: Departed,
+    pub(super) orders: Orders,
+    /// Robots whose news list the bodies around them.
+    pub(super) with_bodies: BTreeSet<RobotName>,
+
+    pub(super) epoch: LiveEpoch,
+    /// The tick at which the thread that works now stops for a moment.
+    pause_at: Tick,
+}
+
+/// What belongs to one epoch: nothing of it reaches into the next one.
+pub(super) struct LiveEpoch {
+    pub(super) simulation: Simulation,
+    pub(super) record: EpochRecord,
+    pub(super) waits_for: WaitsFor,
+    /// Since when the clock waits for robots.
+    waiting_since: Instant,
+    /// Robots that hold the clock up: awaited when people were told, and not waiting for another robot.
+    stragglers: Vec<RobotName>,
+    pub(super) wall: Wall,
+    /// Commands of the operator that are sent at the next tick boundary.
+    pub(super) operator: Vec<(RobotName, String)>,
+    /// Requests that wait until the next tick has begun.
+    pub(super) deferred: Vec<Query>,
+}
+
+/// What an epoch waits for.
+pub(super) enum WaitsFor {
+    /// The robots: to join, or to report.
+    Robots,
+    /// Robots that have to join again, before or after the last tick of a run that is executed again.
+    Rejoins(RejoinWait),
+    /// The next tick to be due.
+    Pace,
+    /// The launcher, to carry out the faults that are due before the next tick.
+    Faults(PendingOrders),
+}
+
+/// The robots for which the clock is held until they have joined again.
+pub(super) struct RejoinWait {
+    pub(super) robots: BTreeSet<RobotName>,
+    pub(super) begun: Instant,
+    /// When they were asked last; `None` if they have not been.
+    pub(super) asked: Option<Instant>,
+}
+
+impl LiveEpoch {
+    fn begin(
+        scenario: Scenario,
+        epoch: Epoch,
+        folder: &RunFolder,
+        frontend: &Frontend,
+        replay_log: Option<ReplayLog>,
+    ) -> Result<Self, ServerError> {
+        let simulation = Simulation::new(scenario, epoch)?;
+        let record = EpochRecord::begin(folder, &frontend.run, &simulation, replay_log)?;
+        Ok(Self {
+            simulation,
+            record,
+            waits_for: WaitsFor::Robots,
+            waiting_since: Instant::now(),
+            stragglers: Vec::new(),
+            wall: Wall::default(),
+            operator: Vec::new(),
+            deferred: Vec::new(),
+        })
+    }
+}
+
+impl Server<LiveRun> {
+    /// Declares the simulator's side of the contract on an open bus, and begins to gather the robots of a run. With a replay log
+    /// the epoch of its record is executed again and then resumed.
+    ///
+    /// # Errors
+    /// [`ServerError`] if something cannot be declared, or the first epoch cannot begin.
+    pub fn open(
+        bus: Bus,
+        scenario: Scenario,
+        options: Options,
+        folder: &RunFolder,
+        replay_log: Option<ReplayLog>,
+    ) -> Result<Self, ServerError> {
+        let mut frontend = Frontend::new(bus, options.run, options.speed, options.is_paused)?;
+        let bus = &frontend.bus;
+        let keys = &frontend.keys;
+        let mut news = BTreeMap::new();
+        for name in scenario.robots.keys() {
+            news.insert(name.clone(), bus.publisher(&keys.news(name))?);
+        }
+        let timing = Timing {
+            repeat: options.repeat_after,
+            ..Timing::default()
+        };
+        let barrier = Barrier::new(
+            scenario.robots.keys().cloned(),
+            scenario.lateness.to_lockstep(),
+            timing,
+            u32::try_from(MAX_ENTRIES).unwrap_or(u32::MAX),
+        );
+        let number = replay_log.as_ref().map_or(1, ReplayLog::epoch);
+
+        let mut source = LiveRun {
+            stay: options.stay,
+            repeat_after: options.repeat_after,
+            folder: folder.clone(),
+            clock: bus.publisher(&keys.clock())?,
+            news,
+            panels: None,
+            viewers: Viewers::default(),
+            watchdog: Watchdog::start(|line| tracing::warn!("{line}")),
+            barrier,
+            outputs: Vec::new(),
+            timers: Timers::default(),
+            departed: Departed::default(),
+            orders: Orders::new(bus.publisher(&keys.faults())?),
+            with_bodies: BTreeSet::new(),
+            epoch: LiveEpoch::begin(scenario, number, folder, &frontend, replay_log)?,
+            pause_at: 0,
+        };
+        source.declare(&mut frontend)?;
+        source.begin_epoch(&mut frontend)?;
+        Ok(Self { frontend, source })
+    }
+
+    /// Runs until the run ends: epoch after epoch, tick after tick.
+    ///
+    /// # Errors
+    /// [`ServerError`] if it cannot go on; what was recorded until then is kept.
+    pub fn run(self) -> Result<Summary, ServerError> {
+        let (Self { frontend, source }, exit) = run_to_exit(self);
+        match exit {
+            Exit::End(end) => source.conclude(end, frontend),
+            Exit::Failed(error) => {
+                // So that its robots end, too.
+                if let Err(error) = source.leave(End::Aborted, frontend) {
+                    tracing::debug!("{error}");
+                }
+                Err(error)
+            }
+        }
+    }
+}
+
+impl TickSource for LiveRun {
+    type Interrupt = Interrupt;
+
+    fn begin_work(&mut self) {
+        self.watchdog.note(Some(Activity::Work));
+        self.pause_at = self.epoch.simulation.tick() + MAX_TICKS_AT_ONCE;
+    }
+
+    fn end_work(
+        &mut self,
+        outcome: Result<Option<Duration>, Interrupt>,
+        frontend: &mut Frontend,
+    ) -> Result<Option<Duration>, Exit> {
+        // What was complete before the interruption is written whatever interrupts.
+        let written = self.write_noted();
+        self.watchdog.note(None);
+        written?;
+
+        match outcome {
+            Ok(rest) => return Ok(rest),
+            Err(Interrupt::Init(next)) => self.begin_next_epoch(*next, frontend)?,
+            // A client that stops a run wants its processes to end.
+            Err(Interrupt::Exit(Exit::End(end))) if end != End::Stopped && self.stays() => {
+                self.end_and_stay(end, frontend)?;
+            }
+            Err(Interrupt::Exit(exit)) => return Err(exit),
+        }
+        Ok(Some(Duration::ZERO))
+    }
+
+    fn advance(&mut self, frontend: &mut Frontend) -> Result<Next, Interrupt> {
+        if self.epoch.record.is_closed() {
+            return Ok(self.linger()?);
+        }
+
+        while let Some(timer) = self.timers.take_due(Instant::now()) {
+            self.barrier.timer(&timer, &mut self.outputs);
+        }
+        self.carry_out(frontend)?;
+        let standby = match self.endless_wait() {
+            Wait::Bounded => None,
+            Wait::Standby(left) => Some(left),
+            Wait::Endless => return Err(Exit::End(End::Aborted).into()),
+        };
+        let simulation = &self.epoch.simulation;
+        let is_waiting_for_robots = matches!(self.epoch.waits_for, WaitsFor::Robots);
+        if simulation.tick() >= simulation.scenario().ticks && !is_waiting_for_robots {
+            return Err(Exit::End(End::Finished).into());
+        }
+
+        if simulation.tick() >= self.pause_at {
+            return Ok(Next::Wait(Some(Duration::ZERO)));
+        }
+
+        match self.open_next_tick(frontend)? {
+            Next::Wait(rest) => Ok(Next::Wait(rest.into_iter().chain(standby).min())),
+            next @ Next::GoOn => Ok(next),
+        }
+    }
+
+    fn handle(&mut self, event: Event, frontend: &mut Frontend) -> Result<(), Interrupt> {
+        self.on_event(event, frontend)
+    }
+
+    fn request(
+        &mut self,
+        query: Query,
+        control: Control,
+        frontend: &mut Frontend,
+    ) -> Result<(), Interrupt> {
+        self.on_request(query, control, frontend)
+    }
+
+    fn act(&mut self, control: &Control, _: &mut Frontend) -> Result<(), String> {
+        self.on_action(control)
+    }
+
+    fn check_next_tick(&self) -> Result<(), String> {
+        Ok(())
+    }
+
+    fn tick_after(&self, ticks: u64) -> Option<Tick> {
+        // People know already for whom the clock is held.
+        if self.barrier.is_announced() {
+            return None;
+        }
+        let simulation = &self.epoch.simulation;
+        let until = simulation.tick() + ticks + u64::from(self.barrier.is_open());
+        Some(until.min(simulation.scenario().ticks))
+    }
+
+    fn scenario(&self) -> Result<Scenario, String> {
+        Ok(self.epoch.simulation.scenario().clone())
+    }
+
+    fn status(&self, frontend: &Frontend) -> Status {
+        let simulation = &self.epoch.simulation;
+        let scenario = simulation.scenario();
+        let lateness = self.barrier.lateness();
+        let mut robots = Vec::new();
+        for name in self.barrier.roster() {
+            let (generation, presence) = self.barrier.presence(name);
+            robots.push(RobotStatus {
+                name: name.clone(),
+                generation,
+                on_late: lateness.of(name),
+                presence,
+            });
+        }
+
+        Status {
+            run: frontend.run.clone(),
+            epoch: simulation.epoch(),
+            tick: simulation.tick(),
+            pending_steps: frontend.pace.pending_steps,
+            time_s: simulation.time_s(simulation.tick()),
+            duration_s: scenario.duration_s(),
+            tick_s: scenario.tick_s,
+            seed: scenario.seed,
+            replay_of: None,
+            phase: frontend.pace.phase,
+            speed: frontend.pace.speed,
+            on_late: lateness.on_late,
+            deadline_s: lateness.deadline.as_secs_f64(),
+            awaiting: self.awaiting(self.epoch.waiting_since),
+            robots,
+            ignored: self.epoch.wall.ignored.clone(),
+        }
+    }
+
+    fn show(&mut self, frontend: &mut Frontend) {
+        if frontend.observers.has_subscribers() {
+            self.put_frame(frontend);
+        }
+    }
+}
+
+impl LiveRun {
+    /// Declares what the simulator subscribes to and answers, its token last.
+    fn declare(&mut self, frontend: &mut Frontend) -> Result<(), BusError> {
+        let keys = &frontend.keys;
+        let reports = frontend.subscribe(&keys.reports(), |robot, report| Event::Report {
+            robot,
+            report,
+        })?;
+        let waiting = frontend.subscribe(&keys.all_waiting(), |robot, waiting| Event::Waiting {
+            robot,
+            waiting,
+        })?;
+
+        let inbox = frontend.inbox.clone();
+        let commands = frontend
+            .bus
+            .subscribe(&keys.commands(), move |key, bytes| {
+                let to = Keys::robot_of(key).unwrap_or_default().to_owned();
+                let from = Keys::last_chunk(key).to_owned();
+                inbox.send_and_work(match decode(key, &from, bytes) {
+                    Ok(command) => Event::Command { from, to, command },
+                    Err(error) => Event::Malformed(error),
+                });
+            })?;
+
+        // The middleware calls back about tokens in the middle of its own work: these events are left to the own thread.
+        let inbox = frontend.inbox.clone();
+        let tokens = frontend
+            .bus
+            .liveliness(&keys.alive_robots(), move |key, is_present| {
+                let robot = Keys::robot_of(key).unwrap_or_default().to_owned();
+                inbox.send(Event::Token { robot, is_present });
+            })?;
+        let mut declared = vec![reports, commands, waiting, tokens];
+
+        if self.stay == Stay::Viewed {
+            let inbox = frontend.inbox.clone();
+            let viewers = frontend
+                .bus
+                .liveliness(&keys.alive_viewer(), move |_, is_present| {
+                    inbox.send(Event::Viewer { is_present });
+                })?;
+            declared.push(viewers);
+        }
+
+        declared.into_iter().for_each(|one| frontend.keep(one));
+        frontend.declare_simulator()
+    }
+
+    /// Begins the epoch after this one.
+    fn begin_next_epoch(
+        &mut self,
+        scenario: Scenario,
+        frontend: &mut Frontend,
+    ) -> Result<(), ServerError> {
+        self.epoch.record.supersede()?;
+        let deferred = std::mem::take(&mut self.epoch.deferred);
+        let number = self.epoch.simulation.epoch() + 1;
+        self.epoch = LiveEpoch::begin(scenario, number, &self.folder, frontend, None)?;
+        for query in deferred {
+            refuse(
+                &query,
+                "the epoch is over, and another one begins from the scenario as it is",
+            );
+        }
+        Ok(self.begin_epoch(frontend)?)
+    }
+
+    /// Begins to gather robots. Nothing of an epoch before may reach into this one.
+    fn begin_epoch(&mut self, frontend: &mut Frontend) -> Result<(), BusError> {
+        self.outputs.clear();
+        let simulation = &mut self.epoch.simulation;
+        for name in &self.with_bodies {
+            simulation.list_bodies(name, true);
+        }
+
+        if !simulation.scenario().record.has_panels() {
+            self.panels = None;
+        } else if self.panels.is_none() {
+            let keys = frontend.keys.panels();
+            let panels = frontend.subscribe(&keys, |robot, panel| Event::Panel { robot, panel })?;
+            self.panels = Some(panels);
+        }
+
+        frontend.pace.gather();
+        self.gather();
+        let number = self.epoch.simulation.epoch();
+        if let Some(pending_orders) = self.order_end_of_faults(number) {
+            self.epoch.waits_for = WaitsFor::Faults(pending_orders);
+        }
+        Ok(())
+    }
+
+    /// Begins to wait for the robots of the roster.
+    fn gather(&mut self) {
+        let epoch = &mut self.epoch;
+        epoch.waits_for = WaitsFor::Robots;
+        epoch.waiting_since = Instant::now();
+        let lateness = epoch.simulation.scenario().lateness.to_lockstep();
+        let number = epoch.simulation.epoch();
+        self.barrier.gather(number, lateness, &mut self.outputs);
+    }
+
+    /// Opens the next tick if it is due, or finds out how long to wait at most before looking again.
+    fn open_next_tick(&mut self, frontend: &mut Frontend) -> Result<Next, Interrupt> {
+        match &self.epoch.waits_for {
+            WaitsFor::Robots => return Ok(Next::Wait(self.timers.next(Instant::now()))),
+            WaitsFor::Rejoins(_) => {
+                if let Some(rest) = self.await_rejoins() {
+                    return Ok(Next::Wait(Some(rest)));
+                }
+                self.epoch.waits_for = WaitsFor::Pace;
+                return Ok(Next::GoOn);
+            }
+            WaitsFor::Pace => {
+                let tick_s = self.epoch.simulation.scenario().tick_s;
+                // A run that is executed again goes as fast as its robots answer.
+                if !self.epoch.record.is_repeating()
+                    && let Err(rest) = frontend.pace.take_grant(tick_s)
+                {
+                    return Ok(Next::Wait(self.put_due_frame(rest, frontend)));
+                }
+                // Changes first: they may be about late robots, and about faults.
+                self.repeat_changes();
+                self.follow_lateness();
+                if let Some(pending_orders) = self.order_faults() {
+                    self.epoch.waits_for = WaitsFor::Faults(pending_orders);
+                    return Ok(Next::GoOn);
+                }
+            }
+            WaitsFor::Faults(pending_orders) => {
+                let is_before_tick_zero = pending_orders.order.tick == 0;
+                if let Some(rest) = self.await_faults()? {
+                    return Ok(Next::Wait(Some(rest)));
+                }
+                if is_before_tick_zero {
+                    self.gather();
+                    return Ok(Next::GoOn);
+                }
+            }
+        }
+
+        let epoch = &mut self.epoch;
+        let commands = match epoch.record.replay_log() {
+            Some(replay_log) => replay_log.commands(),
+            None => std::mem::take(&mut epoch.operator),
+        };
+        for (to, command) in commands {
+            epoch.simulation.command(&to, &command);
+        }
+        let tick = epoch.simulation.begin_tick();
+        self.open_tick(tick);
+        for query in std::mem::take(&mut self.epoch.deferred) {
+            on_control(query, self, frontend)?;
+        }
+        Ok(Next::GoOn)
+    }
+
+    fn open_tick(&mut self, tick: Tick) {
+        self.epoch.waits_for = WaitsFor::Robots;
+        self.epoch.waiting_since = Instant::now();
+        self.recall_attendance();
+        let news = self.epoch.simulation.robots_with_news();
+        self.barrier.open(tick, news, &mut self.outputs);
+    }
+
+    /// While a run is executed again, what was done by hand is done again.
+    fn repeat_changes(&mut self) {
+        let Some(replay_log) = self.epoch.record.replay_log() else {
+            return;
+        };
+        let changes = replay_log.changes_by_hand();
+        if let Err(reason) = self.epoch.simulation.repeat_changes(&changes) {
+            // The tick differs from its record then, which ends the repetition.
+            tracing::error!("what was done by hand cannot be done again: {reason}");
+        }
+    }
+
+    /// What a change sets for late robots holds from its tick on.
+    fn follow_lateness(&mut self) {
+        let Some(due) = self.epoch.simulation.lateness_due() else {
+            return;
+        };
+        let mut lateness = self.barrier.lateness().clone();
+        lateness.on_late = due.on_late;
+        lateness.own.clone_from(&due.own);
+        self.barrier.set_lateness(lateness, &mut self.outputs);
+    }
+
+    /// Carries out what the barrier wants done, also what it wants because of that.
+    fn carry_out(&mut self, frontend: &mut Frontend) -> Result<(), Exit> {
+        while !self.outputs.is_empty() {
+            for output in std::mem::take(&mut self.outputs) {
+                match output {
+                    // The faults of the epoch before are ended first, and then robots are gathered once more.
+                    Output::Gathered if matches!(self.epoch.waits_for, WaitsFor::Faults(_)) => {}
+                    Output::Gathered => self.open_tick_zero(),
+                    Output::Grant { news, clock } => self.put(&news, clock)?,
+                    Output::Complete(outcome) => self.complete(outcome, frontend)?,
+                    Output::StandIn(robot) => self.stand_in(&robot, frontend)?,
+                    Output::Held => self.report_held(frontend),
+                    Output::Released => self.report_released(frontend),
+                    Output::Aborted => return Err(Exit::End(End::Aborted)),
+                    Output::SetTimer(timer, after) => self.timers.set(timer, after, Instant::now()),
+                    Output::Ignored(reason, robot) => self.ignore(reason.as_str(), robot.as_str()),
+                }
+            }
+        }
+
+        Ok(())
+    }
+
+    /// Puts what a robot would have answered: those that follow its state wait for it no longer.
+    fn stand_in(&self, robot: &RobotName, frontend: &Frontend) -> Result<(), BusError> {
+        let Some(state) = self.epoch.simulation.last_state(robot) else {
+            return Ok(());
+        };
+        let key = frontend.keys.query(robot, STATE);
+        frontend.bus.put(&key, encode(&state))
+    }
+
+    /// Every robot of the roster is connected.
+    fn open_tick_zero(&mut self) {
+        self.epoch.simulation.begin_init();
+        self.open_tick(0);
+    }
+
+    /// News first, then the clock: on one session they arrive in this order.
+    fn put(
+        &mut self,
+        news: &[(RobotName, IncarnationNotice)],
+        clock: Clock,
+    ) -> Result<(), BusError> {
+        for (name, notice) in news {
+            if let Some(publisher) = self.news.get(name) {
+                publisher.put(encode(&self.epoch.simulation.news(name, *notice)))?;
+            }
+        }
+
+        self.clock.put(encode(&clock))
+    }
+
+    /// A tick is complete.
+    fn complete(
+        &mut self,
+        mut outcome: Outcome<Arc<Report>, CommandText>,
+        frontend: &mut Frontend,
+    ) -> Result<(), Exit> {
+        self.count_stragglers();
+        self.drop_late(&mut outcome);
+        let epoch = &mut self.epoch;
+        let record = epoch.simulation.end_tick(outcome);
+        frontend.observers.note(record.tick, &record.events);
+
+        self.watchdog.note(Some(Activity::Record));
+        // At full speed a tick is written while the robots run the next one: at the end of this work, after the next clock.
+        let is_written = !frontend.pace.is_at_full_speed();
+        let opened = epoch.waiting_since;
+        let lines = epoch
+            .record
+            .note(&epoch.simulation, &record, opened, is_written)?;
+        self.watchdog.note(Some(Activity::Work));
+        frontend.observers.log(&lines);
+
+        epoch.waits_for = WaitsFor::Pace;
+        if epoch.record.is_repeating() {
+            if epoch.record.compare(&record)? {
+                frontend.pace.ready();
+                tracing::info!("resumed after tick {}", record.tick);
+            }
+            self.hold_for_rejoins();
+        } else if record.tick == 0 {
+            frontend.pace.ready();
+        }
+
+        self.answer_reached(record.tick, frontend);
+        frontend.observers.request_frame();
+        self.put_due_frame(None, frontend);
+        Ok(())
+    }
+
+    /// Writes the tick that is complete and not written, if there is one.
+    fn write_noted(&mut self) -> Result<(), FileError> {
+        let Some(recorder) = self.epoch.record.pending() else {
+            return Ok(());
+        };
+        self.watchdog.note(Some(Activity::Record));
+        recorder.write_noted()
+    }
+
+    pub(super) fn put_frame(&mut self, frontend: &mut Frontend) {
+        let status = self.status(frontend);
+        frontend
+            .observers
+            .put(frame(&self.epoch.simulation, &status));
+    }
+
+    /// Shows a tick that observers have not seen, if it is time for a frame. Returns how long to wait at most before looking
+    /// again, at most `rest`.
+    fn put_due_frame(
+        &mut self,
+        rest: Option<Duration>,
+        frontend: &mut Frontend,
+    ) -> Option<Duration> {
+        match frontend.observers.frame_due_in() {
+            Some(Duration::ZERO) => {
+                self.put_frame(frontend);
+                rest
+            }
+            due => rest.into_iter().chain(due).min(),
+        }
+    }
+
+    /// The clock is held: tells people for which robots, and answers a client that waits for a step.
+    fn report_held(&mut self, frontend: &mut Frontend) {
+        if self.epoch.stragglers.is_empty() && self.barrier.is_open() {
+            for (name, reason) in self.barrier.awaited() {
+                if !matches!(reason, Reason::WaitsFor(_)) {
+                    self.epoch.stragglers.push(name);
+                }
+            }
+        }
+
+        let status = self.status(frontend);
+        self.epoch.record.observe_awaited(&status.awaiting);
+        if let Some(line) = frontend.observers.log_held(&status) {
+            self.epoch.record.observe_late(line);
+            self.put_frame(frontend);
+        }
+        self.answer_stepping(frontend);
+    }
+
+    fn report_released(&mut self, frontend: &mut Frontend) {
+        let status = self.status(frontend);
+        let line = frontend.observers.log_released(&status);
+        self.epoch.record.observe_late(line);
+        self.put_frame(frontend);
+    }
+
+    /// Counts the tick that is complete for the robots that held it up.
+    fn count_stragglers(&mut self) {
+        let epoch = &mut self.epoch;
+        let held_s = epoch.waiting_since.elapsed().as_secs_f64();
+        for name in std::mem::take(&mut epoch.stragglers) {
+            let held = epoch.wall.held_up_by.entry(name).or_default();
+            held.ticks += 1;
+            held.waited_s += held_s;
+            held.longest_s = held.longest_s.max(held_s);
+        }
+    }
+}
