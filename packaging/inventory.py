@@ -18,7 +18,7 @@ import tomllib
 import uuid
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
-PACKAGE = "cars"  # of all programs
+PACKAGES = {"cars", "console", "robots", "simulator"}  # of the programs
 TARGET = "x86_64-unknown-linux-gnu"
 VENDORED = ROOT / "crates" / "console" / "assets" / "vendor"
 LICENSE_FILES = re.compile(r"(un)?licen[sc]e|copying|copyright|notice", re.IGNORECASE)
@@ -34,7 +34,8 @@ def metadata():
 def compiled():
     """Names and versions of what is compiled for the programs. `cargo metadata` has optional dependencies that no feature asks for."""
     command = ["cargo", "tree", "--offline", "--locked", "--target", TARGET, "-e", "normal,build", "--prefix", "none"]
-    command += ["-p", f"path+file://{ROOT}/crates/{PACKAGE}"]
+    for package in PACKAGES:
+        command += ["-p", f"path+file://{ROOT}/crates/{package}"]
     tree = subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True).stdout
     return {(name, version) for name, version in re.findall(r"^(\S+) v(\S+)", tree, re.MULTILINE)}
 
@@ -101,8 +102,8 @@ def vendored():
     return [(name, version, spdx, (VENDORED / file).read_text().strip()) for name, version, spdx, file in rows]
 
 
-def sbom(package, packages, scopes, graph, checksums):
-    """The document about the programs of a package. Parts that only build the programs are `excluded`."""
+def sbom(roots, packages, scopes, graph, checksums):
+    """The document about the programs of packages. Parts that only build the programs are `excluded`."""
     components = [component(part, checksums, scopes[id]) for id, part in packages.items() if id in scopes]
     page = []
     for name, version, spdx, _ in vendored():
@@ -123,6 +124,7 @@ def sbom(package, packages, scopes, graph, checksums):
         {"ref": reference(packages[id]), "dependsOn": sorted({reference(packages[other]) for other, _ in graph[id] if other in scopes})}
         for id in scopes
     ]
+    package = packages[roots[0]]
     top = {
         "type": "application",
         "bom-ref": "CARS",
@@ -130,7 +132,7 @@ def sbom(package, packages, scopes, graph, checksums):
         "version": package["version"],
         "licenses": [{"expression": license_of(package)}],
     }
-    dependencies.append({"ref": "CARS", "dependsOn": sorted([reference(package), *page])})
+    dependencies.append({"ref": "CARS", "dependsOn": sorted([*(reference(packages[root]) for root in roots), *page])})
     seconds = int(os.environ.get("SOURCE_DATE_EPOCH", time.time()))
     return {
         "$schema": "http://cyclonedx.org/schema/bom-1.6.schema.json",
@@ -189,15 +191,15 @@ def main(folder):
     lock = tomllib.loads((ROOT / "Cargo.lock").read_text())
     checksums = {(entry["name"], entry["version"]): entry.get("checksum") for entry in lock["package"]}
 
-    root = next(id for id, package in packages.items() if package["name"] == PACKAGE and is_ours(package))
+    roots = [id for id, package in packages.items() if package["name"] in PACKAGES and is_ours(package)]
     # What only a procedural macro depends on runs in the compiler.
     macros = {id for id, package in packages.items() if any("proc-macro" in target["kind"] for target in package["targets"])}
     runtime = {id: [] if id in macros else parts for id, parts in graph.items()}
-    shipped = reach(runtime, [root], {"normal"}) - macros
-    scopes = {id: "required" if id in shipped else "excluded" for id in sorted(reach(graph, [root], {"normal", "build"}))}
+    shipped = reach(runtime, roots, {"normal"}) - macros
+    scopes = {id: "required" if id in shipped else "excluded" for id in sorted(reach(graph, roots, {"normal", "build"}))}
 
     folder.mkdir(parents=True, exist_ok=True)
-    document = sbom(packages[root], packages, scopes, graph, checksums)
+    document = sbom(roots, packages, scopes, graph, checksums)
     (folder / "sbom.cdx.json").write_text(json.dumps(document, indent=2, ensure_ascii=False) + "\n")
     (folder / "THIRD-PARTY.txt").write_text(notices(packages, scopes))
 

@@ -60,6 +60,16 @@ pub fn cargo() -> Command {
     cargo
 }
 
+/// The programs of the project.
+pub const PROGRAMS: [&str; 6] = [
+    "cars",
+    "cars-sim",
+    "cars-console",
+    "cars-butler",
+    "cars-leguin",
+    "cars-vonda",
+];
+
 /// The folder of the project's programs, built in the profile of this test; examples are in `examples` there.
 #[must_use]
 pub fn programs() -> &'static Path {
@@ -80,15 +90,23 @@ pub fn programs() -> &'static Path {
             "--examples",
             "--quiet",
         ]);
-        if folder.ends_with("release") {
-            build.arg("--release");
-        }
+        build.args(["--profile", profile_of(&folder)]);
         assert!(
             build.status().unwrap().success(),
             "the programs do not build"
         );
         folder
     })
+}
+
+/// The profile of the programs in a folder.
+#[must_use]
+pub fn profile_of(programs: &Path) -> &'static str {
+    if programs.ends_with("release") {
+        "release"
+    } else {
+        "dev"
+    }
 }
 
 /// A temporary folder for the runs of one test.

@@ -226,17 +226,11 @@ pub fn named(run: &str, robot: &str) -> Option<u32> {
     pids.find(|pid| contains(*pid, "cmdline", &argument))
 }
 
-/// The name of a process's program. Those beside `cars` are that file under their own names.
+/// The name of a process's program.
 fn program(pid: u32) -> String {
     let target = std::fs::read_link(format!("/proc/{pid}/exe")).unwrap_or_default();
-    let file = target.file_name().unwrap_or_default().to_string_lossy();
-    let line = std::fs::read(format!("/proc/{pid}/cmdline")).unwrap_or_default();
-    let given = line.split(|byte| *byte == 0).next().unwrap_or_default();
-    let given = String::from_utf8_lossy(given);
-    if file == "cars" && given.starts_with("cars-") {
-        return given.into_owned();
-    }
-    file.into_owned()
+    let file = target.file_name().unwrap_or_default();
+    file.to_string_lossy().into_owned()
 }
 
 /// The fields of `/proc/PID/stat` from the state on.

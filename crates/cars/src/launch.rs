@@ -16,7 +16,7 @@ use terminal::OutputError;
 
 use crate::execution::ExecutionArgs;
 use crate::replay_robot::open;
-use crate::{named, remarks, table};
+use crate::{named, remarks, siblings, table};
 
 /// `cars launch`.
 #[derive(Debug, Args)]
@@ -114,6 +114,7 @@ enum Format {
 pub(crate) fn launch(args: LaunchArgs) -> miette::Result<ExitCode> {
     // Before the observer opens its session. The launched processes inherit the setting.
     bus::runtime::use_one_thread();
+    siblings::build()?;
 
     let is_dry_run = args.dry_run;
     let export = args.export;

@@ -1,4 +1,4 @@
-//! `cars`: the command line of the Cooperative Affective Robot Simulator, and what the programs beside it do.
+//! `cars`: the command line of the Cooperative Affective Robot Simulator.
 
 mod check;
 mod conform;
@@ -19,7 +19,6 @@ mod named;
 mod net;
 mod new;
 mod output;
-mod programs;
 mod remarks;
 mod replay;
 mod replay_robot;
@@ -27,6 +26,7 @@ mod report;
 mod router;
 mod run;
 mod secure;
+mod siblings;
 mod submit;
 mod table;
 mod verify;
@@ -168,10 +168,6 @@ enum Subcommands {
 }
 
 fn main() -> ExitCode {
-    if let Some(main) = programs::begun_as() {
-        return main();
-    }
-
     let cli: Cli = match terminal::arguments() {
         Ok(cli) => cli,
         Err(code) => return code,

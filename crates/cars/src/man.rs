@@ -1,19 +1,17 @@
 //! `cars man`: writes the manual pages of all programs.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
+use std::process::{ExitCode, Stdio};
 
-use clap::{Args, Command, CommandFactory};
+use clap::{Args, Command};
 use clap_mangen::Man;
 use export::draft::{Draft, unwritable};
-use robot::RobotArgs;
+use launch::{SIBLINGS, find_sibling};
+use miette::{IntoDiagnostic, WrapErr, ensure};
+use terminal::MAN_PAGE;
 
-/// The programs of the robots.
-const ROBOTS: [(&str, &str); 3] = [
-    ("cars-butler", "Runs Butler, the waiter"),
-    ("cars-leguin", "Runs Leguin, who refills"),
-    ("cars-vonda", "Runs Vonda, who refills as Leguin does"),
-];
+use crate::siblings;
 
 /// `cars man`.
 #[derive(Debug, Args)]
@@ -22,16 +20,35 @@ pub(crate) struct ManArgs {
     folder: PathBuf,
 }
 
-/// Writes a page for each program, and for each subcommand of `cars`, whose command line is given.
+/// Writes a page for each subcommand of `cars`, whose command line is given, and for each program beside it that is there.
 pub(crate) fn man(args: &ManArgs, cars: Command) -> miette::Result<ExitCode> {
     let folder = &args.folder;
     std::fs::create_dir_all(folder).map_err(|error| unwritable(folder, &error))?;
-    for program in programs(cars) {
-        let mut program = program.disable_help_subcommand(true);
-        program.build();
-        write_pages(&program, folder)?;
+
+    let mut cars = cars.disable_help_subcommand(true);
+    cars.build();
+    write_pages(&cars, folder)?;
+
+    siblings::build()?;
+    for (name, _) in SIBLINGS {
+        if let Some(program) = find_sibling(name) {
+            write(&folder.join(format!("{name}.1")), &page_of(&program)?)?;
+        }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// The page that a program prints.
+fn page_of(program: &Path) -> miette::Result<Vec<u8>> {
+    let output = std::process::Command::new(program)
+        .arg(MAN_PAGE)
+        .stderr(Stdio::inherit())
+        .output()
+        .into_diagnostic()
+        .wrap_err_with(|| program.display().to_string())?;
+    let status = output.status;
+    ensure!(status.success(), "{}: {status}", program.display());
+    Ok(output.stdout)
 }
 
 /// Writes the page of a command and those of its subcommands.
@@ -43,19 +60,16 @@ fn write_pages(command: &Command, folder: &Path) -> miette::Result<()> {
     }
 
     let page = Man::new(command.clone());
-    let path = folder.join(page.get_filename());
-    let mut draft = Draft::create(&path)?;
-    page.render(&mut draft)
-        .map_err(|error| unwritable(&path, &error))?;
-    draft.publish()?;
-    Ok(())
+    let mut text = Vec::new();
+    page.render(&mut text).into_diagnostic()?;
+    write(&folder.join(page.get_filename()), &text)
 }
 
-/// The command lines of all programs.
-fn programs(cars: Command) -> Vec<Command> {
-    let mut programs = vec![cars, simulator::program::command(), console::command()];
-    for (name, about) in ROBOTS {
-        programs.push(RobotArgs::command().name(name).about(about));
-    }
-    programs
+fn write(path: &Path, page: &[u8]) -> miette::Result<()> {
+    let mut draft = Draft::create(path)?;
+    draft
+        .write_all(page)
+        .map_err(|error| unwritable(path, &error))?;
+    draft.publish()?;
+    Ok(())
 }

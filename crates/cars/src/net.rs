@@ -15,7 +15,7 @@ use protocol::RobotName;
 use terminal::OutputError;
 
 use crate::execution::ExecutionArgs;
-use crate::named;
+use crate::{named, siblings};
 
 /// Subcommands of `cars net`.
 #[derive(Debug, Subcommand)]
@@ -162,6 +162,8 @@ fn closing(shape: Shape, closes: bool) -> Shape {
 
 /// Plays a plan of faults on the links of a launch.
 fn play(args: PlayArgs) -> miette::Result<ExitCode> {
+    siblings::build()?;
+
     let via = match args.via {
         Via::Proxy => net::Via::Proxy,
         Via::Namespaces => net::Via::Namespaces,

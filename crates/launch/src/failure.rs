@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
-use simulator::program::ADDRESS_TAKEN;
+use terminal::ADDRESS_TAKEN;
 
 use super::file::SIMULATOR;
 

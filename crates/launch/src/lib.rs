@@ -36,6 +36,7 @@ pub use leftovers::guard;
 pub use link::{LinkError, ProcessLink};
 pub use options::{RunOptions, default_run_name};
 pub use plan::{CommandLine, Part, Planned};
+pub use program::{SIBLINGS, find_sibling};
 pub use restart::Restart;
 pub use secure::Certificates;
 pub use supervise::Outcome;

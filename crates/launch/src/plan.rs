@@ -14,7 +14,7 @@ use record::names::{LOGS, SCENARIO};
 use super::child::{self, AtExit};
 use super::failure::FAILED;
 use super::file::{CONSOLE, LaunchFile, Process, SIMULATOR};
-use super::program::{NotFound, Places};
+use super::program::{NotFound, Places, how_to_install};
 use super::restart::Restart;
 use crate::secure::Secured;
 use config::Speed;
@@ -330,9 +330,8 @@ fn missing_program(
     };
 
     let searched = searched.join(",\nand ");
-    error.with_help(format!(
-        "looked for it {searched}\nthe programs of this project are built by `cargo build --release`"
-    ))
+    let how = how_to_install(name);
+    error.with_help(format!("looked for it {searched}\n{how}"))
 }
 
 impl std::fmt::Display for CommandLine {

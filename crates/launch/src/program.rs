@@ -2,6 +2,32 @@
 
 use std::path::{Path, PathBuf};
 
+/// The programs that come with `cars`, and the packages that they are of.
+pub const SIBLINGS: [(&str, &str); 5] = [
+    ("cars-sim", "simulator"),
+    ("cars-console", "console"),
+    ("cars-butler", "robots"),
+    ("cars-leguin", "robots"),
+    ("cars-vonda", "robots"),
+];
+
+/// The path of a program that comes with `cars`: beside this one, or in a folder of `PATH`.
+#[must_use]
+pub fn find_sibling(program: &str) -> Option<PathBuf> {
+    Places::new(Path::new("/")).find(program).ok()
+}
+
+/// How to get a program that is not there.
+pub(super) fn how_to_install(program: &str) -> String {
+    let build = "the programs of this project are built by `cargo build --release`";
+    match SIBLINGS.iter().find(|(name, _)| *name == program) {
+        Some((_, package)) => format!(
+            "{build}\nto install this one, from a checkout:\n`cargo install --locked --path crates/{package}`"
+        ),
+        None => build.to_owned(),
+    }
+}
+
 /// A program was not found in these places.
 #[derive(Debug, PartialEq)]
 pub(super) struct NotFound(pub(super) Vec<String>);

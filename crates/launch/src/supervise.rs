@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 use nix::sys::signal::Signal;
 use protocol::RobotName;
 use protocol::messages::{FaultKind, ProcessOrder};
+use terminal::RESUME;
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender};
 
 use super::ending::Ended;
@@ -23,8 +24,6 @@ use super::tail::Tail;
 
 /// Longest description of an end for the simulator, characters.
 const MAX_REASON: usize = 1000;
-/// Exit status of a console in which a person wants a run that has failed to go on.
-const RESUME: u8 = 75;
 
 /// A console at which nobody looks has ended after this long.
 const UNSEEN: Duration = Duration::from_secs(1);

@@ -7,7 +7,6 @@
 
 pub mod digest;
 pub mod medium;
-pub mod program;
 pub mod recorder;
 pub mod server;
 pub mod simulation;

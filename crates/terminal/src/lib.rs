@@ -7,11 +7,20 @@
 
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
+use std::path::Path;
 use std::process::ExitCode;
 
-use clap::Parser;
 use clap::error::Error as UsageError;
+use clap::{Command, Parser};
+use clap_mangen::Man;
 use protocol::plain::{escape_report, escape_text};
+
+/// Exit status of a simulator that cannot listen because another process does at its address.
+pub const ADDRESS_TAKEN: u8 = 3;
+/// Exit status of a console in which a person has asked that a failed run be resumed.
+pub const RESUME: u8 = 75;
+/// The only argument of a program that is to print its manual page.
+pub const MAN_PAGE: &str = "--man-page";
 
 /// The standard output cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -99,9 +108,27 @@ pub fn conclude(result: miette::Result<ExitCode>) -> ExitCode {
 /// The arguments of this program.
 ///
 /// # Errors
-/// The exit status with which to end, after help, version or a usage error has been printed.
+/// The exit status with which to end, after help, version, the manual page or a usage error has been printed.
 pub fn arguments<Args: Parser>() -> Result<Args, ExitCode> {
+    if std::env::args_os().skip(1).eq([MAN_PAGE]) {
+        return Err(conclude(print_man_page(Args::command())));
+    }
     Args::try_parse().map_err(|error| print_usage(&error))
+}
+
+fn print_man_page(command: Command) -> miette::Result<ExitCode> {
+    let own = std::env::args_os().next().unwrap_or_default();
+    let name = Path::new(&own).file_name().unwrap_or_default().display();
+    let command = command
+        .display_name(name.to_string())
+        .bin_name(name.to_string());
+
+    let mut page = Vec::new();
+    Man::new(command)
+        .render(&mut page)
+        .map_err(OutputError::from)?;
+    data(String::from_utf8_lossy(&page))?;
+    Ok(ExitCode::SUCCESS)
 }
 
 fn print_usage(error: &UsageError) -> ExitCode {

@@ -4,6 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use system_tests::programs;
+
 /// For each crate of this project: which others of this project it may depend on, tests included.
 const ALLOWED: &[(&str, &[&str])] = &[
     ("world", &[]),
@@ -83,14 +85,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     (
         "launch",
         &[
-            "scenario",
-            "record",
-            "simulator",
-            "robot",
-            "bus",
-            "config",
-            "protocol",
-            "terminal",
+            "scenario", "record", "robot", "bus", "config", "protocol", "terminal",
         ],
     ),
     (
@@ -120,7 +115,6 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "scenario",
             "record",
             "simulator",
-            "console",
             "export",
             "robot",
             "robots",
@@ -221,6 +215,56 @@ fn crates_depend_only_on_what_their_layer_allows() {
                 allowed.contains(&dependency.as_str()),
                 "{name} must not depend on {dependency}"
             );
+        }
+    }
+}
+
+/// Whether a program has symbols of a crate in its table, by their mangled names: the older kind, in which the crate comes first
+/// or begins the type of an `impl`, and the newer one, in which the crate follows its number.
+fn contains(program: &[u8], name: &str) -> bool {
+    let length = name.len();
+    let path = format!("_ZN{length}{name}");
+    let type_of = format!("$LT${name}..");
+    let newer = format!("_{length}{name}");
+
+    program.split(|byte| *byte == 0).any(|symbol| {
+        let symbol = String::from_utf8_lossy(symbol);
+        let follows = symbol
+            .strip_prefix(&path)
+            .and_then(|rest| rest.chars().next());
+        follows.is_some_and(|next| next.is_ascii_digit())
+            || (symbol.starts_with("_ZN") && symbol.contains(&type_of))
+            || (symbol.starts_with("_R") && symbol.contains(&newer))
+    })
+}
+
+#[test]
+fn each_program_contains_its_own_crates_and_no_others() {
+    let robot = (
+        &["robots", "affect", "robot", "lockstep", "bus"][..],
+        &["world", "simulator", "scenario", "record", "lab", "launch"][..],
+    );
+    let console = (
+        &["diagram", "bus"][..],
+        &["world", "simulator", "robots", "affect", "lab", "launch"][..],
+    );
+    let simulator = (
+        &["world", "simulator", "scenario", "record", "bus"][..],
+        &["affect", "robots", "robot", "lab", "launch"][..],
+    );
+    for (program, (own, others)) in [
+        ("cars-sim", simulator),
+        ("cars-console", console),
+        ("cars-butler", robot),
+        ("cars-leguin", robot),
+        ("cars-vonda", robot),
+    ] {
+        let bytes = std::fs::read(programs().join(program)).unwrap();
+        for name in own {
+            assert!(contains(&bytes, name), "{program} is without {name}");
+        }
+        for name in others {
+            assert!(!contains(&bytes, name), "{program} contains {name}");
         }
     }
 }

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
 
-use system_tests::{Lab, programs, root, subcommands_in};
+use system_tests::{Lab, PROGRAMS, programs, root, subcommands_in};
 
 /// A pipe whose reader has gone.
 fn closed() -> Stdio {
@@ -58,14 +58,7 @@ fn subcommands() -> Vec<String> {
 
 #[test]
 fn help_without_a_reader_or_without_room_is_no_panic() {
-    for name in [
-        "cars",
-        "cars-sim",
-        "cars-console",
-        "cars-butler",
-        "cars-leguin",
-        "cars-vonda",
-    ] {
+    for name in PROGRAMS {
         check_output(name, &["--help"]);
         check_output(name, &["--version"]);
     }

@@ -1,10 +1,14 @@
-//! Programs that were built on one machine and run on another one do not show folders of the first.
+//! Where the programs are, and where they find one another; what was built on one machine and runs on another one does not show
+//! folders of the first.
 
+use std::fs::Permissions;
 use std::net::TcpListener;
+use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::process::Command;
 
-use system_tests::{Lab, eventually, programs, root};
+use serde_json::Value;
+use system_tests::{Lab, PROGRAMS, cargo, eventually, profile_of, programs, root};
 
 /// Copies a program, in a process of its own: while another test starts a process, that one would still have the file open to
 /// write, and what is open to write cannot be run.
@@ -52,50 +56,174 @@ fn errors_of_the_middleware_name_no_sources() {
 }
 
 #[test]
-fn the_programs_beside_cars_are_that_program_under_their_names() {
+fn a_process_has_the_name_of_its_program() {
     let lab = Lab::new();
-    let run = "doors";
     let args = ["launch", "launch/hors_doeuvres.toml", "--paused"];
-    let launch = lab.start(run, &args);
+    let launch = lab.start("named", &args);
     for program in ["cars-sim", "cars-console", "cars-butler", "cars-leguin"] {
+        // As killall and pgrep find it.
         let comm = format!("/proc/{}/comm", launch.process(program));
-        // As killall and pgrep find it, from the moment when it has gone on as `cars`.
         eventually(program, || {
             let name = std::fs::read_to_string(&comm).unwrap();
             (name.trim_end() == program).then_some(())
         });
     }
-
-    let size = |program: &str| std::fs::metadata(programs().join(program)).unwrap().len();
-    for program in [
-        "cars-sim",
-        "cars-console",
-        "cars-butler",
-        "cars-leguin",
-        "cars-vonda",
-    ] {
-        assert!(size(program) * 10 < size("cars"), "{program}");
-    }
 }
 
 #[test]
-fn a_program_that_has_no_cars_beside_it_says_so() {
+fn each_program_runs_alone_in_any_folder() {
     let lab = Lab::new();
-    let alone = lab.out().join("cars-sim");
-    copy("cars-sim", &alone);
+    let alone = |program: &str| lab.out().join(format!("of-{program}")).join(program);
+    let elsewhere = |program: &str| {
+        let mut command = Command::new(alone(program));
+        command.current_dir(lab.out()).env("PATH", "/usr/bin:/bin");
+        command
+    };
+    for program in PROGRAMS {
+        std::fs::create_dir(lab.out().join(format!("of-{program}"))).unwrap();
+        copy(program, &alone(program));
+        for argument in ["--version", "--help"] {
+            let output = elsewhere(program).arg(argument).output().unwrap();
+            assert!(output.status.success(), "{program} {argument}: {output:?}");
+        }
+    }
 
-    let output = Command::new(&alone).arg("--version").output().unwrap();
-    assert_eq!(output.status.code(), Some(1));
+    let mut launch = format!(
+        "scenario = {:?}\n[simulator]\ncommand = [{:?}]\n[console]\nbind = \"127.0.0.1:0\"\n",
+        root().join("configs/three_robots.toml"),
+        alone("cars-sim"),
+    );
+    for robot in ["Butler", "Leguin", "Vonda"] {
+        let program = alone(&format!("cars-{}", robot.to_lowercase()));
+        launch += &format!("[[process]]\nname = {robot:?}\ncommand = [{program:?}]\n");
+    }
+    lab.write("alone.toml", &launch);
+    let args = ["alone.toml", "--duration", "5 s", "--speed", "max"];
+    // No launch file can name a console.
+    let path = format!("{}:/usr/bin", lab.out().join("of-cars-console").display());
+    let output = elsewhere("cars")
+        .env("PATH", path)
+        .arg("launch")
+        .args(args)
+        .args(["--out", ".", "--run", "alone"])
+        .output()
+        .unwrap();
     let said = String::from_utf8_lossy(&output.stderr);
-    let missing = lab.out().join("cars");
+    assert!(output.status.success(), "{said}");
+    assert_eq!(lab.summary("alone")["ticks"], 10);
+}
+
+#[test]
+fn programs_are_found_beside_cars_or_on_path_and_else_it_says_how_to_install_them() {
+    let lab = Lab::new();
+    let cars = lab.out().join("cars");
+    copy("cars", &cars);
+    let launch = |path: &Path| {
+        let mut command = Command::new(&cars);
+        command.current_dir(lab.out()).env("PATH", path).args([
+            "launch",
+            "hors_doeuvres",
+            "--dry-run",
+            "--no-console",
+        ]);
+        command.output().unwrap()
+    };
+    let planned = |path: &Path| String::from_utf8(launch(path).stdout).unwrap();
+
+    let on_path = planned(programs());
+    let simulator = programs().join("cars-sim");
+    assert!(on_path.contains(simulator.to_str().unwrap()), "{on_path}");
+
+    let missing = launch(Path::new("/nowhere"));
+    let said = String::from_utf8(missing.stderr).unwrap();
+    assert_eq!(missing.status.code(), Some(1), "{said}");
+    for part in [
+        "there is no program cars-sim",
+        "(beside this program)",
+        "cargo build --release",
+        "cargo install --locked --path crates/simulator",
+    ] {
+        assert!(said.contains(part), "no {part:?} in\n{said}");
+    }
+
+    let beside = lab.out().join("cars-sim");
+    copy("cars-sim", &beside);
+    let beside_cars = planned(programs());
     assert!(
-        said.contains(&format!("cars-sim needs the program {}", missing.display())),
-        "{said}"
+        beside_cars.contains(beside.to_str().unwrap()),
+        "{beside_cars}"
     );
-    assert!(
-        said.contains("install all programs of CARS in one folder"),
-        "{said}"
+}
+
+/// A cargo that writes its arguments and how many variables of a package it got, takes some time, and fails.
+const FAILING_CARGO: &str = r#"#!/bin/sh
+echo "$@" > "$SAID"
+env | grep -cE '^CARGO_(PKG|MANIFEST)_' >> "$SAID"
+sleep 1.5
+exit 101
+"#;
+
+#[test]
+fn cargo_run_builds_the_other_programs_first() {
+    let lab = Lab::new();
+    let cargo = lab.write("cargo", FAILING_CARGO);
+    std::fs::set_permissions(&cargo, Permissions::from_mode(0o755)).unwrap();
+    let package = root().join("crates/cars");
+    let said = lab.out().join("said");
+    let output = lab
+        .cars(&["launch", "launch/hors_doeuvres.toml"])
+        .env("CARGO", &cargo)
+        .env("CARGO_MANIFEST_DIR", &package)
+        .env("CARGO_PKG_NAME", "cars")
+        .env("SAID", &said)
+        .output()
+        .unwrap();
+
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{stderr}");
+    for part in ["building the programs beside", "do not build"] {
+        assert!(stderr.contains(part), "no {part:?} in\n{stderr}");
+    }
+    assert_eq!(
+        std::fs::read_to_string(said).unwrap(),
+        format!(
+            "build --quiet --profile {} --target-dir {} --manifest-path {}/../../Cargo.toml\n0\n",
+            profile_of(programs()),
+            programs().parent().unwrap().display(),
+            package.display(),
+        )
     );
+    assert!(!lab.file("hors_doeuvres", "events.jsonl").exists());
+}
+
+#[test]
+fn cargo_run_compiles_nothing_that_the_tests_have_compiled() {
+    let built = cargo()
+        .current_dir(root())
+        .args(["build", "--profile", profile_of(programs())])
+        .args(["--message-format", "json", "--quiet"])
+        .output()
+        .unwrap();
+    assert!(built.status.success());
+
+    let mut stale = Vec::new();
+    for line in String::from_utf8(built.stdout).unwrap().lines() {
+        let message: Value = serde_json::from_str(line).unwrap();
+        if message["fresh"] == false {
+            stale.push(message["package_id"].clone());
+        }
+    }
+    assert!(stale.is_empty(), "{stale:?}");
+
+    let played = cargo()
+        .current_dir(root())
+        .args(["run", "--quiet", "--profile", profile_of(programs())])
+        .args(["--", "launch", "hors_doeuvres", "--dry-run"])
+        .output()
+        .unwrap();
+    let simulator = programs().join("cars-sim");
+    let planned = String::from_utf8(played.stdout).unwrap();
+    assert!(planned.contains(simulator.to_str().unwrap()), "{planned}");
 }
 
 /// A simulator that finds the port of its launch taken, the first time it is started, and is the real one otherwise.

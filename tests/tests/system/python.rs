@@ -8,7 +8,7 @@ use protocol::random::{MAX_SEED, stream, unit};
 use system_tests::pytest::{Choice, pytest};
 use system_tests::python::python;
 use system_tests::tools::lacks_tool;
-use system_tests::{Lab, cargo, programs, root};
+use system_tests::{Lab, PROGRAMS, cargo, programs, root};
 
 /// Whether there is a Python with all that is needed. If not, the test is reported as skipped.
 fn is_equipped(modules: &str) -> bool {
@@ -171,14 +171,7 @@ fn a_researcher_installs_the_wheel_and_works() {
     let arguments = ["-m", "pip", "install", "--quiet", "--no-deps", "--no-index"];
     ok(installed("python3").args(arguments).arg(&wheel));
 
-    for program in [
-        "cars",
-        "cars-sim",
-        "cars-console",
-        "cars-butler",
-        "cars-leguin",
-        "cars-vonda",
-    ] {
+    for program in PROGRAMS {
         let version = ok(installed(program).arg("--version"));
         assert!(version.ends_with("0.1.0\n"), "{program}: {version}");
     }

@@ -27,8 +27,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use bus::DEFAULT_ENDPOINT;
-use clap::{Command, CommandFactory, Parser};
+use clap::Parser;
 use protocol::RunName;
+use terminal::RESUME;
 use tokio::net::TcpListener;
 use tokio::runtime::Runtime;
 use tokio::signal::unix::{Signal, SignalKind, signal};
@@ -46,8 +47,6 @@ const DEFAULT_BIND: &str = "127.0.0.1:7007";
 const FALLBACK_BIND: &str = "127.0.0.1:0";
 /// How long browsers have to close their connections when the console ends.
 const CLOSE_TIMEOUT: Duration = Duration::from_secs(2);
-/// Exit status of a console in which a person wants a run that has failed to go on.
-pub const RESUME: u8 = 75;
 /// How long to wait for threads that are blocked on a reply of the simulator.
 const SHUTDOWN_TIMEOUT: Duration = Duration::from_millis(200);
 
@@ -107,15 +106,7 @@ struct Serving {
     allowed: Vec<AllowedHost>,
 }
 
-/// The command line, for manual pages.
-#[must_use]
-pub fn command() -> Command {
-    Args::command()
-}
-
-/// The program: reads its arguments, and serves the page until it is told to end.
-#[must_use]
-pub fn main() -> ExitCode {
+fn main() -> ExitCode {
     bus::runtime::use_one_thread();
     let args: Args = match terminal::arguments() {
         Ok(args) => args,

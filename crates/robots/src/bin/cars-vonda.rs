@@ -1,8 +1,5 @@
 //! Vonda, a clone of Leguin under another name.
 
-#[path = "../exec_as.rs"]
-mod exec_as;
-
 fn main() -> std::process::ExitCode {
-    exec_as::exec_cars("cars-vonda")
+    robot::main("Vonda", |_| Box::new(robots::Leguin::default()))
 }

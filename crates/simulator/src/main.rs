@@ -3,10 +3,9 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use crate::server::{Event, Options, REPEAT_AFTER, ReplayLog, Server, Stay};
 use bus::endpoint::connectable;
 use bus::{Bus, DEFAULT_ENDPOINT, Role, check_exposure, check_run};
-use clap::{Command, CommandFactory, Parser, ValueEnum};
+use clap::{Parser, ValueEnum};
 use config::units::Time;
 use config::{Speed, shipped};
 use miette::IntoDiagnostic;
@@ -15,9 +14,8 @@ use protocol::messages::End;
 use record::names::{ENDPOINT, OPERATOR_CONFIG};
 use record::{IfTaken, RunFolder, RunLock, Summary};
 use scenario::{Changes, Override, Scenario};
-
-/// Exit status where another process has the address at which the simulator is to listen.
-pub const ADDRESS_TAKEN: u8 = 3;
+use simulator::server::{Event, Options, REPEAT_AFTER, ReplayLog, Server, Stay};
+use terminal::ADDRESS_TAKEN;
 
 /// The simulator of the Cooperative Affective Robot Simulator: owns the environment and the clock of one run.
 #[derive(Debug, Parser)]
@@ -97,15 +95,7 @@ impl From<StayMode> for Stay {
     }
 }
 
-/// The command line, for manual pages.
-#[must_use]
-pub fn command() -> Command {
-    Args::command()
-}
-
-/// The program: reads its arguments, and owns the clock of one run to its end.
-#[must_use]
-pub fn main() -> ExitCode {
+fn main() -> ExitCode {
     let args: Args = match terminal::arguments() {
         Ok(args) => args,
         Err(code) => return code,

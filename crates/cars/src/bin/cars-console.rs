@@ -1,8 +1,0 @@
-//! The console.
-
-#[path = "../exec_as.rs"]
-mod exec_as;
-
-fn main() -> std::process::ExitCode {
-    exec_as::exec_cars("cars-console")
-}

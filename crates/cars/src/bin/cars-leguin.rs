@@ -1,8 +1,0 @@
-//! Leguin, the refiller.
-
-#[path = "../exec_as.rs"]
-mod exec_as;
-
-fn main() -> std::process::ExitCode {
-    exec_as::exec_cars("cars-leguin")
-}
