@@ -13,7 +13,7 @@ use record::names::LATEST;
 use record::{EpochFiles, RunFolder};
 use terminal::OutputError;
 
-use crate::output::{Output, cannot_write};
+use crate::output::{Output, cannot_write, check_no_record};
 
 /// `cars export`.
 #[derive(Debug, Args)]
@@ -90,6 +90,10 @@ pub(crate) fn export(args: &ExportArgs) -> miette::Result<ExitCode> {
 }
 
 fn write_tables(epochs: &[EpochFiles], into: &Path) -> miette::Result<ExitCode> {
+    // A log may be called what a table is called.
+    for name in tables::FILES {
+        check_no_record(&into.join(name))?;
+    }
     let written = tables::write(epochs, into)?;
     for note in written.notes {
         terminal::note(format_args!("note: {note}"));

@@ -35,13 +35,7 @@ impl Output {
             return Ok(Self::Standard(BufWriter::new(std::io::stdout())));
         };
 
-        if is_part_of_record(path) {
-            return Err(miette!(
-                help = "choose another --output",
-                "{} is part of the record of a run or an experiment",
-                path.display()
-            ));
-        }
+        check_no_record(path)?;
         let is_special = path
             .metadata()
             .is_ok_and(|found| !found.is_file() && !found.is_dir());
@@ -100,6 +94,21 @@ pub(crate) fn write(path: Option<&Path>, text: &str) -> miette::Result<()> {
         Err(error) => Err(cannot_write(path, &error)),
         Ok(()) => output.finish(),
     }
+}
+
+/// Checks that a path is not that of a part of a record.
+///
+/// # Errors
+/// If it is.
+pub(crate) fn check_no_record(path: &Path) -> miette::Result<()> {
+    if is_part_of_record(path) {
+        return Err(miette!(
+            help = "choose another --output",
+            "{} is part of the record of a run or an experiment",
+            path.display()
+        ));
+    }
+    Ok(())
 }
 
 /// The error of an output that cannot be written.

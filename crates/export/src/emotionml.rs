@@ -222,7 +222,7 @@ impl<W: Write> Document<'_, W> {
                 "{robot} does not publish `{INTENSITY}` between 0 and 1 in every tick; emotions with such ticks have no intensity"
             ));
         }
-        let (sets, descriptors) = self.descriptors(state, &published, trace);
+        let (sets, descriptors) = self.descriptors(state, &published, trace.as_deref());
         if descriptors.is_empty() {
             self.notes.insert(format!(
                 "emotions {state:?} are left out: no standard vocabulary has a term for it"
@@ -257,7 +257,7 @@ impl<W: Write> Document<'_, W> {
         &mut self,
         state: &str,
         published: &Published,
-        trace: Option<Vec<f64>>,
+        trace: Option<&[f64]>,
     ) -> (String, String) {
         let mut sets = String::new();
         let mut elements = String::new();
@@ -270,7 +270,7 @@ impl<W: Write> Document<'_, W> {
         };
         let frequency = 1.0 / self.tick_s;
         let traced = |kind: &str| {
-            let Some(trace) = &trace else {
+            let Some(trace) = trace else {
                 return "/>".to_owned();
             };
             let samples: Vec<String> = trace.iter().copied().map(scale_value).collect();

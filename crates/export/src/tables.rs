@@ -16,6 +16,9 @@ use serde::Serialize;
 use crate::csv::{Table, Value};
 use crate::draft::{Draft, unwritable};
 
+/// Names of the tables.
+pub const FILES: [&str; 3] = ["events.csv", "states.csv", "variables.csv"];
+
 /// Columns with which the rows of every table begin. `docs/exports.md` has the types of all columns.
 const WHEN: &str = "epoch tick time_s";
 /// A row for each event.
@@ -73,7 +76,7 @@ impl Tables {
     }
 
     fn write_events(&mut self, epochs: &[EpochFiles], folder: &Path) -> Result<Draft, FileError> {
-        let mut table = create(folder, "events.csv", EVENTS)?;
+        let mut table = create(folder, FILES[0], EVENTS)?;
         for files in epochs {
             let last = add_events(&mut table, files)?;
 
@@ -112,8 +115,8 @@ impl Tables {
             return Ok(Vec::new());
         }
 
-        let mut states = create(folder, "states.csv", STATES)?;
-        let mut variables = create(folder, "variables.csv", VARIABLES)?;
+        let mut states = create(folder, FILES[1], STATES)?;
+        let mut variables = create(folder, FILES[2], VARIABLES)?;
         for files in recorded {
             self.add_recording(&mut states, &mut variables, files)?;
         }

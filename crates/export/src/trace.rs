@@ -207,7 +207,7 @@ impl<'a, W: Write> Writer<'a, W> {
             TICKS,
             "tick",
             (wall.opened_ns, wall.completed_ns),
-            args,
+            &args,
         )?;
         for awaited in &wall.awaited {
             self.held_up(tick, awaited)?;
@@ -230,7 +230,7 @@ impl<'a, W: Write> Writer<'a, W> {
             "because": awaited.because.to_string(),
             "noticed_after_s": awaited.since_s,
         });
-        self.slice(SIMULATOR, HELD_UP, &name, span, args)
+        self.slice(SIMULATOR, HELD_UP, &name, span, &args)
     }
 
     /// Writes when the robots reported.
@@ -245,7 +245,7 @@ impl<'a, W: Write> Writer<'a, W> {
             if let Some(arrived) = tick.wall.reports_ns.get(&robot.name) {
                 self.has_reports = true;
                 let span = (tick.wall.opened_ns, *arrived);
-                self.slice(ROBOTS, thread, "report", span, args)?;
+                self.slice(ROBOTS, thread, "report", span, &args)?;
             } else if robot.missed.is_some() {
                 let ts = microseconds(tick.wall.completed_ns);
                 // The scope of the instant is its thread.
@@ -264,7 +264,7 @@ impl<'a, W: Write> Writer<'a, W> {
         tid: u32,
         name: &str,
         (begin_ns, end_ns): (u64, u64),
-        args: Value,
+        args: &Value,
     ) -> std::io::Result<()> {
         let ts = microseconds(begin_ns);
         let dur = microseconds(end_ns.saturating_sub(begin_ns));

@@ -6,6 +6,7 @@ use std::process::{Command, Output};
 use nix::sys::signal::Signal;
 use serde_json::Value;
 use system_tests::processes::send;
+use system_tests::python::package;
 use system_tests::tools::{has_modules, has_python, lacks_tool};
 use system_tests::{Lab, eventually, root};
 
@@ -23,6 +24,7 @@ fn python(folder: &Path, packages: &[&str], args: &[&str]) -> Option<Output> {
 
     let output = Command::new("python3")
         .current_dir(folder)
+        .env("PYTHONPATH", package())
         .env("PYTHONDONTWRITEBYTECODE", "1")
         .args(args)
         .output()

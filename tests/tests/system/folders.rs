@@ -959,8 +959,8 @@ fn no_output_replaces_a_part_of_a_record() {
         said(&output)
     );
 
-    // A log may be called what an export is called.
-    let name = "record.log_name=shiviz.log";
+    // A log may be called what a table is called.
+    let name = "record.log_name=events.csv";
     place.lab.ok(&[
         "run",
         HALL,
@@ -975,11 +975,9 @@ fn no_output_replaces_a_part_of_a_record() {
     let logged = place.lab.out().join("logged");
     let before = tree(&logged);
     let into = logged.to_str().unwrap();
-    let (_, printed) = place
-        .lab
-        .fails(&["export", "logged", "--shiviz", "-o", into]);
+    let (_, printed) = place.lab.fails(&["export", "logged", "--csv", "-o", into]);
     let printed = in_one_line(&printed);
-    assert!(printed.contains("keeps its record there"), "{printed}");
+    assert!(printed.contains("is part of the record"), "{printed}");
     assert!(tree(&logged) == before, "something has changed");
 }
 
@@ -1110,11 +1108,14 @@ fn a_file_that_cannot_be_written_to_its_end_is_as_it_was() {
             said(&output)
         );
         let piped = program("cars")
-            .args([command, run.to_str().unwrap(), "-o", "/dev/stdout"])
+            .args([command, run.to_str().unwrap()])
+            .args(format)
+            .args(["-o", "/dev/stdout"])
             .output()
             .unwrap();
         let plain = program("cars")
             .args([command, run.to_str().unwrap()])
+            .args(format)
             .output()
             .unwrap();
         assert!(
@@ -1123,7 +1124,9 @@ fn a_file_that_cannot_be_written_to_its_end_is_as_it_was() {
         );
         assert_eq!(piped.stdout, plain.stdout, "{command}");
         let output = program("cars")
-            .args([command, run.to_str().unwrap(), "-o"])
+            .args([command, run.to_str().unwrap()])
+            .args(format)
+            .arg("-o")
             .arg(&file)
             .output();
         assert!(output.unwrap().status.success());

@@ -61,7 +61,7 @@ pub(super) fn escape(text: &str) -> String {
             '<' => escaped.push_str("&lt;"),
             '>' => escaped.push_str("&gt;"),
             '\t' | '\n' | ' '..='\u{D7FF}' | '\u{E000}'..='\u{FFFD}' | '\u{10000}'.. => {
-                escaped.push(char)
+                escaped.push(char);
             }
             _ => escaped.push(char::REPLACEMENT_CHARACTER),
         }
