@@ -1,114 +1,17 @@
 //! The simulator's side: who takes part, and when a tick is complete.
+//!
+//! Every input is checked against the open tick before it changes anything, and counts once. So the caller may feed messages in any
+//! order, late, twice or not at all: what is lost is asked for again by repeating the clock ([`Barrier::repeat`]), and what a tick
+//! comes to depends on who reported what, never on when.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
-use std::time::Duration;
 
 use protocol::messages::{Clock, End, FaultKind, NEWS_FLAGS, OnLate, Presence, Reason};
 use protocol::{Epoch, Generation, RobotName, Tick};
 
 use crate::exchange::{IncarnationNotice, Membership, Outcome, Sent};
-use crate::member::{Admission, Attendance, Lateness, Member, Turn};
-use crate::rules::{Rule, Rules};
-
-/// How long the barrier waits for what.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Timing {
-    /// After this long without a report people are told for whom the clock waits.
-    pub announce: Duration,
-    /// A held clock is repeated this often.
-    pub repeat: Duration,
-    /// A robot that was admitted declares its token within this time, or its place is free again.
-    pub token: Duration,
-}
-
-impl Default for Timing {
-    fn default() -> Self {
-        Self {
-            announce: Duration::from_millis(500),
-            repeat: Duration::from_secs(2),
-            token: Duration::from_secs(2),
-        }
-    }
-}
-
-/// A timer of the barrier. Setting it again replaces it.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Timer {
-    /// It is time to tell people for whom the clock waits.
-    Announce,
-    /// It is time to repeat the clock.
-    Repeat,
-    /// The robots that have not reported are late.
-    Deadline,
-    /// This robot was admitted and has not declared its token.
-    Token(RobotName),
-}
-
-/// What the barrier wants done.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub enum Output<R, C> {
-    /// Every robot of the roster is connected: grant tick 0.
-    Gathered,
-    /// Put these news, each to its robot with the incarnations that it names, then the clock.
-    Grant {
-        /// Robots that get news, in the order of their names.
-        news: Vec<(RobotName, IncarnationNotice)>,
-        /// The clock.
-        clock: Clock,
-    },
-    /// The tick is complete.
-    Complete(Outcome<R, C>),
-    /// The clock goes on without this robot, and others may wait for its state as of the tick before: put that on its behalf.
-    StandIn(RobotName),
-    /// The clock is held: tell people for whom, or tell them again because that has changed.
-    Held,
-    /// A clock that was held goes on.
-    Released,
-    /// A robot is late and the run ends because of it.
-    Aborted,
-    /// Call [`Barrier::timer`] after this time.
-    SetTimer(Timer, Duration),
-    /// A message changed nothing.
-    Ignored(Ignored, RobotName),
-}
-
-/// Why a message changed nothing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Ignored {
-    /// No robot of the roster has this name.
-    UnknownRobot,
-    /// It is of another tick, epoch or incarnation than the open one.
-    Stale,
-    /// It is from a robot without which the clock goes on.
-    Lost,
-    /// More commands than a robot may send in a tick.
-    TooMany,
-}
-
-impl Ignored {
-    /// In words.
-    #[must_use]
-    pub fn as_str(self) -> &'static str {
-        match self {
-            Self::UnknownRobot => "unknown robot",
-            Self::Stale => "stale",
-            Self::Lost => "lost",
-            Self::TooMany => "too many commands",
-        }
-    }
-}
-
-/// Why a robot is not admitted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Refused {
-    /// No robot of the roster has this name.
-    UnknownName,
-    /// A connected process is this robot.
-    NameTaken,
-    /// The run is over.
-    Ended,
-}
+use crate::member::{Admission, Attendance, Lateness, Member, Received};
+use crate::outputs::{Ignored, Output, Refused, Stamp, Timer, Timing};
 
 /// What the barrier is doing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -123,17 +26,6 @@ enum Phase {
     Open,
     /// The run is over.
     Over,
-}
-
-/// Epoch, tick and generation that a robot's message states.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Stamp {
-    /// Epoch of the clock that it answers.
-    pub epoch: Epoch,
-    /// Tick of the clock that it answers.
-    pub tick: Tick,
-    /// Incarnation that answers.
-    pub generation: Generation,
 }
 
 /// The simulator's side of the lock-step. `R` is the content of a report, `C` that of a command.
@@ -152,10 +44,9 @@ pub struct Barrier<R, C> {
     /// Who takes part in the tick, where it is executed again: then neither tokens nor time decide.
     attendance: Option<Attendance>,
     is_announced: bool,
-    pub(crate) rules: Rules,
 }
 
-impl<R: Clone, C: Clone> Barrier<R, C> {
+impl<R, C> Barrier<R, C> {
     /// A barrier for these robots, before the first epoch. A robot sends at most `max_commands` in a tick.
     #[must_use]
     pub fn new(
@@ -179,7 +70,6 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
             membership: Vec::new(),
             attendance: None,
             is_announced: false,
-            rules: Rules::default(),
         }
     }
 
@@ -191,15 +81,10 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         self.tick = 0;
         self.lateness = lateness;
         self.is_announced = false;
-        self.news.clear();
         self.membership.clear();
         self.attendance = None;
-        // Only what belongs to the epoch that is over is forgotten. Who is connected, and as which incarnation, stays: a robot keeps
-        // its process and its token from epoch to epoch.
         for member in self.members.values_mut() {
-            member.turn = Turn::default();
-            member.fault = None;
-            member.must_rejoin = false;
+            member.end_epoch();
         }
 
         out.push(Output::SetTimer(Timer::Announce, self.timing.announce));
@@ -214,7 +99,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
     /// Asks the process of a robot to join again, so that it takes part as a further incarnation from the next tick on.
     pub fn ask_to_rejoin(&mut self, robot: &RobotName) {
         if let Some(member) = self.members.get_mut(robot) {
-            member.must_rejoin |= !member.is_coming;
+            member.ask_to_rejoin();
         }
     }
 
@@ -227,32 +112,31 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         self.phase = Phase::Open;
         self.tick = tick;
         self.news = news;
-        self.membership.clear();
-        self.is_announced = false;
+
         for (name, member) in &mut self.members {
-            member.turn = Turn::default();
             let attendance = self.attendance.as_ref();
-            if tick == 0 {
-                member.begin_epoch();
-                // Then a process took the place of another one while tick 0 was open. Here it is the first.
-                if attendance.is_some_and(|recorded| recorded.joined.contains(name)) {
-                    let joined = Membership::Joined(name.clone(), member.seated);
-                    self.membership.push(joined);
-                }
-                continue;
-            }
-            // Where the tick is executed again, a successor waits until its predecessor's absence is over.
-            let is_admitted = attendance.is_none_or(|recorded| recorded.joined.contains(name));
-            if is_admitted && let Some(generation) = member.take_in() {
-                self.membership
-                    .push(Membership::Joined(name.clone(), generation));
+            let recorded = attendance.map(|recorded| recorded.joined.contains(name));
+            let joined = if tick == 0 {
+                // All take part. Only where a process took the place of another one while tick 0 was open does the record say so;
+                // here it is the first.
+                let generation = member.begin_epoch();
+                recorded.unwrap_or(false).then_some(generation)
+            } else if recorded.unwrap_or(true) {
+                member.take_in()
+            } else {
+                // Where the tick is executed again, a successor waits until its predecessor's absence is over.
+                None
+            };
+            if let Some(generation) = joined {
+                let joined = Membership::Joined(name.clone(), generation);
+                self.membership.push(joined);
             }
         }
 
-        self.exclude_unavailable();
         // Robots that cannot report are excluded before the clock goes out, so that it does not wait for them even once. The tick may
         // be complete at once, without any report: where all robots are lost.
-        self.grant(true, out);
+        self.exclude_unavailable();
+        self.grant(out);
         self.set_timers(out);
         self.settle(out);
     }
@@ -270,82 +154,57 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         if self.phase == Phase::Over {
             return Err(Refused::Ended);
         }
-        let news_flag = self.news_flag(name);
-        let Some(member) = self.members.get_mut(name) else {
+        let index = self.members.keys().position(|own| own == name);
+        let (Some(index), Some(member)) = (index, self.members.get_mut(name)) else {
             return Err(Refused::UnknownName);
         };
-        if member.is_taken_from(instance) && self.rules.hold(Rule::RefusesTakenName) {
+        if member.is_taken_from(instance) {
             return Err(Refused::NameTaken);
         }
 
-        // The same process asks again: its answer was lost, it joins a further epoch, or it must join again.
-        let is_new = member.instance.as_deref() != Some(instance);
-        let is_further = if is_new {
-            member.generation == 0 || self.rules.hold(Rule::CountsGenerations)
-        } else {
-            member.must_rejoin && self.rules.hold(Rule::CountsRejoining)
-        };
-        if is_further {
-            member.generation += 1;
-        }
-        if is_new || member.must_rejoin {
-            member.is_coming = member.seated > 0;
-            member.must_rejoin = false;
-        }
-        if is_new {
-            // What the predecessor has sent for the open tick counts only if all of it is here: its successor cannot complete it, and
-            // messages of the old generation are stale from now on.
-            member.instance = Some(Arc::from(instance));
-            member.is_reserved = self.rules.hold(Rule::ReservesPlace);
-            if self.rules.hold(Rule::DropsPredecessor) && !member.turn.is_complete(true) {
-                let is_given_up = member.turn.is_given_up;
-                member.turn = Turn {
-                    is_given_up,
-                    ..Turn::default()
-                };
-            }
-            out.push(Output::SetTimer(
-                Timer::Token(name.clone()),
-                self.timing.token,
-            ));
+        // Even while a tick is open: it takes part from its token on ([`Self::token`]), and until then the tick waits.
+        if member.admit(instance) {
+            let timer = Timer::Token(name.clone());
+            out.push(Output::SetTimer(timer, self.timing.token));
         }
 
         Ok(Admission {
             epoch: self.epoch,
-            generation: member.generation,
-            news_flag,
+            generation: member.generation(),
+            news_flag: news_flag(index),
         })
     }
 
     /// A robot's liveliness token was declared or undeclared.
     pub fn token(&mut self, name: &RobotName, is_present: bool, out: &mut Vec<Output<R, C>>) {
-        let takes_in_now = self.phase == Phase::Open && self.rules.hold(Rule::TakesInWhileOpen);
-        let policy = self.lateness.of(name);
+        let is_open = self.phase == Phase::Open;
         let Some(member) = self.members.get_mut(name) else {
             out.push(Output::Ignored(Ignored::UnknownRobot, name.clone()));
             return;
         };
 
-        member.is_present = is_present;
+        member.has_token = is_present;
+        let is_awaited = is_open && member.is_awaited();
         if is_present {
-            // From now on its place is free as soon as its token goes.
-            member.is_reserved = false;
-        }
-        let is_awaited = is_awaited(self.phase, member, self.rules);
-        if is_present && takes_in_now && is_awaited {
-            // The open tick waits for it: it takes the place of a predecessor, or it is back and may have missed the clock.
-            if let Some(generation) = member.take_in() {
-                self.note_joined(name, generation);
+            member.end_reservation();
+            if is_awaited {
+                // The open tick waits for it: it takes the place of a predecessor, or it is back and may have missed the clock.
+                // Everything that it subscribes to is in effect, because it declares its token last.
+                if let Some(generation) = member.take_in() {
+                    self.note_joined(name, generation);
+                }
+                self.repeat(out);
             }
-            self.repeat(out);
-        }
-        let is_decided = self.attendance.is_some();
-        if !is_present && is_awaited && policy == OnLate::Continue && !is_decided {
+        } else if is_awaited
+            && self.attendance.is_none()
+            && self.lateness.of(name) == OnLate::Continue
+        {
             // It will not report in time.
             self.give_up(name);
             self.stand_in(name, out);
             self.settle(out);
         }
+
         if self.phase == Phase::Gathering {
             self.check_all_joined(out);
         }
@@ -363,26 +222,17 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         command: Sent<C>,
         out: &mut Vec<Output<R, C>>,
     ) {
-        let is_open = self.is_open_for(from, stamp);
-        let max_commands = self.max_commands;
-        let Some(member) = self.members.get_mut(from) else {
-            out.push(Output::Ignored(Ignored::UnknownRobot, from.clone()));
-            return;
-        };
-        if number == 0 || number > max_commands {
-            out.push(Output::Ignored(Ignored::TooMany, from.clone()));
-            return;
-        }
-        if !is_open {
-            out.push(Output::Ignored(Ignored::Stale, from.clone()));
-            return;
-        }
-
-        // The first one counts; a repetition has the same content. So repeating is idempotent, and a message that was delivered twice
-        // or overtaken by its repetition changes nothing.
-        member.turn.commands.entry(number).or_insert(command);
-        if member.turn.report.is_some() {
-            self.settle(out);
+        let is_allowed = (1..=self.max_commands).contains(&number);
+        match self.received(from, stamp, is_allowed) {
+            Ok(received) => {
+                // The first one counts; a repetition has the same content. So repeating is idempotent, and a message that was
+                // delivered twice or overtaken by its repetition changes nothing.
+                received.commands.entry(number).or_insert(command);
+                if received.is_complete() {
+                    self.settle(out);
+                }
+            }
+            Err(ignored) => out.push(Output::Ignored(ignored, from.clone())),
         }
     }
 
@@ -395,31 +245,23 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         report: R,
         out: &mut Vec<Output<R, C>>,
     ) {
-        let is_open = self.is_open_for(from, stamp);
-        let Some(member) = self.members.get_mut(from) else {
-            out.push(Output::Ignored(Ignored::UnknownRobot, from.clone()));
-            return;
-        };
-        if member.is_lost && stamp.generation == member.generation {
+        let is_lost = self.is_member(from, |member| {
+            member.is_lost() && member.generation() == stamp.generation
+        });
+        if is_lost {
             out.push(Output::Ignored(Ignored::Lost, from.clone()));
             return;
         }
-        if commands > self.max_commands {
-            out.push(Output::Ignored(Ignored::TooMany, from.clone()));
-            return;
-        }
-        if !is_open {
-            out.push(Output::Ignored(Ignored::Stale, from.clone()));
-            return;
-        }
 
-        // The report states how many commands belong to it. It completes the turn only when they are all here, in whatever order: on
-        // one session they arrive before it, but any of them may have been lost and be repeated later.
-        member.turn.waits_for = None;
-        member.turn.report.get_or_insert((commands, report));
-        let counts = self.rules.hold(Rule::CountsCommands);
-        if member.turn.is_complete(counts) {
-            self.settle(out);
+        match self.received(from, stamp, commands <= self.max_commands) {
+            Ok(received) => {
+                received.waits_for = None;
+                received.report.get_or_insert((commands, report));
+                if received.is_complete() {
+                    self.settle(out);
+                }
+            }
+            Err(ignored) => out.push(Output::Ignored(ignored, from.clone())),
         }
     }
 
@@ -432,7 +274,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         on: &RobotName,
         out: &mut Vec<Output<R, C>>,
     ) {
-        if self.phase != Phase::Open || (epoch, tick) != (self.epoch, self.tick) {
+        if !self.is_open_at(epoch, tick) {
             return;
         }
         let Some(member) = self.members.get_mut(from) else {
@@ -440,49 +282,48 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
             return;
         };
 
-        member.turn.waits_for = Some(on.clone());
+        member.wait_for(on);
         self.stand_in(on, out);
         if self.is_announced {
             out.push(Output::Held);
         }
     }
 
-    /// A timer that was set has fired.
+    /// A timer that was set has fired. It may be of a tick that is over: a timer is replaced, never withdrawn, so it decides nothing
+    /// that the state does not bear out.
     pub fn timer(&mut self, timer: &Timer, out: &mut Vec<Output<R, C>>) {
-        let is_waiting = matches!(self.phase, Phase::Open | Phase::Gathering);
+        let is_open = self.phase == Phase::Open;
         match timer {
-            Timer::Announce if is_waiting && !self.is_announced => {
-                self.is_announced = true;
-                out.push(Output::Held);
+            Timer::Announce => {
+                let is_waiting = is_open || self.phase == Phase::Gathering;
+                if is_waiting && !self.is_announced {
+                    self.is_announced = true;
+                    out.push(Output::Held);
+                }
             }
-            Timer::Repeat if self.phase == Phase::Open => {
-                if self.rules.hold(Rule::RepeatsClock) {
-                    self.repeat(out);
+            Timer::Repeat if is_open => {
+                self.repeat(out);
+                // A state that was put on a robot's behalf may have been lost like any other message.
+                for name in self.members.keys() {
+                    self.stand_in(name, out);
                 }
-
-                let roster: Vec<RobotName> = self.members.keys().cloned().collect();
-                for name in roster {
-                    self.stand_in(&name, out);
-                }
-
                 out.push(Output::SetTimer(Timer::Repeat, self.timing.repeat));
             }
-            Timer::Deadline if self.phase == Phase::Open && self.attendance.is_none() => {
-                self.judge_late(out);
-            }
+            Timer::Deadline if is_open && self.attendance.is_none() => self.judge_late(out),
+            Timer::Repeat | Timer::Deadline => {}
             Timer::Token(name) => {
                 if let Some(member) = self.members.get_mut(name) {
-                    member.is_reserved = false;
+                    member.end_reservation();
                 }
             }
-            _ => {}
         }
     }
 
-    /// Puts the last clock and its news again.
+    /// Puts the last clock and its news again. Between two ticks that is the clock of the complete one: it reaches a robot that is
+    /// asked to join again, and changes nothing for any other.
     pub fn repeat(&mut self, out: &mut Vec<Output<R, C>>) {
         if matches!(self.phase, Phase::Open | Phase::Between) {
-            self.grant(self.rules.hold(Rule::RepeatsNews), out);
+            self.grant(out);
         }
     }
 
@@ -549,60 +390,53 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         let Some(member) = self.members.get(robot) else {
             return (0, Presence::Gone);
         };
-        let presence = match (member.is_lost, member.is_present) {
+        let presence = match (member.is_lost(), member.has_token) {
             (true, _) => Presence::Lost,
             (false, true) => Presence::Here,
             (false, false) => Presence::Gone,
         };
 
-        (member.generation, presence)
+        (member.generation(), presence)
     }
 
     /// Whether a robot's process is connected.
     #[must_use]
     pub fn is_present(&self, robot: &RobotName) -> bool {
-        self.members
-            .get(robot)
-            .is_some_and(|member| member.is_present)
+        self.is_member(robot, |member| member.has_token)
     }
 
     /// Whether a process was admitted as this robot and its token is still awaited.
     #[must_use]
     pub fn is_reserved(&self, robot: &RobotName) -> bool {
-        let member = self.members.get(robot);
-        member.is_some_and(|member| member.is_reserved)
+        self.is_member(robot, Member::is_reserved)
     }
 
     /// Whether this incarnation of a robot has missed the last ticks.
     #[must_use]
     pub fn is_behind(&self, robot: &RobotName, generation: Generation) -> bool {
-        let member = self.members.get(robot);
-        member.is_some_and(|member| member.missed > 0 && member.generation == generation)
+        self.is_member(robot, |member| {
+            member.is_behind() && member.generation() == generation
+        })
     }
 
     /// Whether the scenario keeps the process of a robot from running.
     #[must_use]
     pub fn is_stopped(&self, robot: &RobotName) -> bool {
-        self.members.get(robot).is_some_and(Member::is_stopped)
+        self.is_member(robot, Member::is_stopped)
     }
 
     /// Whether a robot can take part in the next tick.
     #[must_use]
     pub fn is_back(&self, robot: &RobotName) -> bool {
-        self.members
-            .get(robot)
-            .is_none_or(|member| member.is_back(self.rules))
+        self.members.get(robot).is_none_or(Member::is_back)
     }
 
     /// The report of a robot for the open tick, if it is here.
     #[must_use]
     pub fn open_report(&self, robot: &RobotName) -> Option<&R> {
-        let turn = &self.members.get(robot)?.turn;
+        let report = self.members.get(robot)?.report();
 
-        (self.phase == Phase::Open)
-            .then_some(turn.report.as_ref())
-            .flatten()
-            .map(|(_, report)| report)
+        report.filter(|_| self.is_open())
     }
 
     /// The robots for which the clock waits, and why.
@@ -612,9 +446,8 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         for (name, member) in &self.members {
             let reason = match self.phase {
                 Phase::Gathering if !member.is_ready() => Reason::NotJoined,
-                Phase::Open if !is_awaited(self.phase, member, self.rules) => continue,
-                Phase::Open if !member.is_present => Reason::Gone,
-                Phase::Open => match &member.turn.waits_for {
+                Phase::Open if member.is_awaited() => match member.waits_for() {
+                    _ if !member.has_token => Reason::Gone,
                     Some(other) => Reason::WaitsFor(other.clone()),
                     None => Reason::Silent,
                 },
@@ -624,6 +457,31 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
         }
 
         awaited
+    }
+
+    fn is_member(&self, robot: &RobotName, is: impl FnOnce(&Member<R, C>) -> bool) -> bool {
+        self.members.get(robot).is_some_and(is)
+    }
+
+    fn is_open_at(&self, epoch: Epoch, tick: Tick) -> bool {
+        self.phase == Phase::Open && (epoch, tick) == (self.epoch, self.tick)
+    }
+
+    /// What has come from a robot for the open tick, if a message with this stamp counts.
+    fn received(
+        &mut self,
+        from: &RobotName,
+        stamp: Stamp,
+        is_allowed: bool,
+    ) -> Result<&mut Received<R, C>, Ignored> {
+        let is_open = self.is_open_at(stamp.epoch, stamp.tick);
+        let member = self.members.get_mut(from).ok_or(Ignored::UnknownRobot)?;
+        if !is_allowed {
+            return Err(Ignored::TooMany);
+        }
+
+        let received = member.received(stamp.generation);
+        received.filter(|_| is_open).ok_or(Ignored::Stale)
     }
 
     /// An incarnation takes part from the open tick on. One that was taken in before it and has not reported leaves no trace.
@@ -646,69 +504,29 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
 
     /// Has the state of a robot put that cannot answer, because the clock goes on without it in the open tick.
     fn stand_in(&self, robot: &RobotName, out: &mut Vec<Output<R, C>>) {
-        let member = self.members.get(robot);
-        if self.phase == Phase::Open && member.is_some_and(|member| member.turn.is_given_up) {
+        if self.phase == Phase::Open && self.is_member(robot, Member::is_given_up) {
             out.push(Output::StandIn(robot.clone()));
         }
     }
 
-    fn news_flag(&self, robot: &RobotName) -> u32 {
-        let index = self.members.keys().position(|name| name == robot);
-
-        1 << (index.unwrap_or_default() % NEWS_FLAGS)
-    }
-
-    /// Whether a message with this stamp counts in the open tick.
-    fn is_open_for(&self, robot: &RobotName, stamp: Stamp) -> bool {
-        let Some(member) = self.members.get(robot) else {
-            return false;
-        };
-        let is_of_epoch = stamp.epoch == self.epoch || !self.rules.hold(Rule::ChecksEpoch);
-        let is_of_tick = stamp.tick == self.tick || !self.rules.hold(Rule::ChecksTick);
-        let is_of_generation =
-            stamp.generation == member.generation || !self.rules.hold(Rule::ChecksGeneration);
-
-        self.phase == Phase::Open
-            && is_of_epoch
-            && is_of_tick
-            && is_of_generation
-            && !member.is_lost
-            && !(member.turn.is_given_up && self.rules.hold(Rule::GivesUpForGood))
-    }
-
-    /// Puts the news and the clock of the tick that was granted last.
-    fn grant(&mut self, has_news: bool, out: &mut Vec<Output<R, C>>) {
-        let mut named = BTreeMap::new();
-        for (name, member) in &self.members {
-            let notice = self.notice(member);
-            if notice != IncarnationNotice::default() {
-                named.insert(name.clone(), notice);
-            }
-        }
-
-        // A robot does not run a tick whose clock says that it has news, and they do not come.
-        let mut withheld = BTreeSet::new();
-        for name in self.attendance.iter().flat_map(|recorded| &recorded.absent) {
-            let notice = named.get(name).copied().unwrap_or_default();
-            if notice.rejoin.is_none() {
-                withheld.insert(name.clone());
+    /// Puts the news and the clock of the tick that was granted last. The news are composed anew each time: since the clock was put
+    /// last, a robot may have joined, or been asked to.
+    fn grant(&self, out: &mut Vec<Output<R, C>>) {
+        let mut flags = 0;
+        for (index, (name, member)) in self.members.iter().enumerate() {
+            let is_named = member.notice(self.tick) != IncarnationNotice::default();
+            if is_named || self.news.contains(name) || self.is_withheld(name, member) {
+                flags |= news_flag(index);
             }
         }
 
         // A flag may belong to several robots. All of them get news then, so that each one that finds its flag set waits for something
         // that comes.
-        let mut flags = 0;
-        for (index, name) in self.members.keys().enumerate() {
-            let has_own = self.news.contains(name) || named.contains_key(name);
-            if has_own || withheld.contains(name) {
-                flags |= 1_u32 << (index % NEWS_FLAGS);
-            }
-        }
         let mut news = Vec::new();
-        for (index, name) in self.members.keys().enumerate() {
-            let is_flagged = flags & (1 << (index % NEWS_FLAGS)) != 0;
-            if has_news && is_flagged && !withheld.contains(name) {
-                news.push((name.clone(), named.get(name).copied().unwrap_or_default()));
+        for (index, (name, member)) in self.members.iter().enumerate() {
+            let is_flagged = flags & news_flag(index) != 0;
+            if is_flagged && !self.is_withheld(name, member) {
+                news.push((name.clone(), member.notice(self.tick)));
             }
         }
 
@@ -717,29 +535,19 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
             clock: Clock {
                 epoch: self.epoch,
                 tick: self.tick,
-                news: if self.rules.hold(Rule::FlagsNews) {
-                    flags
-                } else {
-                    0
-                },
+                news: flags,
                 end: None,
             },
         });
     }
 
-    /// The incarnations that a robot's news name.
-    fn notice(&self, member: &Member<R, C>) -> IncarnationNotice {
-        let is_replacement = member.seated > 1 && self.rules.hold(Rule::NamesReplacement);
-        let is_newcomer = self.tick > 0
-            && !member.has_reported
-            && !member.must_rejoin
-            && self.rules.hold(Rule::NamesUntilReported);
-        let asked = member.asked_to_rejoin();
+    /// Whether a robot is kept from running the tick: it does not run one whose clock says that it has news, and they do not come.
+    /// A robot that is asked to join again does not run it either, and must get to know.
+    fn is_withheld(&self, name: &RobotName, member: &Member<R, C>) -> bool {
+        let attendance = self.attendance.as_ref();
+        let is_absent = attendance.is_some_and(|recorded| recorded.absent.contains(name));
 
-        IncarnationNotice {
-            joined: (is_replacement || is_newcomer).then_some(member.seated),
-            rejoin: asked.filter(|_| self.rules.hold(Rule::AsksToRejoin)),
-        }
+        is_absent && member.notice(self.tick).rejoin.is_none()
     }
 
     fn set_timers(&self, out: &mut Vec<Output<R, C>>) {
@@ -757,20 +565,18 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
     /// Where the clock goes on without late robots, it does not wait for those that cannot report. It never waits for a report
     /// that would not count. Where the tick is executed again, its record says which robots those are.
     fn exclude_unavailable(&mut self) {
-        let goes_on = self.rules.hold(Rule::GoesOnWithoutAbsent);
-        let mut out = Vec::new();
+        let mut unavailable = Vec::new();
         for (name, member) in &self.members {
-            let policy = self.lateness.of(name);
             let is_out = match &self.attendance {
                 Some(recorded) => recorded.absent.contains(name),
-                None => member.is_out(self.tick) && policy == OnLate::Continue && goes_on,
+                None => member.is_out(self.tick) && self.lateness.of(name) == OnLate::Continue,
             };
-            if !member.is_lost && (is_out || member.must_rejoin) {
-                out.push(name.clone());
+            if !member.is_lost() && (is_out || member.must_rejoin()) {
+                unavailable.push(name.clone());
             }
         }
 
-        for name in out {
+        for name in unavailable {
             self.give_up(&name);
         }
     }
@@ -779,7 +585,7 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
     fn judge_late(&mut self, out: &mut Vec<Output<R, C>>) {
         let mut late = Vec::new();
         for (name, member) in &self.members {
-            if is_awaited(self.phase, member, self.rules) {
+            if member.is_awaited() {
                 late.push((name.clone(), self.lateness.of(name)));
             }
         }
@@ -799,71 +605,42 @@ impl<R: Clone, C: Clone> Barrier<R, C> {
 
     /// The clock goes on without a robot in the open tick, and from then on if it is lost.
     fn give_up(&mut self, name: &RobotName) {
-        let lose_after = self.lateness.lose_after;
         let attendance = self.attendance.as_ref();
         let recorded = attendance.map(|recorded| recorded.lost.contains(name));
-        let Some(member) = self.members.get_mut(name) else {
-            return;
-        };
-        if member.miss(lose_after, recorded, self.rules) {
+        if let Some(member) = self.members.get_mut(name)
+            && member.miss(self.lateness.lose_after, recorded)
+        {
             self.membership.push(Membership::Lost(name.clone()));
         }
     }
 
-    /// Completes the open tick if no robot is awaited any more.
+    /// Completes the open tick if no robot is awaited any more. Whatever may have been the last thing that it waited for calls this.
     fn settle(&mut self, out: &mut Vec<Output<R, C>>) {
-        if self.phase != Phase::Open {
-            return;
-        }
-        let is_awaited = |member: &Member<R, C>| is_awaited(Phase::Open, member, self.rules);
-        let has_report = self
-            .members
-            .values()
-            .any(|member| member.turn.report.is_some());
-        let goes_early = !self.rules.hold(Rule::WaitsForAll) && has_report;
-        if self.members.values().any(is_awaited) && !goes_early {
+        if self.phase != Phase::Open || self.members.values().any(Member::is_awaited) {
             return;
         }
 
-        // From here on nothing that arrives can change the tick: `is_open_for` asks for the phase, so reports and tokens that come
+        // From here on nothing that arrives can change the tick: reports, tokens and timers ask for the phase, so those that come
         // between two ticks are for the next one, or stale.
         self.phase = Phase::Between;
-        if self.is_announced {
-            self.is_announced = false;
+        if std::mem::take(&mut self.is_announced) {
             out.push(Output::Released);
         }
-        let outcome = self.take_outcome();
-        out.push(Output::Complete(outcome));
-    }
-
-    fn take_outcome(&mut self) -> Outcome<R, C> {
-        let mut reports = BTreeMap::new();
+        let mut outcome = Outcome {
+            reports: BTreeMap::new(),
+            membership: std::mem::take(&mut self.membership),
+        };
+        outcome.membership.sort();
         for (name, member) in &mut self.members {
-            let turn = std::mem::take(&mut member.turn);
-            let Some((stated, report)) = turn.report else {
-                continue;
-            };
-
-            member.missed = 0;
-            member.has_reported = true;
-            // A predecessor may have sent more commands than the report that counts states.
-            let mut commands = turn.commands;
-            commands.retain(|number, _| *number <= stated);
-            reports.insert(name.clone(), (report, commands.into_values().collect()));
+            if let Some(reply) = member.take_reply() {
+                outcome.reports.insert(name.clone(), reply);
+            }
         }
-        self.membership.sort();
-
-        Outcome {
-            reports,
-            membership: self.membership.clone(),
-        }
+        out.push(Output::Complete(outcome));
     }
 }
 
-/// Whether the open tick waits for a robot.
-fn is_awaited<R, C>(phase: Phase, member: &Member<R, C>, rules: Rules) -> bool {
-    phase == Phase::Open
-        && !member.is_lost
-        && !member.turn.is_given_up
-        && !member.turn.is_complete(rules.hold(Rule::CountsCommands))
+/// The flag of a robot in [`Clock::news`].
+fn news_flag(index: usize) -> u32 {
+    1 << (index % NEWS_FLAGS)
 }

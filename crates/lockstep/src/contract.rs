@@ -5,11 +5,10 @@ use std::str::FromStr;
 use protocol::RobotName;
 use protocol::messages::{Command, CommandText, News, Refusal, Report, Welcome};
 
-use crate::barrier::{Refused, Stamp};
-use crate::exchange::IncarnationNotice;
-use crate::exchange::Sent;
+use crate::actions::Answer;
+use crate::exchange::{IncarnationNotice, Sent};
 use crate::member::Admission;
-use crate::participant::Answer;
+use crate::outputs::{Refused, Stamp};
 use crate::states::StateQuery;
 
 impl From<&Report> for Stamp {

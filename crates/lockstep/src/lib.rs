@@ -8,20 +8,23 @@
 //!
 //! The content of messages is a type parameter: the rules depend on epochs, ticks, generations and counts only.
 
+mod actions;
 mod barrier;
 mod contract;
 mod exchange;
 mod member;
 #[cfg(test)]
 mod model;
+mod outputs;
 mod participant;
-mod rules;
 mod states;
 #[cfg(test)]
 mod tests;
 
-pub use barrier::{Barrier, Ignored, Output, Refused, Stamp, Timer, Timing};
+pub use actions::{Action, Answer, Begin, Leave, RobotTimer, Timeouts, Turn};
+pub use barrier::Barrier;
 pub use exchange::{Bulletin, Exchange, IncarnationNotice, Membership, Outcome, Sent};
 pub use member::{Admission, Attendance, Lateness};
-pub use participant::{Action, Answer, Begin, Leave, Participant, RobotTimer, Timeouts, Turn};
+pub use outputs::{Ignored, Output, Refused, Stamp, Timer, Timing};
+pub use participant::Participant;
 pub use states::{NoState, StateQuery, States};

@@ -1,25 +1,19 @@
 //! A robot's side: from the request to join to the end of the run, tick by tick.
+//!
+//! Two states say where it is, and each kind of input looks at both: [`JoinState`], whether it was admitted and as what, and
+//! [`TickState`], what it does as that. A clock may come again, late or of another epoch, and news without their clock; the robot
+//! runs each tick at most once, in order, and only with the news that belong to it.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use protocol::messages::{Clock, End, Refusal};
+use protocol::messages::{Clock, Refusal};
 use protocol::{Epoch, Generation, RobotName, Tick};
 
-use crate::exchange::IncarnationNotice;
-use crate::exchange::Sent;
+use crate::actions::{Action, Answer, Begin, Leave, RobotTimer, Timeouts, Turn};
+use crate::exchange::{IncarnationNotice, Sent};
 use crate::member::Admission;
-use crate::rules::{Rule, Rules};
 use crate::states::{NoState, StateQuery, States};
-
-/// How long a participant waits for what.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Timeouts {
-    /// How long to try to be admitted.
-    pub join: Duration,
-    /// How long to wait for a simulator that is gone: it has ended, or the link to it is down, which look the same from here.
-    pub gone: Duration,
-}
 
 /// Pause between two requests to join.
 const JOIN_AGAIN: Duration = Duration::from_millis(100);
@@ -33,126 +27,42 @@ const MAX_NEWS: usize = 4;
 /// A robot that was not queried for this many ticks is followed no more.
 const UNUSED_TICKS: Tick = 64;
 
-/// A timer of a participant. Setting it again replaces it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum RobotTimer {
-    /// Ask to join again.
-    Join,
-    /// Give up joining.
-    JoinPatience,
-    /// Give up waiting for a simulator that is gone.
-    Gone,
-    /// Query again.
-    Query,
-    /// Tell people for whom the robot waits.
-    Waiting,
-}
-
-/// What a participant wants done.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub enum Action<N, S, C, R> {
-    /// Ask the simulator to be admitted; answer by [`Participant::admitted`], [`Participant::refused`] or
-    /// [`Participant::unanswered`].
-    Join,
-    /// Declare the liveliness token.
-    DeclareToken,
-    /// Run the robot for a tick; answer by [`Participant::done`].
-    Run(Turn<N>),
-    /// Put what came of a tick, in this order: the commands, the state, the report.
-    Put(Box<Answer<S, C, R>>),
-    /// Query the state of another robot as of this tick, and subscribe to it; answer by [`Participant::heard`].
-    Query {
-        /// The other robot.
-        of: RobotName,
-        /// The tick under way: the answer is the state of the tick before.
-        tick: Tick,
-        /// The epoch.
-        epoch: Epoch,
-    },
-    /// Subscribe no more to the state of another robot.
-    Unfollow(RobotName),
-    /// Put that the robot waits for another robot's answer.
-    PutWaiting {
-        /// The tick under way.
-        tick: Tick,
-        /// The epoch.
-        epoch: Epoch,
-        /// The other robot.
-        on: RobotName,
-    },
-    /// Call [`Participant::timer`] after this time.
-    SetTimer(RobotTimer, Duration),
-    /// Leave the run: withdraw the token, close the session, end.
-    Leave(Leave),
-}
-
-/// A tick that a robot is to run.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub struct Turn<N> {
-    /// The epoch.
-    pub epoch: Epoch,
-    /// The tick.
-    pub tick: Tick,
-    /// How it begins.
-    pub begin: Begin,
-    /// What is new, if anything is.
-    pub news: Option<N>,
-}
-
-/// How a robot's tick begins.
+/// Whether a robot was admitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Begin {
-    /// Tick 0: the robot returns to its initial state.
-    Init,
-    /// The first tick of an incarnation that takes over in the middle of an epoch.
-    TakeOver,
-    /// Any other tick.
-    GoOn,
-}
-
-/// What came of a tick.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub struct Answer<S, C, R> {
-    /// The epoch.
-    pub epoch: Epoch,
-    /// The tick.
-    pub tick: Tick,
-    /// The incarnation that answers.
-    pub generation: Generation,
-    /// The commands, numbered from 1 in this order.
-    pub commands: Vec<Sent<C>>,
-    /// The state that other robots may query.
-    pub state: S,
-    /// The report.
-    pub report: R,
-}
-
-/// Why a robot leaves the run.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub enum Leave {
-    /// The run is over.
-    End(End),
-    /// It was refused.
-    Refused(Refusal),
-    /// No simulator answered in time.
-    NoSimulator,
-    /// The simulator was gone for too long.
-    SimulatorGone,
-    /// Another process has taken its place.
-    Replaced,
-    /// The process itself wants to leave.
-    Stopped,
-}
-
-/// Where a participant stands.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-enum Standing {
-    /// It has asked to join, for the first time or again.
-    Joining,
+enum JoinState {
+    /// It has asked to join for the first time.
+    Joining {
+        /// Whether it was answered that the name is taken.
+        is_name_taken: bool,
+    },
     /// It was admitted.
-    Admitted,
-    /// It has left.
-    Left,
+    Joined(Admission),
+    /// It was admitted as this, and has asked to join again: it does not know whether it still is.
+    Rejoining {
+        admission: Admission,
+        /// The newest clock of a later epoch. Only a welcome to that epoch shows that it has begun.
+        later: Option<Clock>,
+        /// Whether a tick was done meanwhile, whose answer counts only if nothing has changed.
+        holds_answer: bool,
+    },
+    /// It has left; before, it may have been admitted.
+    Left(Option<Admission>),
+}
+
+/// What a robot does as the incarnation that it was admitted as, in the epoch that it was admitted to.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+enum TickState<S, C, R> {
+    /// It has not run a tick as that yet.
+    NotBegun,
+    /// The same, and the tick that it ran before is not done: it cannot be interrupted, so what comes of it is thrown away.
+    Discarding,
+    /// It runs a tick.
+    Running {
+        at: (Epoch, Tick),
+        asking: Option<Asking>,
+    },
+    /// It has done a tick, whose answer is kept in case that it is lost.
+    Answered(Box<Answer<S, C, R>>),
 }
 
 /// A query to another robot that has no answer yet.
@@ -173,34 +83,17 @@ struct Arrived<N> {
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Participant<N, S, C, R> {
     timeouts: Timeouts,
-    standing: Standing,
-    admission: Option<Admission>,
-    /// Whether the last answer to its request was that the name is taken.
-    is_name_taken: bool,
-    has_token: bool,
-    /// Whether it has run a tick as the incarnation that it was admitted as, in the epoch that it was admitted to.
-    is_seated: bool,
+    join: JoinState,
+    tick: TickState<S, C, R>,
     /// The newest clock that has not been run, of the epoch that it was admitted to.
     pending: Option<Clock>,
-    /// The newest clock of a later epoch. Only a welcome to that epoch shows that it has begun.
-    later: Option<Clock>,
     /// News of ticks that have not been run.
     news: BTreeMap<(Epoch, Tick), Arrived<N>>,
-    /// The tick that the robot is running.
-    running: Option<(Epoch, Tick)>,
-    /// Whether the robot still runs a tick as what it is no more: its result is thrown away.
-    is_discarding: bool,
-    /// What came of the last tick.
-    answer: Option<Box<Answer<S, C, R>>>,
-    /// Whether the answer has not been put, because the robot was joining again.
-    is_held_back: bool,
     states: States<S>,
-    asking: Option<Asking>,
     /// States of other robots, with the tick when each was last asked for.
     others: BTreeMap<RobotName, States<S>>,
     followed: BTreeMap<RobotName, Tick>,
     is_simulator_gone: bool,
-    rules: Rules,
 }
 
 type Out<N, S, C, R> = Vec<Action<N, S, C, R>>;
@@ -209,38 +102,21 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
     /// A robot that asks to join.
     #[must_use]
     pub fn new(timeouts: Timeouts, out: &mut Out<N, S, C, R>) -> Self {
-        Self::with_rules(timeouts, Rules::default(), out)
-    }
-
-    pub(crate) fn with_rules(timeouts: Timeouts, rules: Rules, out: &mut Out<N, S, C, R>) -> Self {
-        // A token that is declared before the welcome would keep the robot's own request from being admitted.
-        let has_token = !rules.hold(Rule::TokenAfterWelcome);
-        if has_token {
-            out.push(Action::DeclareToken);
-        }
         out.push(Action::SetTimer(RobotTimer::JoinPatience, timeouts.join));
         out.push(Action::Join);
 
         Self {
             timeouts,
-            standing: Standing::Joining,
-            admission: None,
-            is_name_taken: false,
-            has_token,
-            is_seated: false,
+            join: JoinState::Joining {
+                is_name_taken: false,
+            },
+            tick: TickState::NotBegun,
             pending: None,
-            later: None,
             news: BTreeMap::new(),
-            running: None,
-            is_discarding: false,
-            answer: None,
-            is_held_back: false,
             states: States::default(),
-            asking: None,
             others: BTreeMap::new(),
             followed: BTreeMap::new(),
             is_simulator_gone: false,
-            rules,
         }
     }
 
@@ -252,31 +128,40 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         states: impl IntoIterator<Item = (Tick, S)>,
         out: &mut Out<N, S, C, R>,
     ) {
-        if self.standing != Standing::Joining {
-            return;
-        }
+        let (before, later, holds_answer) = match self.join {
+            JoinState::Joining { .. } => (None, None, false),
+            JoinState::Rejoining {
+                admission,
+                later,
+                holds_answer,
+            } => (Some(admission), later, holds_answer),
+            // The answer to a request that was repeated.
+            JoinState::Joined(_) | JoinState::Left(_) => return,
+        };
+        self.join = JoinState::Joined(admission);
 
-        let before = self.admission.replace(admission);
-        self.standing = Standing::Admitted;
-        self.take_later(admission.epoch);
+        // The welcome shows which epoch it is: a clock of a still later one is ignored, and so are its news. Both are repeated.
+        let is_present = |clock: &Clock| clock.epoch == admission.epoch;
+        self.pending = later
+            .filter(is_present)
+            .or(self.pending.filter(|clock| clock.epoch >= admission.epoch));
+        self.news.retain(|of, _| of.0 <= admission.epoch);
+
         let is_unchanged = before.is_some_and(|before| {
-            let is_of_epoch = before.epoch == admission.epoch;
-            let is_of_generation = before.generation == admission.generation;
-            is_of_epoch && (is_of_generation || !self.rules.hold(Rule::StartsOver))
+            (before.epoch, before.generation) == (admission.epoch, admission.generation)
         });
-        if is_unchanged && self.rules.hold(Rule::GoesOnInOwnEpoch) {
-            if std::mem::take(&mut self.is_held_back) {
-                self.put(out);
-            }
-        } else {
+        if !is_unchanged {
             self.start_over();
             for (tick, state) in states {
                 self.states.add(admission.epoch, tick, state);
             }
+        } else if holds_answer {
+            self.put_answer(out);
         }
 
-        if !self.has_token {
-            self.has_token = true;
+        // Only now: a token that is declared before the welcome would keep the robot's own request from being admitted. It stays
+        // declared for as long as the process lives.
+        if before.is_none() {
             out.push(Action::DeclareToken);
         }
         self.run_if_possible(out);
@@ -284,33 +169,29 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
 
     /// The simulator has refused the robot.
     pub fn refused(&mut self, reason: Refusal, out: &mut Out<N, S, C, R>) {
-        if self.standing != Standing::Joining {
-            return;
-        }
-
-        // A process that was admitted before is refused its own name only if another one has taken its place.
-        let was_admitted = self.admission.is_some() && self.rules.hold(Rule::EndsWhenTaken);
-        if reason == Refusal::NameTaken && was_admitted {
-            self.leave(Leave::Replaced, out);
-        } else if reason == Refusal::NameTaken {
-            // A predecessor that was killed keeps the name until its lease is over.
-            self.is_name_taken = true;
-            out.push(Action::SetTimer(RobotTimer::Join, JOIN_AGAIN));
-        } else {
-            self.leave(Leave::Refused(reason), out);
+        match (&mut self.join, reason) {
+            (JoinState::Joined(_) | JoinState::Left(_), _) => {}
+            (JoinState::Joining { is_name_taken }, Refusal::NameTaken) => {
+                // A predecessor that was killed keeps the name until its lease is over.
+                *is_name_taken = true;
+                out.push(Action::SetTimer(RobotTimer::Join, JOIN_AGAIN));
+            }
+            // A process that was admitted before is refused its own name only if another one has taken its place.
+            (JoinState::Rejoining { .. }, Refusal::NameTaken) => self.leave(Leave::Replaced, out),
+            (_, reason) => self.leave(Leave::Refused(reason), out),
         }
     }
 
     /// No simulator has answered the request to join.
     pub fn unanswered(&mut self, out: &mut Out<N, S, C, R>) {
-        if self.standing == Standing::Joining {
+        if self.is_asking_to_join() {
             out.push(Action::SetTimer(RobotTimer::Join, JOIN_AGAIN));
         }
     }
 
     /// A clock arrived.
     pub fn clock(&mut self, clock: Clock, out: &mut Out<N, S, C, R>) {
-        if self.standing == Standing::Left {
+        if self.has_left() {
             return;
         }
         // Before anything else is looked at, whatever its tick.
@@ -318,40 +199,38 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
             self.leave(Leave::End(end), out);
             return;
         }
-        let Some(admission) = self.admission else {
+        let Some(admission) = self.admission() else {
             return; // The clock is repeated when the token is declared.
         };
-
         let at = (clock.epoch, clock.tick);
         if clock.epoch > admission.epoch {
-            if self.rules.hold(Rule::JoinsNewEpoch) {
-                self.note_later(clock);
-                self.join_again(out);
+            self.join_again(out);
+            if let JoinState::Rejoining { later, .. } = &mut self.join
+                && later.is_none_or(|later| at >= (later.epoch, later.tick))
+            {
+                *later = Some(clock);
             }
             return;
         }
-        if clock.epoch < admission.epoch && self.rules.hold(Rule::IgnoresLate) {
+        if clock.epoch < admission.epoch {
             return;
         }
-        if self.running == Some(at) {
-            return; // It is being answered.
-        }
-        // A clock that was answered comes again because something of the answer was lost. The whole answer is put again, from memory:
-        // the robot must not run a tick twice, since its random numbers and its state have moved on.
-        if let Some(answer) = &self.answer
-            && at <= (answer.epoch, answer.tick)
-            && self.rules.hold(Rule::AnswersOnce)
-        {
-            if at == (answer.epoch, answer.tick) && self.running.is_none() {
-                self.repeat(out);
+
+        match &self.tick {
+            TickState::Running { at: running, .. } if at <= *running => return,
+            // A clock that was answered comes again because something of the answer was lost. The whole answer is put again, from
+            // memory: the robot must not run a tick twice, since its random numbers and its state have moved on.
+            TickState::Answered(answer) if at <= answer.at() => {
+                if at == answer.at() {
+                    self.put_answer(out);
+                }
+                return;
             }
-            return;
+            _ => {}
         }
-        let is_newest = self
-            .pending
-            .is_none_or(|pending| at >= (pending.epoch, pending.tick))
-            && self.running.is_none_or(|running| at > running);
-        if is_newest || !self.rules.hold(Rule::RunsNewest) {
+        // One that is pending comes again because its news were lost.
+        let pending = self.pending;
+        if pending.is_none_or(|pending| at >= (pending.epoch, pending.tick)) {
             self.pending = Some(clock);
             self.run_if_possible(out);
         }
@@ -366,33 +245,33 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         news: N,
         out: &mut Out<N, S, C, R>,
     ) {
-        let Some(admission) = self.admission else {
+        let Some(admission) = self.admission() else {
             return;
         };
-        if self.standing == Standing::Left || epoch < admission.epoch {
+        if self.has_left() || epoch < admission.epoch {
             return;
         }
         let IncarnationNotice { joined, rejoin } = notice;
-        // While it joins again, a higher generation may become its own.
-        let is_joining = self.standing == Standing::Joining && self.rules.hold(Rule::AwaitsWelcome);
-        let is_replaced =
-            joined.is_some_and(|generation| generation > admission.generation) && !is_joining;
-        if epoch == admission.epoch && is_replaced && self.rules.hold(Rule::EndsWhenReplaced) {
-            self.leave(Leave::Replaced, out);
-            return;
-        }
-        let must_rejoin = rejoin == Some(admission.generation);
-        if epoch == admission.epoch && must_rejoin && self.rules.hold(Rule::JoinsWhenAsked) {
-            self.join_again(out);
-        }
-        let is_answered = self
-            .answer
-            .as_ref()
-            .is_some_and(|answer| (epoch, tick) <= (answer.epoch, answer.tick));
-        if is_answered || self.running.is_some_and(|running| (epoch, tick) <= running) {
-            return;
+        if epoch == admission.epoch {
+            // While it joins again, a higher generation may become its own.
+            let is_joined = matches!(self.join, JoinState::Joined(_));
+            if is_joined && joined.is_some_and(|joined| joined > admission.generation) {
+                self.leave(Leave::Replaced, out);
+                return;
+            }
+            if rejoin == Some(admission.generation) {
+                self.join_again(out);
+            }
         }
 
+        let is_over = match &self.tick {
+            TickState::NotBegun | TickState::Discarding => false,
+            TickState::Running { at, .. } => (epoch, tick) <= *at,
+            TickState::Answered(answer) => (epoch, tick) <= answer.at(),
+        };
+        if is_over {
+            return;
+        }
         self.news.insert((epoch, tick), Arrived { joined, news });
         // Those of later epochs, which only a welcome confirms, take no room from the others.
         let mut later = self.news.split_off(&(admission.epoch, Tick::MAX));
@@ -407,21 +286,21 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
 
     /// The robot has done the tick that it was to run.
     pub fn done(&mut self, commands: Vec<Sent<C>>, state: S, report: R, out: &mut Out<N, S, C, R>) {
-        if std::mem::take(&mut self.is_discarding) {
+        let is_discarded = matches!(self.tick, TickState::Discarding);
+        if is_discarded || self.has_left() {
+            self.tick = TickState::NotBegun;
             self.run_if_possible(out);
             return;
         }
-        let (Some((epoch, tick)), Some(admission)) = (self.running.take(), self.admission) else {
+        let (TickState::Running { at, .. }, Some(admission)) = (&self.tick, self.admission())
+        else {
             return;
         };
-        self.asking = None;
-        if self.standing == Standing::Left {
-            return;
-        }
 
         // The state can be queried before the report is put: a robot that runs the next tick already may ask for it.
+        let (epoch, tick) = *at;
         self.states.add(epoch, tick, state.clone());
-        self.answer = Some(Box::new(Answer {
+        self.tick = TickState::Answered(Box::new(Answer {
             epoch,
             tick,
             generation: admission.generation,
@@ -429,10 +308,11 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
             state,
             report,
         }));
-        // While it joins again, nobody knows whether the answer is still of its epoch and incarnation: the welcome decides.
-        self.is_held_back = self.standing == Standing::Joining;
-        if !self.is_held_back {
-            self.put(out);
+        // While it joins again, it is not known whether the answer is still of its epoch and incarnation: the welcome decides.
+        if let JoinState::Rejoining { holds_answer, .. } = &mut self.join {
+            *holds_answer = true;
+        } else {
+            self.put_answer(out);
         }
         self.run_if_possible(out);
     }
@@ -448,7 +328,10 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
     /// The state of another robot as of the tick before the one that runs: `None` until it is here. The first call begins a
     /// query.
     pub fn ask(&mut self, of: &RobotName, out: &mut Out<N, S, C, R>) -> Option<S> {
-        let (epoch, tick) = self.running?;
+        let TickState::Running { at, asking } = &mut self.tick else {
+            return None;
+        };
+        let (epoch, tick) = *at;
         let query = StateQuery {
             tick: Some(tick),
             epoch: Some(epoch),
@@ -459,12 +342,12 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
             .get(of)
             .and_then(|states| states.answer(query).ok());
         if found.is_some() {
-            self.asking = None;
+            *asking = None;
             return found;
         }
 
-        if self.asking.as_ref().is_none_or(|asking| asking.of != *of) {
-            self.asking = Some(Asking {
+        if asking.as_ref().is_none_or(|asking| asking.of != *of) {
+            *asking = Some(Asking {
                 of: of.clone(),
                 has_told: false,
             });
@@ -483,12 +366,12 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
     pub fn heard(&mut self, of: RobotName, epoch: Epoch, tick: Tick, state: S) {
         // Only states near the present tick are ever asked for. One of a tick after that under way shows that the clock has
         // gone on without this robot. It must not take the place of the state that this tick may still ask for.
-        let is_near = match (self.running, &self.answer) {
-            (Some(running), _) => {
-                (epoch, tick) == running || (epoch, tick.saturating_add(1)) == running
+        let is_near = match &self.tick {
+            TickState::NotBegun | TickState::Discarding => false,
+            TickState::Running { at, .. } => {
+                (epoch, tick) == *at || (epoch, tick.saturating_add(1)) == *at
             }
-            (None, Some(answer)) => epoch == answer.epoch && tick.abs_diff(answer.tick) <= 1,
-            (None, None) => false,
+            TickState::Answered(answer) => epoch == answer.epoch && tick.abs_diff(answer.tick) <= 1,
         };
         if is_near {
             self.others.entry(of).or_default().add(epoch, tick, state);
@@ -499,7 +382,9 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
     /// another incarnation now.
     #[must_use]
     pub fn is_interrupted(&self) -> bool {
-        self.standing == Standing::Left || self.is_discarding || self.pending.is_some()
+        let is_discarding = matches!(self.tick, TickState::Discarding);
+
+        self.has_left() || is_discarding || self.pending.is_some()
     }
 
     /// The simulator's liveliness token was declared or undeclared.
@@ -512,23 +397,25 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
 
     /// A timer that was set has fired.
     pub fn timer(&mut self, timer: RobotTimer, out: &mut Out<N, S, C, R>) {
-        if self.standing == Standing::Left {
+        if self.has_left() {
             return;
         }
 
-        match timer {
-            RobotTimer::Join if self.standing == Standing::Joining => out.push(Action::Join),
-            RobotTimer::JoinPatience if self.admission.is_none() => {
-                let leave = if self.is_name_taken {
+        // A timer is never withdrawn: it decides nothing that the state does not bear out.
+        match (timer, &self.join) {
+            (RobotTimer::Join, _) if self.is_asking_to_join() => out.push(Action::Join),
+            (RobotTimer::JoinPatience, JoinState::Joining { is_name_taken }) => {
+                let leave = if *is_name_taken {
                     Leave::Refused(Refusal::NameTaken)
                 } else {
                     Leave::NoSimulator
                 };
                 self.leave(leave, out);
             }
-            RobotTimer::Gone if self.is_simulator_gone => self.leave(Leave::SimulatorGone, out),
-            RobotTimer::Query => self.query_again(out),
-            RobotTimer::Waiting => self.tell_waiting(out),
+            (RobotTimer::Gone, _) if self.is_simulator_gone => {
+                self.leave(Leave::SimulatorGone, out);
+            }
+            (RobotTimer::Query | RobotTimer::Waiting, _) => self.still_asking(timer, out),
             _ => {}
         }
     }
@@ -541,103 +428,95 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
     /// Whether it has left.
     #[must_use]
     pub fn has_left(&self) -> bool {
-        self.standing == Standing::Left
+        matches!(self.join, JoinState::Left(_))
     }
 
-    /// Whether it waits for an answer to its request to join: another process does not have its place, as far as it knows.
+    /// Whether it waits for an answer to its first request to join: another process does not have its place, as far as it knows.
     #[must_use]
     pub fn is_unanswered(&self) -> bool {
-        self.admission.is_none() && !self.is_name_taken
+        let unanswered = JoinState::Joining {
+            is_name_taken: false,
+        };
+
+        self.join == unanswered
     }
 
     /// What it was admitted to.
     #[must_use]
     pub fn admission(&self) -> Option<Admission> {
-        self.admission
+        match self.join {
+            JoinState::Joining { .. } => None,
+            JoinState::Joined(admission) | JoinState::Rejoining { admission, .. } => {
+                Some(admission)
+            }
+            JoinState::Left(admission) => admission,
+        }
+    }
+
+    fn is_asking_to_join(&self) -> bool {
+        matches!(
+            self.join,
+            JoinState::Joining { .. } | JoinState::Rejoining { .. }
+        )
     }
 
     fn leave(&mut self, leave: Leave, out: &mut Out<N, S, C, R>) {
-        if self.standing != Standing::Left {
-            self.standing = Standing::Left;
+        if !self.has_left() {
+            self.join = JoinState::Left(self.admission());
             out.push(Action::Leave(leave));
         }
     }
 
-    /// The same process, in the next epoch or as a further incarnation. The welcome decides which, if any.
+    /// The same process, in the next epoch or as a further incarnation. The welcome decides which, if any: that it was asked to may
+    /// be old, and a clock of a later epoch a stray one. Until then it answers no clock but the one that it runs.
     fn join_again(&mut self, out: &mut Out<N, S, C, R>) {
-        if self.standing != Standing::Joining {
-            self.standing = Standing::Joining;
+        if let JoinState::Joined(admission) = self.join {
+            self.join = JoinState::Rejoining {
+                admission,
+                later: None,
+                holds_answer: false,
+            };
             out.push(Action::Join);
         }
     }
 
-    /// Keeps the newest clock of a later epoch.
-    fn note_later(&mut self, clock: Clock) {
-        let is_newest = self
-            .later
-            .is_none_or(|later| (clock.epoch, clock.tick) >= (later.epoch, later.tick));
-        if is_newest || !self.rules.hold(Rule::RunsNewest) {
-            self.later = Some(clock);
-        }
-    }
-
-    /// The welcome shows which epoch it is: a clock of a still later one is ignored, and so are its news. Both are repeated.
-    fn take_later(&mut self, epoch: Epoch) {
-        if let Some(clock) = self.later.take()
-            && clock.epoch == epoch
-        {
-            self.pending = Some(clock);
-        }
-        self.news.retain(|of, _| of.0 <= epoch);
-    }
-
     /// Forgets what it was.
     fn start_over(&mut self) {
-        self.is_seated = false;
         // The robot cannot be interrupted in the middle of a tick: what comes of it is discarded by `done`, and until then no other
         // tick begins.
-        self.is_discarding |= self.running.take().is_some();
-        self.asking = None;
-        self.answer = None;
-        self.is_held_back = false;
+        self.tick = match self.tick {
+            TickState::Running { .. } | TickState::Discarding => TickState::Discarding,
+            TickState::NotBegun | TickState::Answered(_) => TickState::NotBegun,
+        };
         // A query that names no epoch means the present one.
         self.states.clear();
     }
 
     /// Runs the pending clock if everything that belongs to it is here and it is this robot's turn.
     fn run_if_possible(&mut self, out: &mut Out<N, S, C, R>) {
-        let (Some(clock), Some(admission)) = (self.pending, self.admission) else {
+        let (JoinState::Joined(admission), Some(clock)) = (self.join, self.pending) else {
             return;
         };
-        let is_busy = self.running.is_some() || self.is_discarding;
-        if self.standing != Standing::Admitted || is_busy {
-            return;
-        }
+        let has_begun = match self.tick {
+            TickState::Running { .. } | TickState::Discarding => return,
+            TickState::NotBegun => false,
+            TickState::Answered(_) => true,
+        };
         let at = (clock.epoch, clock.tick);
-        if clock.epoch < admission.epoch && self.rules.hold(Rule::IgnoresLate) {
-            self.pending = None;
-            return;
-        }
         let has_news = clock.news & admission.news_flag != 0;
-        let is_here = self.news.contains_key(&at);
-        if has_news && !is_here && self.rules.hold(Rule::WaitsForNews) {
+        if has_news && !self.news.contains_key(&at) {
             return; // They were lost: both are repeated.
         }
 
         // The clock is taken before anything else: a repetition that arrives from now on finds the tick running, and not pending.
         self.pending = None;
-        let arrived = if self.rules.hold(Rule::MatchesNews) {
-            self.news.remove(&at)
-        } else {
-            self.news.pop_first().map(|(_, arrived)| arrived)
-        };
+        let arrived = self.news.remove(&at);
         self.news.retain(|of, _| *of > at);
         let joined = arrived.as_ref().and_then(|arrived| arrived.joined);
         // A clock of tick 0 may be from before this incarnation: only the first one takes part in it without being named.
         let is_first = admission.generation == 1;
-        let is_named =
-            joined == Some(admission.generation) || !self.rules.hold(Rule::WaitsToBeNamed);
-        let begin = if self.is_seated {
+        let is_named = joined == Some(admission.generation);
+        let begin = if has_begun {
             Begin::GoOn
         } else if clock.tick == 0 && (is_first || is_named) {
             Begin::Init
@@ -647,8 +526,7 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
             return; // Its turn comes with the news that name it.
         };
 
-        self.is_seated = true;
-        self.running = Some(at);
+        self.tick = TickState::Running { at, asking: None };
         self.unfollow_unused(clock.tick, out);
         out.push(Action::Run(Turn {
             epoch: clock.epoch,
@@ -673,48 +551,32 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         }
     }
 
-    /// Puts the answer of the last tick.
-    fn put(&self, out: &mut Out<N, S, C, R>) {
-        if let Some(answer) = &self.answer {
+    /// Puts the answer of the last tick, for the first time or again.
+    fn put_answer(&self, out: &mut Out<N, S, C, R>) {
+        if let TickState::Answered(answer) = &self.tick {
             out.push(Action::Put(answer.clone()));
         }
     }
 
-    /// A clock came again that was answered: a message was lost.
-    fn repeat(&self, out: &mut Out<N, S, C, R>) {
-        let Some(answer) = &self.answer else { return };
-        if !self.rules.hold(Rule::RepeatsReport) {
-            return;
-        }
-
-        let mut again = answer.clone();
-        if !self.rules.hold(Rule::RepeatsCommands) {
-            again.commands.clear();
-        }
-        out.push(Action::Put(again));
-    }
-
-    fn query_again(&mut self, out: &mut Out<N, S, C, R>) {
-        let (Some(asking), Some((epoch, tick))) = (&self.asking, self.running) else {
+    /// A timer of the query to another robot has fired, which may have been answered since.
+    fn still_asking(&mut self, timer: RobotTimer, out: &mut Out<N, S, C, R>) {
+        let TickState::Running {
+            at: (epoch, tick),
+            asking: Some(asking),
+        } = &mut self.tick
+        else {
             return;
         };
-        out.push(Action::Query {
-            of: asking.of.clone(),
-            tick,
-            epoch,
-        });
-        out.push(Action::SetTimer(RobotTimer::Query, QUERY_AGAIN));
-    }
+        let (epoch, tick, of) = (*epoch, *tick, asking.of.clone());
 
-    fn tell_waiting(&mut self, out: &mut Out<N, S, C, R>) {
-        let (Some(asking), Some((epoch, tick))) = (&mut self.asking, self.running) else {
-            return;
-        };
-        if !std::mem::replace(&mut asking.has_told, true) {
+        if timer == RobotTimer::Query {
+            out.push(Action::Query { of, tick, epoch });
+            out.push(Action::SetTimer(RobotTimer::Query, QUERY_AGAIN));
+        } else if !std::mem::replace(&mut asking.has_told, true) {
             out.push(Action::PutWaiting {
                 tick,
                 epoch,
-                on: asking.of.clone(),
+                on: of,
             });
         }
     }

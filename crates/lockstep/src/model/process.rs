@@ -5,13 +5,12 @@ use std::collections::VecDeque;
 use protocol::messages::Clock;
 use protocol::{Epoch, Generation, RobotName, Tick};
 
+use super::mutants::{Mutant, Robot};
 use super::simulation::{self, News, Order, Report, Simulation, Violation};
-use crate::barrier::{Refused, Stamp};
-use crate::exchange::IncarnationNotice;
-use crate::exchange::Sent;
-use crate::member::Admission;
-use crate::participant::{Action, Begin, Leave, Participant, RobotTimer, Timeouts, Turn};
-use crate::rules::{Rule, Rules};
+use crate::{
+    Action, Admission, Begin, IncarnationNotice, Leave, Refused, RobotTimer, Sent, Stamp, Timeouts,
+    Turn,
+};
 
 /// From a process to the simulator, in order.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -31,7 +30,6 @@ pub(super) enum Down {
     Clock(Clock),
 }
 
-pub(super) type Robot = Participant<News, (), Order, Report>;
 type Actions = Vec<Action<News, (), Order, Report>>;
 
 /// A process of a robot.
@@ -73,7 +71,7 @@ pub(super) struct Around<'a> {
     pub(super) simulation: &'a Simulation,
     /// Whether a tick takes time, so that things happen meanwhile.
     pub(super) is_slow: bool,
-    pub(super) rules: Rules,
+    pub(super) mutant: Option<Mutant>,
 }
 
 impl Process {
@@ -84,7 +82,7 @@ impl Process {
             gone: std::time::Duration::MAX,
         };
         let mut out = Vec::new();
-        let robot = Robot::with_rules(timeouts, around.rules, &mut out);
+        let robot = Robot::new(timeouts, around.mutant, &mut out);
         let mut process = Self {
             name,
             robot,
@@ -129,7 +127,7 @@ impl Process {
         }
 
         self.feed(around, |robot, out| match message {
-            Down::Answer(Ok(admission)) => robot.admitted(admission, [], out),
+            Down::Answer(Ok(admission)) => robot.admitted(admission, out),
             Down::Answer(Err(refused)) => robot.refused(refused.into(), out),
             Down::News(epoch, tick, notice, news) => robot.news(epoch, tick, notice, news, out),
             Down::Clock(clock) => robot.clock(clock, out),
@@ -149,7 +147,7 @@ impl Process {
             orders: turn.news.map(|news| news.orders).unwrap_or_default(),
         };
 
-        self.feed(around, |robot, out| robot.done(commands, (), report, out))
+        self.feed(around, |robot, out| robot.done(commands, report, out))
     }
 
     /// The process is no more: what it has sent still arrives, then its token is undeclared.
@@ -210,15 +208,15 @@ impl Process {
                     self.has_token = true;
                     self.send(Up::Token(true));
 
-                    // The rule is broken on purpose to see what follows.
+                    // A mutant does so on purpose, to see what follows.
                     let is_early = self.robot.admission().is_none()
-                        && around.rules.hold(Rule::TokenAfterWelcome);
+                        && around.mutant != Some(Mutant::DeclaresTokenEarly);
                     is_early.then_some(Violation::TokenBeforeWelcome)
                 }
                 Action::Run(turn) => self.run(turn, around),
                 Action::Put(answer) => {
                     let stamp = Stamp::from(answer.as_ref());
-                    // How many were sent; a broken rule may repeat fewer.
+                    // How many were sent; a mutant may repeat fewer.
                     let count = simulation::commands(&self.name, 0, answer.tick, 0).len();
 
                     for (number, command) in (1..).zip(answer.commands) {

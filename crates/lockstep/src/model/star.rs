@@ -7,14 +7,10 @@ use protocol::messages::{Clock, End, FaultKind, OnLate};
 use protocol::{Epoch, RobotName, Tick};
 use stateright::{Model, Property};
 
-use super::process::{Around, Down, Process, Robot, Up};
+use super::mutants::{Mutant, Robot, Simulator};
+use super::process::{Around, Down, Process, Up};
 use super::simulation::{News, Order, Ordered, Report, Simulation, Violation};
-use crate::barrier::{Barrier, Output, Timer, Timing};
-use crate::exchange::IncarnationNotice;
-use crate::exchange::{Membership, Outcome};
-use crate::member::Lateness;
-use crate::participant::RobotTimer;
-use crate::rules::{Rule, Rules};
+use crate::{IncarnationNotice, Lateness, Membership, Outcome, Output, RobotTimer, Timer};
 
 /// How often each thing may still happen.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
@@ -43,7 +39,7 @@ pub(super) struct Budget {
     pub(super) strays: u8,
 }
 
-/// What is explored: bounds, and perhaps a broken rule.
+/// What is explored: bounds, and perhaps what is done wrong.
 #[derive(Debug, Clone)]
 pub(super) struct Star {
     pub(super) last_tick: Tick,
@@ -59,13 +55,13 @@ pub(super) struct Star {
     /// Whether the exploration begins when tick 0 is granted.
     pub(super) is_gathered: bool,
     pub(super) budget: Budget,
-    pub(super) rules: Rules,
+    pub(super) mutant: Option<Mutant>,
 }
 
 /// One state of everything.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) struct State {
-    pub(super) barrier: Barrier<Report, Order>,
+    pub(super) barrier: Simulator,
     pub(super) simulation: Simulation,
     /// By the order in which they were started; `None` if nothing of them remains.
     pub(super) processes: Vec<Option<Process>>,
@@ -232,7 +228,7 @@ impl Star {
         let around = Around {
             simulation,
             is_slow: self.is_slow,
-            rules: self.rules,
+            mutant: self.mutant,
         };
         let violation = processes[number]
             .as_mut()
@@ -245,7 +241,7 @@ impl Star {
     fn feed_barrier(
         &self,
         state: &mut State,
-        input: impl FnOnce(&mut Barrier<Report, Order>, &mut Vec<Output<Report, Order>>),
+        input: impl FnOnce(&mut Simulator, &mut Vec<Output<Report, Order>>),
     ) {
         let mut out = Vec::new();
         input(&mut state.barrier, &mut out);
@@ -489,7 +485,7 @@ impl Star {
         let around = Around {
             simulation: &state.simulation,
             is_slow: self.is_slow,
-            rules: self.rules,
+            mutant: self.mutant,
         };
         let (process, violation) = Process::start(name, around);
 
@@ -722,7 +718,7 @@ impl Star {
                 if !state.is_quiet() {
                     state.left.early -= 1;
                 }
-                self.feed_barrier(state, Barrier::repeat);
+                self.feed_barrier(state, Simulator::repeat);
             }
             Step::Init => {
                 state.left.inits -= 1;
@@ -747,10 +743,8 @@ impl Model for Star {
 
     fn init_states(&self) -> Vec<State> {
         let roster = [super::name("A"), super::name("B")];
-        let mut barrier = Barrier::new(roster.clone(), self.lateness(), Timing::default(), 4);
-        barrier.rules = self.rules;
         let mut state = State {
-            barrier,
+            barrier: Simulator::new(roster.clone(), self.lateness(), self.mutant),
             simulation: Simulation::new(&roster),
             processes: Vec::new(),
             reserved: BTreeSet::new(),
@@ -807,8 +801,3 @@ impl Model for Star {
 pub(super) const SAFE: &str = "safe";
 /// The run can end.
 pub(super) const ENDS: &str = "ends";
-
-/// Every rule holds but this one.
-pub(super) fn without(broken: Option<Rule>) -> Rules {
-    Rules { broken }
-}
