@@ -26,9 +26,8 @@ data = "cars_simulator.data"
 
 def build(profile: str, out: Path) -> Path:
     """Makes the wheel in a folder, and returns its path."""
-    # The whole workspace, so that what the module and the programs share has the same features in both and is compiled once.
-    cargo = ["cargo", "build", "--workspace", "--bins", "--lib", "--profile", profile]
-    subprocess.run(cargo, cwd=ROOT, check=True)
+    # The programs; maturin builds the module, and what both share has the same features and is compiled once.
+    subprocess.run(["cargo", "build", "--profile", profile], cwd=ROOT, check=True)
     target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"), profile)
     made = out.resolve()
     # A copy, so that programs never lie among the sources; within the project, whose toolchain and settings cargo finds from there,
