@@ -1,0 +1,60 @@
+//! States of robots, and queries for them.
+
+use crate::{NoState, StateQuery, States};
+
+#[test]
+fn the_last_two_states_are_kept() {
+    let at = |epoch: Option<u32>, tick: Option<u64>| StateQuery { tick, epoch };
+    let mut states = States::default();
+    assert_eq!(states.answer(at(None, None)), Err(NoState::NotYet));
+
+    for (epoch, tick) in [(1, 9), (2, 4), (2, 3), (2, 5), (1, 10)] {
+        states.add(epoch, tick, (epoch, tick));
+    }
+    states.add(2, 5, (0, 0));
+
+    assert_eq!(states.answer(at(None, None)), Ok((2, 5)));
+    assert_eq!(states.answer(at(Some(2), Some(5))), Ok((2, 4)));
+    assert_eq!(states.answer(at(Some(2), Some(6))), Ok((2, 5)));
+    assert_eq!(states.answer(at(Some(2), Some(7))), Err(NoState::NotYet));
+    assert_eq!(
+        states.answer(at(Some(2), Some(8))),
+        Err(NoState::OutOfRange)
+    );
+    assert_eq!(states.answer(at(Some(2), Some(4))), Err(NoState::Over));
+    assert_eq!(
+        states.answer(at(Some(2), Some(0))),
+        Err(NoState::OutOfRange)
+    );
+    assert_eq!(states.answer(at(Some(1), Some(5))), Err(NoState::Over));
+    assert_eq!(states.answer(at(Some(3), Some(1))), Err(NoState::NotYet));
+}
+#[test]
+fn why_there_is_no_state_is_said_in_words() {
+    let words = [NoState::NotYet, NoState::Over, NoState::OutOfRange].map(|why| why.to_string());
+
+    assert_eq!(
+        words,
+        [
+            "that tick has not been reported yet: ask again",
+            "that tick is over",
+            "that tick is out of range"
+        ]
+    );
+}
+
+#[test]
+fn a_query_is_read_from_its_parameters() {
+    let read = |tick: Option<&str>, epoch: Option<&str>| {
+        StateQuery::read(|name| if name == "tick" { tick } else { epoch })
+    };
+    let query = StateQuery {
+        tick: Some(7),
+        epoch: Some(2),
+    };
+
+    assert_eq!(read(Some("7"), Some("2")), Ok(query));
+    assert_eq!(read(None, None), Ok(StateQuery::default()));
+    let wrong = Err("parameter epoch: not a whole number".to_owned());
+    assert_eq!(read(None, Some("-1")), wrong);
+}
