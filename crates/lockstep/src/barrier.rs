@@ -1,8 +1,8 @@
 //! The simulator's side: who takes part, and when a tick is complete.
 //!
-//! Every input is checked against the open tick before it changes anything, and counts once. So the caller may feed messages in any
-//! order, late, twice or not at all: what is lost is asked for again by repeating the clock ([`Barrier::repeat`]), and what a tick
-//! comes to depends on who reported what, never on when.
+//! Every input is checked against the open tick before it changes anything, and counts once. So the caller may feed
+//! messages in any order, late, twice or not at all: what is lost is asked for again by repeating the clock
+//! ([`Barrier::repeat`]), and what a tick comes to depends on who reported what, never on when.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -73,8 +73,8 @@ impl<R, C> Barrier<R, C> {
         }
     }
 
-    /// Begins an epoch: waits until every robot of the roster is connected, then asks for tick 0 by [`Output::Gathered`].
-    /// An open tick is given up.
+    /// Begins an epoch: waits until every robot of the roster is connected, then asks for tick 0 by
+    /// [`Output::Gathered`]. An open tick is given up.
     pub fn gather(&mut self, epoch: Epoch, lateness: Lateness, out: &mut Vec<Output<R, C>>) {
         self.phase = Phase::Gathering;
         self.epoch = epoch;
@@ -91,12 +91,14 @@ impl<R, C> Barrier<R, C> {
         self.check_all_joined(out);
     }
 
-    /// Says who takes part in the tick that is opened next, because it is executed again. `None` if that is open, as usual.
+    /// Says who takes part in the tick that is opened next, because it is executed again. `None` if that is open, as
+    /// usual.
     pub fn recall(&mut self, attendance: Option<Attendance>) {
         self.attendance = attendance;
     }
 
-    /// Asks the process of a robot to join again, so that it takes part as a further incarnation from the next tick on.
+    /// Asks the process of a robot to join again, so that it takes part as a further incarnation from the next tick
+    /// on.
     pub fn ask_to_rejoin(&mut self, robot: &RobotName) {
         if let Some(member) = self.members.get_mut(robot) {
             member.ask_to_rejoin();
@@ -117,8 +119,8 @@ impl<R, C> Barrier<R, C> {
             let attendance = self.attendance.as_ref();
             let recorded = attendance.map(|recorded| recorded.joined.contains(name));
             let joined = if tick == 0 {
-                // All take part. Only where a process took the place of another one while tick 0 was open does the record say so;
-                // here it is the first.
+                // All take part. Only where a process took the place of another one while tick 0 was open does the
+                // record say so; here it is the first.
                 let generation = member.begin_epoch();
                 recorded.unwrap_or(false).then_some(generation)
             } else if recorded.unwrap_or(true) {
@@ -133,8 +135,8 @@ impl<R, C> Barrier<R, C> {
             }
         }
 
-        // Robots that cannot report are excluded before the clock goes out, so that it does not wait for them even once. The tick may
-        // be complete at once, without any report: where all robots are lost.
+        // Robots that cannot report are excluded before the clock goes out, so that it does not wait for them even
+        // once. The tick may be complete at once, without any report: where all robots are lost.
         self.exclude_unavailable();
         self.grant(out);
         self.set_timers(out);
@@ -162,7 +164,8 @@ impl<R, C> Barrier<R, C> {
             return Err(Refused::NameTaken);
         }
 
-        // Even while a tick is open: it takes part from its token on ([`Self::token`]), and until then the tick waits.
+        // Even while a tick is open: it takes part from its token on ([`Self::token`]), and until then the tick
+        // waits.
         if member.admit(instance) {
             let timer = Timer::Token(name.clone());
             out.push(Output::SetTimer(timer, self.timing.token));
@@ -188,8 +191,8 @@ impl<R, C> Barrier<R, C> {
         if is_present {
             member.end_reservation();
             if is_awaited {
-                // The open tick waits for it: it takes the place of a predecessor, or it is back and may have missed the clock.
-                // Everything that it subscribes to is in effect, because it declares its token last.
+                // The open tick waits for it: it takes the place of a predecessor, or it is back and may have missed
+                // the clock. Everything that it subscribes to is in effect, because it declares its token last.
                 if let Some(generation) = member.take_in() {
                     self.note_joined(name, generation);
                 }
@@ -225,8 +228,8 @@ impl<R, C> Barrier<R, C> {
         let is_allowed = (1..=self.max_commands).contains(&number);
         match self.received(from, stamp, is_allowed) {
             Ok(received) => {
-                // The first one counts; a repetition has the same content. So repeating is idempotent, and a message that was
-                // delivered twice or overtaken by its repetition changes nothing.
+                // The first one counts; a repetition has the same content. So repeating is idempotent, and a message
+                // that was delivered twice or overtaken by its repetition changes nothing.
                 received.commands.entry(number).or_insert(command);
                 if received.is_complete() {
                     self.settle(out);
@@ -289,8 +292,8 @@ impl<R, C> Barrier<R, C> {
         }
     }
 
-    /// A timer that was set has fired. It may be of a tick that is over: a timer is replaced, never withdrawn, so it decides nothing
-    /// that the state does not bear out.
+    /// A timer that was set has fired. It may be of a tick that is over: a timer is replaced, never withdrawn, so it
+    /// decides nothing that the state does not bear out.
     pub fn timer(&mut self, timer: &Timer, out: &mut Vec<Output<R, C>>) {
         let is_open = self.phase == Phase::Open;
         match timer {
@@ -319,16 +322,16 @@ impl<R, C> Barrier<R, C> {
         }
     }
 
-    /// Puts the last clock and its news again. Between two ticks that is the clock of the complete one: it reaches a robot that is
-    /// asked to join again, and changes nothing for any other.
+    /// Puts the last clock and its news again. Between two ticks that is the clock of the complete one: it reaches a
+    /// robot that is asked to join again, and changes nothing for any other.
     pub fn repeat(&mut self, out: &mut Vec<Output<R, C>>) {
         if matches!(self.phase, Phase::Open | Phase::Between) {
             self.grant(out);
         }
     }
 
-    /// The scenario has brought a fault upon a robot's process, or that fault is over. While it lasts, the scenario decides
-    /// what becomes of the robot, and no timer does.
+    /// The scenario has brought a fault upon a robot's process, or that fault is over. While it lasts, the scenario
+    /// decides what becomes of the robot, and no timer does.
     pub fn fault(&mut self, robot: &RobotName, fault: Option<FaultKind>) {
         if let Some(member) = self.members.get_mut(robot) {
             member.fault = fault;
@@ -484,7 +487,8 @@ impl<R, C> Barrier<R, C> {
         received.filter(|_| is_open).ok_or(Ignored::Stale)
     }
 
-    /// An incarnation takes part from the open tick on. One that was taken in before it and has not reported leaves no trace.
+    /// An incarnation takes part from the open tick on. One that was taken in before it and has not reported leaves
+    /// no trace.
     fn note_joined(&mut self, name: &RobotName, generation: Generation) {
         self.membership
             .retain(|change| !matches!(change, Membership::Joined(robot, _) if robot == name));
@@ -509,8 +513,8 @@ impl<R, C> Barrier<R, C> {
         }
     }
 
-    /// Puts the news and the clock of the tick that was granted last. The news are composed anew each time: since the clock was put
-    /// last, a robot may have joined, or been asked to.
+    /// Puts the news and the clock of the tick that was granted last. The news are composed anew each time: since the
+    /// clock was put last, a robot may have joined, or been asked to.
     fn grant(&self, out: &mut Vec<Output<R, C>>) {
         let mut flags = 0;
         for (index, (name, member)) in self.members.iter().enumerate() {
@@ -520,8 +524,8 @@ impl<R, C> Barrier<R, C> {
             }
         }
 
-        // A flag may belong to several robots. All of them get news then, so that each one that finds its flag set waits for something
-        // that comes.
+        // A flag may belong to several robots. All of them get news then, so that each one that finds its flag set
+        // waits for something that comes.
         let mut news = Vec::new();
         for (index, (name, member)) in self.members.iter().enumerate() {
             let is_flagged = flags & news_flag(index) != 0;
@@ -541,8 +545,8 @@ impl<R, C> Barrier<R, C> {
         });
     }
 
-    /// Whether a robot is kept from running the tick: it does not run one whose clock says that it has news, and they do not come.
-    /// A robot that is asked to join again does not run it either, and must get to know.
+    /// Whether a robot is kept from running the tick: it does not run one whose clock says that it has news, and they
+    /// do not come. A robot that is asked to join again does not run it either, and must get to know.
     fn is_withheld(&self, name: &RobotName, member: &Member<R, C>) -> bool {
         let attendance = self.attendance.as_ref();
         let is_absent = attendance.is_some_and(|recorded| recorded.absent.contains(name));
@@ -562,8 +566,8 @@ impl<R, C> Barrier<R, C> {
         }
     }
 
-    /// Where the clock goes on without late robots, it does not wait for those that cannot report. It never waits for a report
-    /// that would not count. Where the tick is executed again, its record says which robots those are.
+    /// Where the clock goes on without late robots, it does not wait for those that cannot report. It never waits for
+    /// a report that would not count. Where the tick is executed again, its record says which robots those are.
     fn exclude_unavailable(&mut self) {
         let mut unavailable = Vec::new();
         for (name, member) in &self.members {
@@ -614,14 +618,15 @@ impl<R, C> Barrier<R, C> {
         }
     }
 
-    /// Completes the open tick if no robot is awaited any more. Whatever may have been the last thing that it waited for calls this.
+    /// Completes the open tick if no robot is awaited any more. Whatever may have been the last thing that it waited
+    /// for calls this.
     fn settle(&mut self, out: &mut Vec<Output<R, C>>) {
         if self.phase != Phase::Open || self.members.values().any(Member::is_awaited) {
             return;
         }
 
-        // From here on nothing that arrives can change the tick: reports, tokens and timers ask for the phase, so those that come
-        // between two ticks are for the next one, or stale.
+        // From here on nothing that arrives can change the tick: reports, tokens and timers ask for the phase, so
+        // those that come between two ticks are for the next one, or stale.
         self.phase = Phase::Between;
         if std::mem::take(&mut self.is_announced) {
             out.push(Output::Released);

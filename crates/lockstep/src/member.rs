@@ -1,14 +1,20 @@
-//! A robot of the roster as the barrier knows it: which process has its name, which incarnation takes part, and what has come
-//! from it for the open tick.
+//! A robot of the roster as the barrier knows it: which process has its name, which incarnation takes part, and what
+//! has come from it for the open tick.
 //!
-//! Name and participation are separate, because a process that is admitted takes part later, when its token is declared:
+//! Name and participation are separate, because a process is admitted first and takes part later, when its token is
+//! declared:
 //!
 //! ```text
-//! registration   None --admit--> reserved --token or timer--> not reserved --admit (token gone, or same process)--> …
-//! participation  NotYet --begin_epoch--> Active --miss--> Lost, either --take_in--> Active
-//! successor      NotNeeded --miss or ask--> Requested --admit--> Admitted --take_in--> NotNeeded
-//! reply          Expected --miss--> GivenUp, either --begin_tick or take_reply--> Expected
+//! registration   None --admit--> reserved --token, or timer--> not reserved --admit a successor--> reserved
+//! participation  NotYet --begin_epoch--> Active --miss--> Lost; Active or Lost --take_in--> Active
+//! successor      NotNeeded --miss, ask_to_rejoin--> Requested --admit--> Admitted --take_in--> NotNeeded
+//!                NotNeeded --admit another process--> Admitted; Requested --end_epoch--> NotNeeded
+//! reply          Expected --miss--> GivenUp; either --take_reply, end_epoch--> Expected
 //! ```
+//!
+//! Until `take_in` the predecessor is the one that is active or lost, and its numbers are those of `Incarnation`;
+//! messages are checked against the generation of the registration, so that those of a predecessor are stale from
+//! `admit` on.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -67,8 +73,8 @@ pub struct Attendance {
 pub(crate) struct Member<R, C> {
     /// The process that joined last; it keeps the name from epoch to epoch.
     registration: Option<Registration>,
-    /// Whether a token of this name is declared. It is not said of which process: it may be the one of a predecessor whose lease is
-    /// not over, or of a process that has not asked this simulator to join yet.
+    /// Whether a token of this name is declared. It does not tell of which process: it may be that of a predecessor
+    /// whose lease is not over, or of a process that has not asked this simulator to join yet.
     pub(crate) has_token: bool,
     participation: Participation,
     /// The fault that the scenario has brought upon its process.
@@ -80,10 +86,11 @@ pub(crate) struct Member<R, C> {
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 struct Registration {
     instance: Arc<str>,
-    /// Its incarnation, from 1. Each further process gets the next one, and so does a process that joins again after the clock has
-    /// gone on without it.
+    /// Its incarnation, from 1. Each further process gets the next one, and so does a process that joins again after
+    /// the clock has gone on without it.
     generation: Generation,
-    /// Whether no other process gets the name although no token is declared: it has just been admitted.
+    /// Whether no other process gets the name although no token is declared: it has just been admitted. Without this,
+    /// two processes that start at once would replace each other until one of them is connected.
     is_reserved: bool,
 }
 
@@ -94,7 +101,7 @@ enum Participation {
     NotYet,
     /// The clock waits for it.
     Active(Incarnation),
-    /// The clock goes on without it.
+    /// The clock goes on without it. It stays so until tick 0 of the next epoch, or until a successor is taken in.
     Lost(Incarnation),
 }
 
@@ -114,10 +121,11 @@ struct Incarnation {
 enum Successor {
     /// It goes on.
     NotNeeded,
-    /// The clock has gone on without its process. How many old clocks that still answers is wall clock, so its state must not matter
-    /// any more: it is asked to join again, and takes part as a further incarnation only.
+    /// The clock has gone on without its process. How many old clocks that still answers is wall clock, so its state
+    /// must not matter any more: it is asked to join again, and takes part as a further incarnation only.
     Requested,
-    /// A further incarnation was admitted, the same process or another one, and takes part when its token is declared.
+    /// A further incarnation was admitted, the same process or another one, and takes part when its token is
+    /// declared.
     Admitted,
 }
 
@@ -152,8 +160,8 @@ impl<R, C> Default for TickReply<R, C> {
 }
 
 impl<R, C> Received<R, C> {
-    /// Whether the report is here, and all commands that it states. The count makes the order of arrival irrelevant: any of the
-    /// messages may have been lost and be repeated later.
+    /// Whether the report is here, and all commands that it states. The count makes the order of arrival irrelevant:
+    /// any of the messages may have been lost and be repeated later.
     pub(crate) fn is_complete(&self) -> bool {
         let stated = self.report.as_ref().map(|(stated, _)| *stated);
 
@@ -185,8 +193,6 @@ impl<R, C> Default for Member<R, C> {
 }
 
 impl<R, C> Member<R, C> {
-    // The name.
-
     /// The incarnation that was admitted last; 0 before the first.
     pub(crate) fn generation(&self) -> Generation {
         self.registration.as_ref().map_or(0, |own| own.generation)
@@ -223,8 +229,8 @@ impl<R, C> Member<R, C> {
 
     /// Admits a process. Returns whether it is another one than before.
     ///
-    /// A process that asks again is the same incarnation, so that it can ask as often as it likes: its answer was lost, or it joins
-    /// a further epoch. It is a further one only if it must not go on.
+    /// A process that asks again is the same incarnation, so that it can ask as often as it likes: its answer was
+    /// lost, or it joins a further epoch. It is a further one only if it must not go on.
     pub(crate) fn admit(&mut self, instance: &str) -> bool {
         let own = self.registration.as_ref();
         let is_new = own.is_none_or(|own| *own.instance != *instance);
@@ -239,8 +245,8 @@ impl<R, C> Member<R, C> {
             }
         }
 
-        // What a predecessor has sent for the open tick counts only if all of it is here: its successor cannot complete it, and
-        // messages of the old generation are stale from now on.
+        // What a predecessor has sent for the open tick counts only if all of it is here: its successor cannot
+        // complete it, and messages of the old generation are stale from now on.
         if is_new
             && let TickReply::Expected(received) = &self.reply
             && !received.is_complete()
@@ -250,8 +256,6 @@ impl<R, C> Member<R, C> {
 
         is_new
     }
-
-    // Taking part.
 
     fn incarnation(&self) -> Option<&Incarnation> {
         match &self.participation {
@@ -304,7 +308,8 @@ impl<R, C> Member<R, C> {
         }
     }
 
-    /// Takes part from tick 0 of an epoch. Returns its incarnation.
+    /// The incarnation that was admitted last takes part from the open tick on, as if nothing had been before.
+    /// Returns which it is.
     pub(crate) fn begin_epoch(&mut self) -> Generation {
         let generation = self.generation();
         self.participation = Participation::Active(Incarnation::new(generation));
@@ -321,7 +326,8 @@ impl<R, C> Member<R, C> {
         Some(self.begin_epoch())
     }
 
-    /// Misses the open tick. Returns whether it is lost now; `recorded` is whether it was, where the tick is executed again.
+    /// Misses the open tick. Returns whether it is lost now; `recorded` is whether it was, where the tick is executed
+    /// again.
     pub(crate) fn miss(&mut self, lose_after: u32, recorded: Option<bool>) -> bool {
         self.reply = TickReply::GivenUp;
         let Participation::Active(own) = &mut self.participation else {
@@ -329,8 +335,8 @@ impl<R, C> Member<R, C> {
         };
         own.missed += 1;
 
-        // While the scenario keeps its process stopped, its token goes when the lease is over: that is wall clock and decides
-        // nothing.
+        // While the scenario keeps its process stopped, its token goes when the lease is over: that is wall clock and
+        // decides nothing.
         let is_hung = self.fault == Some(FaultKind::Hang);
         let is_gone = !self.has_token && !is_hung;
         let is_lost = recorded.unwrap_or(own.missed >= lose_after || is_gone);
@@ -387,8 +393,6 @@ impl<R, C> Member<R, C> {
             rejoin: (must_rejoin && self.has_token).then_some(own.generation),
         }
     }
-
-    // The open tick.
 
     /// What has come from it, if further messages of this incarnation count.
     pub(crate) fn received(&mut self, generation: Generation) -> Option<&mut Received<R, C>> {

@@ -1,8 +1,8 @@
 //! A robot's side: from the request to join to the end of the run, tick by tick.
 //!
-//! Two states say where it is, and each kind of input looks at both: [`JoinState`], whether it was admitted and as what, and
-//! [`TickState`], what it does as that. A clock may come again, late or of another epoch, and news without their clock; the robot
-//! runs each tick at most once, in order, and only with the news that belong to it.
+//! Two states say where it is, and each kind of input looks at both: [`JoinState`], whether it was admitted and as
+//! what, and [`TickState`], what it does as that. A clock may come again, late or of another epoch, and news without
+//! their clock; the robot runs each tick at most once, in order, and only with the news that belong to it.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -21,8 +21,8 @@ const JOIN_AGAIN: Duration = Duration::from_millis(100);
 const QUERY_AGAIN: Duration = Duration::from_millis(500);
 /// After this long without an answer people are told for whom the robot waits.
 const WAITING_AFTER: Duration = Duration::from_millis(250);
-/// Most news that are kept while their clock is not here, of the epoch and of later ones each. Only the newest clock is ever
-/// run.
+/// Most news that are kept while their clock is not here, of the epoch and of later ones each. Only the newest clock
+/// is ever run.
 const MAX_NEWS: usize = 4;
 /// A robot that was not queried for this many ticks is followed no more.
 const UNUSED_TICKS: Tick = 64;
@@ -54,9 +54,11 @@ enum JoinState {
 enum TickState<S, C, R> {
     /// It has not run a tick as that yet.
     NotBegun,
-    /// The same, and the tick that it ran before is not done: it cannot be interrupted, so what comes of it is thrown away.
+    /// The same, and the tick that it ran before is not done: it cannot be interrupted, so what comes of it is thrown
+    /// away.
     Discarding,
-    /// It runs a tick.
+    /// It runs a tick. The answer of the one before is not kept: the clock of this tick shows that it has arrived, or
+    /// is not waited for any more.
     Running {
         at: (Epoch, Tick),
         asking: Option<Asking>,
@@ -79,7 +81,8 @@ struct Arrived<N> {
     news: N,
 }
 
-/// A robot's side of the lock-step. `N` is the content of its news, `S` of a state, `C` of a command, `R` of a report.
+/// A robot's side of the lock-step. `N` is the content of its news, `S` of a state, `C` of a command, `R` of a
+/// report.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Participant<N, S, C, R> {
     timeouts: Timeouts,
@@ -120,8 +123,8 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         }
     }
 
-    /// The simulator has admitted the robot. `states` are the last ones of its predecessor, oldest first: other robots may
-    /// still query them.
+    /// The simulator has admitted the robot. `states` are the last ones of its predecessor, oldest first: other
+    /// robots may still query them.
     pub fn admitted(
         &mut self,
         admission: Admission,
@@ -140,7 +143,8 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         };
         self.join = JoinState::Joined(admission);
 
-        // The welcome shows which epoch it is: a clock of a still later one is ignored, and so are its news. Both are repeated.
+        // The welcome shows which epoch it is: a clock of a still later one is ignored, and so are its news. Both are
+        // repeated. Without a clock of this epoch, the one that is pending stays if it is of this epoch.
         let is_present = |clock: &Clock| clock.epoch == admission.epoch;
         self.pending = later
             .filter(is_present)
@@ -159,8 +163,8 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
             self.put_answer(out);
         }
 
-        // Only now: a token that is declared before the welcome would keep the robot's own request from being admitted. It stays
-        // declared for as long as the process lives.
+        // Only now: a token that is declared before the welcome would keep the robot's own request from being
+        // admitted. It stays declared for as long as the process lives.
         if before.is_none() {
             out.push(Action::DeclareToken);
         }
@@ -200,7 +204,7 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
             return;
         }
         let Some(admission) = self.admission() else {
-            return; // The clock is repeated when the token is declared.
+            return; // It is repeated when the token is declared, which is after the welcome.
         };
         let at = (clock.epoch, clock.tick);
         if clock.epoch > admission.epoch {
@@ -218,8 +222,9 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
 
         match &self.tick {
             TickState::Running { at: running, .. } if at <= *running => return,
-            // A clock that was answered comes again because something of the answer was lost. The whole answer is put again, from
-            // memory: the robot must not run a tick twice, since its random numbers and its state have moved on.
+            // A clock that was answered comes again because something of the answer was lost. The whole answer is put
+            // again, from memory: the robot must not run a tick twice, since its random numbers and its state have
+            // moved on.
             TickState::Answered(answer) if at <= answer.at() => {
                 if at == answer.at() {
                     self.put_answer(out);
@@ -228,7 +233,8 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
             }
             _ => {}
         }
-        // One that is pending comes again because its news were lost.
+        // One that is pending comes again because its news were lost. A newer one takes its place: then the clock has
+        // gone on, and the robot misses what is between.
         let pending = self.pending;
         if pending.is_none_or(|pending| at >= (pending.epoch, pending.tick)) {
             self.pending = Some(clock);
@@ -264,6 +270,8 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
             }
         }
 
+        // The news come before their clock on one link, but either may be lost and be repeated, so they wait for each
+        // other here. Those of a tick that runs or is answered are repetitions.
         let is_over = match &self.tick {
             TickState::NotBegun | TickState::Discarding => false,
             TickState::Running { at, .. } => (epoch, tick) <= *at,
@@ -308,7 +316,8 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
             state,
             report,
         }));
-        // While it joins again, it is not known whether the answer is still of its epoch and incarnation: the welcome decides.
+        // While it joins again, it is not known whether the answer is still of its epoch and incarnation: the welcome
+        // decides.
         if let JoinState::Rejoining { holds_answer, .. } = &mut self.join {
             *holds_answer = true;
         } else {
@@ -325,8 +334,8 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         self.states.answer(query)
     }
 
-    /// The state of another robot as of the tick before the one that runs: `None` until it is here. The first call begins a
-    /// query.
+    /// The state of another robot as of the tick before the one that runs: `None` until it is here. The first call
+    /// begins a query.
     pub fn ask(&mut self, of: &RobotName, out: &mut Out<N, S, C, R>) -> Option<S> {
         let TickState::Running { at, asking } = &mut self.tick else {
             return None;
@@ -364,8 +373,9 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
 
     /// Another robot's state arrived, queried or followed.
     pub fn heard(&mut self, of: RobotName, epoch: Epoch, tick: Tick, state: S) {
-        // Only states near the present tick are ever asked for. One of a tick after that under way shows that the clock has
-        // gone on without this robot. It must not take the place of the state that this tick may still ask for.
+        // Only states near the present tick are ever asked for. One of a tick after that under way shows that the
+        // clock has gone on without this robot. It must not take the place of the state that this tick may still ask
+        // for.
         let is_near = match &self.tick {
             TickState::NotBegun | TickState::Discarding => false,
             TickState::Running { at, .. } => {
@@ -378,8 +388,8 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         }
     }
 
-    /// Whether the tick that runs is of no use any more: the run is over, a newer clock is here, the process leaves, or it is
-    /// another incarnation now.
+    /// Whether the tick that runs is of no use any more: the run is over, a newer clock is here, the process leaves,
+    /// or it is another incarnation now.
     #[must_use]
     pub fn is_interrupted(&self) -> bool {
         let is_discarding = matches!(self.tick, TickState::Discarding);
@@ -431,7 +441,8 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         matches!(self.join, JoinState::Left(_))
     }
 
-    /// Whether it waits for an answer to its first request to join: another process does not have its place, as far as it knows.
+    /// Whether it waits for an answer to its first request to join: another process does not have its place, as far
+    /// as it knows.
     #[must_use]
     pub fn is_unanswered(&self) -> bool {
         let unanswered = JoinState::Joining {
@@ -467,8 +478,9 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         }
     }
 
-    /// The same process, in the next epoch or as a further incarnation. The welcome decides which, if any: that it was asked to may
-    /// be old, and a clock of a later epoch a stray one. Until then it answers no clock but the one that it runs.
+    /// The same process, in the next epoch or as a further incarnation. The welcome decides which, if any: that it
+    /// was asked to may be old, and a clock of a later epoch a stray one. Until then it answers no clock but the one
+    /// that it runs.
     fn join_again(&mut self, out: &mut Out<N, S, C, R>) {
         if let JoinState::Joined(admission) = self.join {
             self.join = JoinState::Rejoining {
@@ -482,8 +494,8 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
 
     /// Forgets what it was.
     fn start_over(&mut self) {
-        // The robot cannot be interrupted in the middle of a tick: what comes of it is discarded by `done`, and until then no other
-        // tick begins.
+        // The robot cannot be interrupted in the middle of a tick: what comes of it is discarded by `done`, and until
+        // then no other tick begins.
         self.tick = match self.tick {
             TickState::Running { .. } | TickState::Discarding => TickState::Discarding,
             TickState::NotBegun | TickState::Answered(_) => TickState::NotBegun,
@@ -508,12 +520,14 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
             return; // They were lost: both are repeated.
         }
 
-        // The clock is taken before anything else: a repetition that arrives from now on finds the tick running, and not pending.
+        // The clock is taken before anything else: a repetition that arrives from now on finds the tick running, and
+        // not pending.
         self.pending = None;
         let arrived = self.news.remove(&at);
         self.news.retain(|of, _| *of > at);
         let joined = arrived.as_ref().and_then(|arrived| arrived.joined);
-        // A clock of tick 0 may be from before this incarnation: only the first one takes part in it without being named.
+        // A clock of tick 0 may be from before this incarnation: only the first one takes part in it without being
+        // named.
         let is_first = admission.generation == 1;
         let is_named = joined == Some(admission.generation);
         let begin = if has_begun {

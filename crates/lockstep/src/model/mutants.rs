@@ -1,5 +1,5 @@
-//! Wrong simulators and robots: [`Barrier`] and [`Participant`] behind a wrapper that alters what goes in or what comes out, so
-//! that they behave as if one rule were missing. Without a [`Mutant`] the wrappers change nothing.
+//! Wrong simulators and robots: [`Barrier`] and [`Participant`] behind a wrapper that alters what goes in or what
+//! comes out, so that they behave as if one rule were missing. Without a [`Mutant`] the wrappers change nothing.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Deref;
@@ -233,9 +233,10 @@ impl Simulator {
             let sent = self.messages.iter();
             commands = sent.filter(|(of, at, _)| (of, *at) == own).count() as u32;
         }
-        self.receive(from, stamp, Message::Report(commands, report.clone()), out);
+        let forged = self.is(Mutant::CompletesEarly).then(|| report.clone());
+        self.receive(from, stamp, Message::Report(commands, report), out);
 
-        if self.is(Mutant::CompletesEarly) {
+        if let Some(report) = forged {
             let roster: Vec<RobotName> = self.roster().cloned().collect();
             for name in roster {
                 let (generation, _) = self.presence(&name);
