@@ -218,16 +218,7 @@ impl Bus {
         keys: &str,
         handle: impl Fn(&str, &[u8]) + Send + Sync + 'static,
     ) -> Result<Declared, BusError> {
-        let declared = self
-            .session
-            .declare_subscriber(keys)
-            .callback(move |sample: Sample| {
-                handle(sample.key_expr().as_str(), &sample.payload().to_bytes());
-            })
-            .wait();
-
-        let declared = used("subscribe to", keys, declared)?;
-        Ok(Declared::new(declared))
+        self.subscribe_with_qos(keys, move |key, bytes, _| handle(key, bytes))
     }
 
     /// Like [`Self::subscribe`], with the quality of service of each message.
@@ -303,14 +294,7 @@ impl Bus {
         body: Option<Vec<u8>>,
         timeout: Duration,
     ) -> Result<Option<Reply>, BusError> {
-        let replies: FifoChannelHandler<zenoh::query::Reply> = used(
-            "ask",
-            key,
-            self.query(key, parameters, body, timeout)?
-                .with(zenoh::handlers::FifoChannel::new(8))
-                .wait(),
-        )?;
-
+        let replies = self.replies(key, parameters, body, timeout)?;
         while let Ok(reply) = replies.recv() {
             if let Some(answer) = Reply::read(reply) {
                 return Ok(Some(answer));
@@ -331,19 +315,28 @@ impl Bus {
         parameters: &str,
         timeout: Duration,
     ) -> Result<Vec<Reply>, BusError> {
-        let replies: FifoChannelHandler<zenoh::query::Reply> = used(
-            "ask",
-            key,
-            self.query(key, parameters, None, timeout)?
-                .with(zenoh::handlers::FifoChannel::new(64))
-                .wait(),
-        )?;
+        let replies = self.replies(key, parameters, None, timeout)?;
         let mut all = Vec::new();
         while let Ok(reply) = replies.recv() {
             all.extend(Reply::read(reply));
         }
 
         Ok(all)
+    }
+
+    /// Sends a query to all queryables, and receives their replies.
+    fn replies(
+        &self,
+        key: &str,
+        parameters: &str,
+        body: Option<Vec<u8>>,
+        timeout: Duration,
+    ) -> Result<FifoChannelHandler<zenoh::query::Reply>, BusError> {
+        let replies = self
+            .query(key, parameters, body, timeout)?
+            .with(zenoh::handlers::FifoChannel::new(64))
+            .wait();
+        used("ask", key, replies)
     }
 
     /// Sends a query and calls `then` with the one reply, or with `None` if none arrives within [`QUERY_TIMEOUT`]. `then`

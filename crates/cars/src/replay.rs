@@ -14,7 +14,7 @@ use record::RunLock;
 use record::names::ENDPOINT;
 use record::{EpochFiles, RunFolder};
 use recording::Recording;
-use simulator::server::{Event, Options, REPEAT_AFTER, Server, Stay};
+use simulator::server::{Options, REPEAT_AFTER, Server, Stay};
 use terminal::OutputError;
 
 /// `cars replay`.
@@ -70,8 +70,7 @@ pub(crate) fn replay(args: &ReplayArgs) -> miette::Result<ExitCode> {
         repeat_after: REPEAT_AFTER,
     };
     let server = Server::replay(bus, recording, options).into_diagnostic()?;
-    let send = server.sender();
-    ctrlc::set_handler(move || send(Event::Terminate)).into_diagnostic()?;
+    ctrlc::set_handler(server.stopper()).into_diagnostic()?;
 
     let endpoint = connectable(&args.listen);
     // Nothing is written through a link.

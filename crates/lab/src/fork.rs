@@ -13,7 +13,7 @@ use scenario::Scenario;
 use simulator::Recorder;
 
 use crate::reexecution::{Reexecution, cannot_go_on};
-use crate::run::{check_faults, check_parameters, go_on, observed};
+use crate::run::{check_faults, check_parameters, go_on, observe};
 
 /// Tables of a scenario that hold for the whole run and can be other ones in a fork.
 const OF_THE_RUN: [&str; 2] = ["duration", "record"];
@@ -124,7 +124,7 @@ impl Fork<'_> {
             let recorded = record.next_entry()?;
             let recorded = recorded.ok_or_else(|| miette!("the record has become shorter"))?;
             let executed = again.play(&recorded)?;
-            recorder.observe(observed(&again.local, &executed.record, opened));
+            observe(&mut recorder, &again.local, &executed.record, opened);
             recorder.write(&again.local.simulation, &executed.record)?;
             check_same(&recorded, &executed.into_entry())?;
             if recorded.tick == self.tick {
@@ -134,7 +134,7 @@ impl Fork<'_> {
 
         let mut local = again.end().map_err(|robot| cannot_go_on(&robot))?;
         go_on(&mut local, run, |local, record, opened| {
-            recorder.observe(observed(local, record, opened));
+            observe(&mut recorder, local, record, opened);
             recorder.write(&local.simulation, record)?;
             Ok(())
         })?;

@@ -12,7 +12,6 @@ use recording::panel_ticks;
 use robot::{LocalHost, Robot, Welcome};
 use scenario::FaultEnd;
 use scenario::Scenario;
-use simulator::recorder::Observed;
 use simulator::{Recorder, Simulation, TickRecord};
 
 /// Longest sleep of a run that is not as fast as possible, before it looks whether it is to go on.
@@ -53,9 +52,7 @@ pub fn execute_with(
             Some(recorder) => recorder,
             none => none.insert(Recorder::begin(folder, run, simulation)?),
         };
-        if recorder.is_recording() {
-            recorder.observe(observed(local, record, opened));
-        }
+        observe(recorder, local, record, opened);
         recorder.write(simulation, record)?;
         goes_on()?;
         if let Some(speed) = speed {
@@ -70,24 +67,25 @@ pub fn execute_with(
     Ok(recorder.finish(&simulation)?)
 }
 
-/// What is observed of a tick for the recording: panels as often as they are shown, and that of a robot whose emotion or behavior
-/// has changed.
-pub(crate) fn observed(local: &Local, record: &TickRecord, opened: Instant) -> Observed {
+/// Observes a tick for the recording: panels as often as they are shown, and that of a robot whose emotion or behavior has
+/// changed.
+pub(crate) fn observe(
+    recorder: &mut Recorder,
+    local: &Local,
+    record: &TickRecord,
+    opened: Instant,
+) {
+    let Some(observed) = recorder.observed() else {
+        return;
+    };
+    observed.opened = Some(opened);
+
     let scenario = local.simulation.scenario();
     let is_due = record.tick.is_multiple_of(panel_ticks(scenario.tick_s));
-    let mut panels = BTreeMap::new();
     if scenario.record.has_panels() {
-        panels = local
+        observed.panels = local
             .robots
             .panels(|robot| is_due || has_changed(robot, record));
-    }
-
-    Observed {
-        opened,
-        reports: BTreeMap::new(),
-        awaited: Vec::new(),
-        late: Vec::new(),
-        panels,
     }
 }
 

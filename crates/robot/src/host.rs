@@ -261,7 +261,7 @@ impl Host {
         self.declare_parameters_check(name)
     }
 
-    /// Declares the queryable at which a robot says whether it could work with other parameters, if it can tell.
+    /// Declares the queryable that checks whether a robot could work with other parameters, if the robot has such a check.
     fn declare_parameters_check(&mut self, name: &RobotName) -> Result<(), BusError> {
         let robot = self
             .members
@@ -405,7 +405,15 @@ impl Host {
             unreachable!("a robot runs after its welcome");
         };
 
-        let mut network = HostNetwork::new(self, name, turn);
+        let mut network = HostNetwork {
+            host: self,
+            name,
+            query: StateQuery {
+                tick: Some(turn.tick),
+                epoch: Some(turn.epoch),
+            },
+            failed: None,
+        };
         let outcome = runner.run(turn, &mut network);
         if let Some(failed) = network.failed.take() {
             return Err(failed);
@@ -608,20 +616,6 @@ struct HostNetwork<'a> {
     query: StateQuery,
     /// Why the host cannot go on.
     failed: Option<HostError>,
-}
-
-impl<'a> HostNetwork<'a> {
-    fn new(host: &'a mut Host, name: &'a RobotName, turn: &Turn<News>) -> Self {
-        Self {
-            host,
-            name,
-            query: StateQuery {
-                tick: Some(turn.tick),
-                epoch: Some(turn.epoch),
-            },
-            failed: None,
-        }
-    }
 }
 
 impl Network for HostNetwork<'_> {

@@ -14,7 +14,7 @@ use protocol::messages::End;
 use record::names::{ENDPOINT, OPERATOR_CONFIG};
 use record::{IfTaken, RunFolder, RunLock, Summary};
 use scenario::{Changes, Override, Scenario};
-use simulator::server::{Event, Options, REPEAT_AFTER, ReplayLog, Server, Stay};
+use simulator::server::{Options, REPEAT_AFTER, ReplayLog, Server, Stay};
 use terminal::ADDRESS_TAKEN;
 
 /// The simulator of the Cooperative Affective Robot Simulator: owns the environment and the clock of one run.
@@ -153,8 +153,7 @@ fn run(args: &Args) -> miette::Result<ExitCode> {
         repeat_after: REPEAT_AFTER,
     };
     let server = Server::open(bus, scenario, options, &folder, past).into_diagnostic()?;
-    let send = server.sender();
-    ctrlc::set_handler(move || send(Event::Terminate)).into_diagnostic()?;
+    ctrlc::set_handler(server.stopper()).into_diagnostic()?;
 
     if let Some(file) = &args.operator_config {
         let path = std::path::absolute(file).into_diagnostic()?;

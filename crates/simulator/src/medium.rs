@@ -228,6 +228,7 @@ impl Medium {
 
     /// Begins and ends partitions.
     fn update_cuts(&mut self, tick: Tick, events: &mut Vec<Event>) {
+        // Links that are cut are compared with partitions that may have changed by hand, so that each change is one event.
         if self.network.partitions.is_empty() && self.cut.is_empty() {
             return;
         }
@@ -288,6 +289,8 @@ impl Medium {
                     continue;
                 };
 
+                // A link that gets bursts in the middle of a run is good then, and draws from the beginning of its stream: the tick of
+                // the change is in the record, so a run that is executed again does the same.
                 let seed = self.seed;
                 let state = self
                     .bursts
@@ -374,6 +377,7 @@ impl Medium {
             text: Some(command.text.command.clone()),
             ..on_the_link.clone()
         };
+        // All links are counted: a change may name a command by its number later. Of texts only those that are named.
         self.counts.entry(on_the_link.clone()).or_default();
 
         let mut is_named = false;
@@ -405,6 +409,7 @@ impl Medium {
 
     fn deliver(&mut self, tick: Tick, decision: &mut Decision) {
         let mut arrivals = self.arrivals.remove(&tick).unwrap_or_default();
+        // Some were decided in earlier ticks: the order in which a target reads them must not show when.
         arrivals.sort_by(|(one, _), (other, _)| {
             (&one.to, &one.from, one.seq).cmp(&(&other.to, &other.from, other.seq))
         });
@@ -446,6 +451,7 @@ impl Medium {
         }
 
         for (asker, target) in pairs(&self.roster) {
+            // Nothing is drawn in turn, so it does not matter for which pairs, and in which ticks, this is reached.
             let answer_is_cut = self.is_cut(&target, &asker, Kind::Queries);
             let name = format!("medium/query/{tick}/{asker}/{target}");
             let drawn = unit(&mut stream(self.seed, &name));

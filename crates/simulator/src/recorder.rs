@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use config::FileError;
 use protocol::event::log_line;
 use protocol::messages::{Awaited, LogRecord, Panel, Report};
-use protocol::{Line, PROTOCOL_VERSION, RobotName, RunName};
+use protocol::{Line, PROTOCOL_VERSION, RobotName, RunName, Tick};
 use recording::content::Missed;
 use recording::{Frame, Header, PlacedRobot, TickView, Wall, WriteError, Writer};
 
@@ -79,19 +79,61 @@ impl Lines {
     }
 }
 
-/// What was observed of a tick beside its record. It differs from run to run, and nothing compares it.
-#[derive(Debug)]
+/// What is observed of the tick in progress beside its record. It differs from run to run, and nothing compares it.
+#[derive(Debug, Default)]
 pub struct Observed {
-    /// When the tick was opened.
-    pub opened: Instant,
-    /// When the report of each robot arrived.
-    pub reports: BTreeMap<RobotName, Instant>,
+    /// When the tick was opened; `None` if its times are not recorded.
+    pub opened: Option<Instant>,
+    /// The tick of the last report of each robot, and when the first one of that tick arrived.
+    reports: BTreeMap<RobotName, (Tick, Instant)>,
     /// Robots for which the clock was held.
     pub awaited: Vec<Awaited>,
     /// Lines of the log about that.
-    pub late: Vec<LogRecord>,
+    late: Vec<LogRecord>,
     /// The newest panel of each robot from which one arrived.
     pub panels: BTreeMap<RobotName, Panel>,
+}
+
+/// Most lines about one tick, of those for whom the clock is held, that are recorded: robots can cause any number.
+const MAX_LATE_LINES: usize = 64;
+
+impl Observed {
+    /// A robot's report arrives now. A report that is repeated, because its clock was, arrived when it did first.
+    pub fn report(&mut self, robot: &RobotName, tick: Tick) {
+        let is_known = self.reports.get(robot).is_some_and(|last| last.0 == tick);
+        if !is_known {
+            self.reports.insert(robot.clone(), (tick, Instant::now()));
+        }
+    }
+
+    /// People were told for which robots the clock is held, or that it goes on.
+    pub fn late(&mut self, line: LogRecord) {
+        if self.late.len() < MAX_LATE_LINES {
+            self.late.push(line);
+        }
+    }
+
+    /// Takes the times of a tick that is complete now, and what is about it alone.
+    fn take(&mut self, tick: Tick, begun: Instant) -> (Wall, BTreeMap<RobotName, Panel>) {
+        let panels = std::mem::take(&mut self.panels);
+        let Some(opened) = self.opened.take() else {
+            return (Wall::default(), panels);
+        };
+
+        let since = |time: Instant| time.saturating_duration_since(begun).as_nanos() as u64;
+        let reports = self.reports.iter();
+        let wall = Wall {
+            opened_ns: since(opened),
+            completed_ns: since(Instant::now()),
+            reports_ns: reports
+                .filter(|(_, (reported, _))| *reported == tick)
+                .map(|(robot, (_, arrived))| (robot.clone(), since(*arrived)))
+                .collect(),
+            awaited: std::mem::take(&mut self.awaited),
+            late: std::mem::take(&mut self.late),
+        };
+        (wall, panels)
+    }
 }
 
 /// A tick that was noted and is not written: all that writing it needs beside the frame.
@@ -116,7 +158,7 @@ pub struct Recorder {
     /// What was noted and is not written.
     noted: Option<PendingTick>,
     begun: Instant,
-    /// Of the tick that is written next.
+    /// Of the tick that is noted next, if every tick is recorded.
     observed: Option<Observed>,
     sync: SyncPoint,
     synced_at: Instant,
@@ -211,11 +253,11 @@ impl Recorder {
             events: Lines::create(folder.file(&format!("{EVENTS}{suffix}")))?,
             seal: Seal::default(),
             log,
+            observed: recording.is_some().then(Observed::default),
             recording,
             frame: Frame::default(),
             noted: None,
             begun: Instant::now(),
-            observed: None,
             sync: record.sync,
             synced_at: Instant::now(),
             summary: simulation.begin_summary(run),
@@ -228,6 +270,8 @@ impl Recorder {
     /// # Errors
     /// [`FileError`] if a file cannot be written or renamed.
     pub fn supersede_record(&mut self) -> Result<(), FileError> {
+        // All drafts are on the disk before the first takes the place of a file: a crash in between leaves the events of one and the
+        // recording of the other, which are the same up to the end of the older one.
         self.write_noted()?;
         self.sync()?;
         for name in std::mem::take(&mut self.drafts) {
@@ -238,15 +282,10 @@ impl Recorder {
         Ok(())
     }
 
-    /// Whether every tick is recorded, so that [`Recorder::observe`] is of use.
+    /// What is observed of the tick that is noted next; `None` if ticks are not recorded.
     #[must_use]
-    pub fn is_recording(&self) -> bool {
-        self.recording.is_some()
-    }
-
-    /// Notes what was observed of the tick that is written next.
-    pub fn observe(&mut self, observed: Observed) {
-        self.observed = Some(observed);
+    pub fn observed(&mut self) -> Option<&mut Observed> {
+        self.observed.as_mut()
     }
 
     /// Writes a tick. Returns the lines of the log, for observers.
@@ -281,12 +320,9 @@ impl Recorder {
             simulation.count(&mut self.summary, record.tick, event);
             lines.extend(event.log_record(simulation.epoch(), record.tick, tick_s));
         }
-        let mut wall = Wall::default();
-        let mut panels = BTreeMap::new();
-        if let Some(observed) = self.observed.take() {
-            wall = wall_times(self.begun, &observed);
-            panels = observed.panels;
-        }
+        let observed = self.observed.as_mut();
+        let taken = observed.map(|observed| observed.take(record.tick, self.begun));
+        let (wall, panels) = taken.unwrap_or_default();
         let mut reports = Vec::new();
         if self.recording.is_some() && !record.is_end() {
             set_frame(&mut self.frame, simulation, record);
@@ -329,6 +365,7 @@ impl Recorder {
             finish(recording, &noted.record).map_err(|error| unrecordable(&error))?;
         }
 
+        // Events before what is written beside them: what a reader sees of a tick elsewhere has its events.
         for line in noted.record.lines() {
             self.add_event(&line)?;
         }
@@ -552,19 +589,4 @@ fn set_frame(frame: &mut Frame, simulation: &Simulation, record: &TickRecord) {
     frame.cuts = simulation.cuts();
     frame.unreachable.clone_from(simulation.unreachable());
     frame.expectations = simulation.standings();
-}
-
-/// The times of a tick that is complete now.
-fn wall_times(begun: Instant, observed: &Observed) -> Wall {
-    let since = |time: Instant| time.saturating_duration_since(begun).as_nanos() as u64;
-    let reports = observed.reports.iter();
-    Wall {
-        opened_ns: since(observed.opened),
-        completed_ns: since(Instant::now()),
-        reports_ns: reports
-            .map(|(robot, arrived)| (robot.clone(), since(*arrived)))
-            .collect(),
-        awaited: observed.awaited.clone(),
-        late: observed.late.clone(),
-    }
 }

@@ -1,7 +1,7 @@
 //! The simulator as a process: it translates between the bus, the lock-step ([`lockstep::Barrier`]) and the
 //! [`Simulation`](crate::Simulation).
 //!
-//! A [`Server`] has one [`bus::Inbox`]. Everything that can happen is an [`Event`], and one thread at a time works on them: the
+//! A [`Server`] has one [`bus::Inbox`]. Everything that can happen is an event, and one thread at a time works on them: the
 //! one on which an event arrives, or the server's own. Control is answered in the same way, also while the clock is held, because
 //! no work ever waits for a robot.
 //!
@@ -31,11 +31,12 @@ mod rejoins;
 mod replay_log;
 mod requests;
 mod source;
+mod ticks;
 mod timers;
 mod viewers;
 mod watchdog;
 
-pub use event::{Event, ServerError};
+pub use event::ServerError;
 pub use live::LiveRun;
 pub use options::{Options, REPEAT_AFTER, Stay};
 pub use process::Server;

@@ -2,7 +2,6 @@
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
-use std::collections::BTreeMap;
 use std::convert::Infallible;
 use std::path::Path;
 use std::sync::Arc;
@@ -16,7 +15,6 @@ use record::RunLock;
 use record::names::{EVENTS, RECORDING};
 use scenario::Scenario;
 use scenario::diagnostic::Source;
-use simulator::recorder::Observed;
 use simulator::{Recorder, Simulation};
 
 /// Robots that miss every tick.
@@ -112,13 +110,7 @@ fn a_tick_is_complete_when_it_is_noted_and_not_when_it_is_written() {
     let mut recorder = Recorder::begin(&folder, &run(), &simulation).unwrap();
     let opened = Instant::now();
     let tick = simulation.init(&mut Absent).unwrap();
-    recorder.observe(Observed {
-        opened,
-        reports: BTreeMap::new(),
-        awaited: Vec::new(),
-        late: Vec::new(),
-        panels: BTreeMap::new(),
-    });
+    recorder.observed().unwrap().opened = Some(opened);
     recorder.note(&simulation, &tick).unwrap();
     let most = opened.elapsed();
 

@@ -73,10 +73,10 @@ impl LiveRun {
         waited_for
     }
 
-    /// Ends a run that has not ended yet, and writes what came of it.
-    fn end(&mut self, end: End, frontend: &mut Frontend) -> Result<(), FileError> {
-        if self.epoch.record.is_closed() {
-            return Ok(());
+    /// Ends the run, if it has not ended yet, and writes what came of it.
+    fn end(&mut self, end: End, frontend: &mut Frontend) -> Result<Summary, FileError> {
+        if let EpochRecord::Closed(summary) = &self.epoch.record {
+            return Ok(summary.as_ref().clone());
         }
         frontend.pace.end();
         self.answer_stepping(frontend);
@@ -91,12 +91,12 @@ impl LiveRun {
         }
         let epoch = &mut self.epoch;
         let wall = std::mem::take(&mut epoch.wall);
-        let lines = epoch
+        let (lines, summary) = epoch
             .record
             .close(end, waited_for, &mut epoch.simulation, wall)?;
         frontend.observers.log(&lines);
         self.put_frame(frontend);
-        Ok(())
+        Ok(summary)
     }
 
     /// Whether the process stays now that the run is over.
@@ -143,17 +143,9 @@ impl LiveRun {
         end: End,
         mut frontend: Frontend,
     ) -> Result<Summary, ServerError> {
-        let ended = self.end(end, &mut frontend);
-        let summary = match &self.epoch.record {
-            EpochRecord::Closed(summary) => Some(summary.as_ref().clone()),
-            EpochRecord::Open(_) => None,
-        };
+        let summary = self.end(end, &mut frontend);
         self.leave(end, frontend)?;
-        ended?;
-        match summary {
-            Some(summary) => Ok(summary),
-            None => unreachable!("a record that could be written is closed"),
-        }
+        Ok(summary?)
     }
 
     /// Puts the end of the run, and ends this side of the contract when the robots have left.

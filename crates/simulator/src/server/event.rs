@@ -8,67 +8,38 @@ use record::difference::Difference;
 use recording::RecordingError;
 use scenario::Scenario;
 
-/// Everything that can happen to a server.
-pub enum Event {
+/// Everything that can happen to a server. Robots are those that the keys name.
+pub(super) enum Event {
     /// A robot has done its tick.
-    Report {
-        /// The robot that the key names.
-        robot: String,
-        /// What it put.
-        report: Report,
-    },
+    Report(String, Report),
     /// A robot, or the operator, sent a command.
     Command {
-        /// The sender that the key names.
         from: String,
-        /// The target that the key names.
         to: String,
-        /// What was put.
         command: Command,
     },
     /// A robot waits for another robot's answer.
-    Waiting {
-        /// The robot that the key names.
-        robot: String,
-        /// What it put.
-        waiting: Waiting,
-    },
+    Waiting(String, Waiting),
     /// A robot shows a panel.
-    Panel {
-        /// The robot that the key names.
-        robot: String,
-        /// What it put.
-        panel: Panel,
-    },
+    Panel(String, Panel),
     /// A message that cannot be decoded.
     Malformed(Malformed),
     /// A robot asks to take part.
     Join(Query),
     /// An operator asks for something.
     Control(Query),
-    /// Robots have been asked about the parameters that an operator wants to set.
+    /// Robots have been asked about the parameters that a request sets; a refusal is the reason of one of them.
     Offered {
-        /// The request.
         query: Query,
-        /// What it asks for.
-        control: Box<Control>,
-        /// Why a robot refuses its parameters, if one does.
+        control: Control,
         refusal: Option<String>,
     },
     /// An observer asks for the state of a robot of a recording.
     State(RobotName, Query),
     /// A robot's liveliness token was declared or undeclared.
-    Token {
-        /// The robot that the key names.
-        robot: String,
-        /// Whether it is declared.
-        is_present: bool,
-    },
+    Token { robot: String, is_present: bool },
     /// A console declares, or declares no more, that a browser shows the run.
-    Viewer {
-        /// Whether one does.
-        is_present: bool,
-    },
+    Viewer { is_present: bool },
     /// The process is asked to end.
     Terminate,
 }

@@ -16,7 +16,7 @@ use super::orders::PendingOrders;
 pub(super) const TIMEOUT: Duration = Duration::from_secs(30);
 /// Longest wait for a launcher to subscribe: it starts the simulator first, and a fast run may be ahead of it.
 const LAUNCHER_TIMEOUT: Duration = Duration::from_secs(10);
-/// How often to check whether what the clock is held for has happened: a robot that goes or comes back sends no event.
+/// How often to check whether what the clock is held for has happened.
 pub(super) const POLL_INTERVAL: Duration = Duration::from_millis(20);
 /// A robot whose hang is over is asked to join again this often, and counts as back when it has joined.
 pub(super) const REJOIN_INTERVAL: Duration = Duration::from_millis(100);

@@ -2,7 +2,7 @@
 
 use bus::{Bus, BusError, Declared, Inbox, OnArrival, Query};
 use protocol::keys::Keys;
-use protocol::messages::{ControlAnswer, FieldError, Status};
+use protocol::messages::ControlAnswer;
 use protocol::{Message, RunName, decode, encode};
 
 use super::event::Event;
@@ -98,43 +98,17 @@ impl Frontend {
     }
 }
 
-/// Why something is not done.
-pub(super) struct Refusal {
-    pub(super) explanation: String,
-    pub(super) fields: Vec<FieldError>,
-}
-
-impl From<String> for Refusal {
-    fn from(explanation: String) -> Self {
-        Self {
-            explanation,
-            fields: Vec::new(),
-        }
-    }
-}
-
-impl From<Refusal> for ControlAnswer {
-    fn from(
-        Refusal {
-            explanation,
-            fields,
-        }: Refusal,
-    ) -> Self {
-        Self::Refused {
-            explanation,
-            fields,
-        }
+/// The answer to a request that is not done, for this reason.
+pub(super) fn refused(explanation: String) -> ControlAnswer {
+    ControlAnswer::Refused {
+        explanation,
+        fields: Vec::new(),
     }
 }
 
 /// Refuses a request with the reason.
 pub(super) fn refuse(query: &Query, explanation: &str) {
-    answer(query, &Refusal::from(explanation.to_owned()).into());
-}
-
-/// Answers a request with how things stand.
-pub(super) fn answer_status(query: &Query, status: Status) {
-    answer(query, &ControlAnswer::Done(Box::new(status)));
+    answer(query, &refused(explanation.to_owned()));
 }
 
 pub(super) fn answer(query: &Query, answer: &ControlAnswer) {

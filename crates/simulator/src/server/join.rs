@@ -9,29 +9,14 @@ use protocol::{PROTOCOL_VERSION, RobotName, RunName, decode, encode};
 use super::frontend::Frontend;
 use super::live::LiveRun;
 
-/// Why a robot may not take part.
-struct NotAdmitted {
-    reason: Refusal,
-    explanation: String,
-}
-
-impl NotAdmitted {
-    fn new(reason: Refusal, explanation: impl Into<String>) -> Self {
-        Self {
-            reason,
-            explanation: explanation.into(),
-        }
-    }
-}
+/// Why a robot may not take part, for programs and for people.
+type NotAdmitted = (Refusal, String);
 
 impl LiveRun {
     pub(super) fn on_join(&mut self, query: &Query, frontend: &Frontend) {
         let answer = match self.judge_join(query, &frontend.run) {
             Ok(answer) => answer,
-            Err(NotAdmitted {
-                reason,
-                explanation,
-            }) => {
+            Err((reason, explanation)) => {
                 tracing::info!("refused a robot: {explanation}");
                 JoinAnswer::Refused {
                     reason,
@@ -45,7 +30,7 @@ impl LiveRun {
 
     fn judge_join(&mut self, query: &Query, run: &RunName) -> Result<JoinAnswer, NotAdmitted> {
         let request: JoinRequest = decode(query.key(), "a robot", &query.body())
-            .map_err(|error| NotAdmitted::new(Refusal::Malformed, error.to_string()))?;
+            .map_err(|error| (Refusal::Malformed, error.to_string()))?;
         check_request(query, &request, run)?;
 
         let name = &request.name;
@@ -75,21 +60,18 @@ impl LiveRun {
 
     fn explain(&self, refused: Refused, name: &RobotName, run: &RunName) -> NotAdmitted {
         match refused {
-            Refused::Ended => {
-                let explanation = format!("run {run} is over");
-                NotAdmitted::new(Refusal::Ended, explanation)
-            }
-            Refused::NameTaken => {
-                let explanation = format!("another living process is {name} already");
-                NotAdmitted::new(Refusal::NameTaken, explanation)
-            }
+            Refused::Ended => (Refusal::Ended, format!("run {run} is over")),
+            Refused::NameTaken => (
+                Refusal::NameTaken,
+                format!("another living process is {name} already"),
+            ),
             Refused::UnknownName => {
                 let roster: Vec<&str> = self.barrier.roster().map(RobotName::as_str).collect();
                 let explanation = format!(
                     "no robot of this run is called {name}; its robots are {}",
                     roster.join(", ")
                 );
-                NotAdmitted::new(Refusal::UnknownName, explanation)
+                (Refusal::UnknownName, explanation)
             }
         }
     }
@@ -103,18 +85,18 @@ fn check_request(query: &Query, request: &JoinRequest, run: &RunName) -> Result<
     let asker = Keys::joins_as(query.key());
     if let Some(asker) = asker.filter(|asker| *asker != name.as_str()) {
         let explanation = format!("{asker} cannot join as {name}");
-        return Err(NotAdmitted::new(Refusal::Malformed, explanation));
+        return Err((Refusal::Malformed, explanation));
     }
     if request.protocol != PROTOCOL_VERSION {
         let explanation = format!(
             "{name} speaks version {} of the protocol, this simulator version {PROTOCOL_VERSION}: update the older one",
             request.protocol
         );
-        return Err(NotAdmitted::new(Refusal::OtherProtocol, explanation));
+        return Err((Refusal::OtherProtocol, explanation));
     }
     if request.run != *run {
         let explanation = format!("{name} means run {}, this is run {run}", request.run);
-        return Err(NotAdmitted::new(Refusal::OtherRun, explanation));
+        return Err((Refusal::OtherRun, explanation));
     }
 
     Ok(())

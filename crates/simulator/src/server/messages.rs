@@ -6,47 +6,12 @@ use lockstep::{Sent, Stamp};
 use protocol::RobotName;
 use protocol::messages::{Command, Panel, Report, Waiting};
 
-use super::event::{Event, Interrupt};
-use super::frontend::{Frontend, refuse};
 use super::live::LiveRun;
 
 /// Most commands of the operator that wait for the next tick.
 const MAX_OPERATOR_COMMANDS: usize = 1024;
 
 impl LiveRun {
-    /// One event. The arms call; they do not decide.
-    pub(super) fn on_event(
-        &mut self,
-        event: Event,
-        frontend: &mut Frontend,
-    ) -> Result<(), Interrupt> {
-        match event {
-            Event::Report { robot, report } => self.on_report(&robot, report),
-            Event::Command { from, to, command } => self.on_command(&from, &to, command),
-            Event::Waiting { robot, waiting } => self.on_waiting(&robot, &waiting),
-            Event::Panel { robot, panel } => self.on_panel(&robot, panel),
-            Event::Malformed(error) => self.ignore("malformed", &error.to_string()),
-            Event::Join(query) => self.on_join(&query, frontend),
-            Event::Token { robot, is_present } => self.on_token(&robot, is_present),
-            Event::Viewer { is_present } => self.viewers.note(is_present),
-            Event::Offered {
-                query,
-                control,
-                refusal: None,
-            } => self.on_accepted(query, &control, frontend)?,
-            Event::Offered {
-                query,
-                refusal: Some(reason),
-                ..
-            } => refuse(&query, &reason),
-            Event::Control(_) | Event::Terminate | Event::State(..) => {
-                unreachable!("the same for all sources, or of a recording")
-            }
-        }
-
-        Ok(())
-    }
-
     /// Counts a message that changes nothing, and logs it once in a while.
     pub(super) fn ignore(&mut self, reason: &str, text: &str) {
         let ignored = &mut self.epoch.wall.ignored;
@@ -69,12 +34,14 @@ impl LiveRun {
         name
     }
 
-    fn on_report(&mut self, robot: &str, report: Report) {
+    pub(super) fn on_report(&mut self, robot: &str, report: Report) {
         let Some(name) = self.known(robot) else {
             return;
         };
         let epoch = &mut self.epoch;
-        epoch.record.observe_report(&name, report.tick);
+        if let Some(observed) = epoch.record.observed() {
+            observed.report(&name, report.tick);
+        }
         let stamp = Stamp::from(&report);
         let is_of_epoch = stamp.epoch == epoch.simulation.epoch();
         if is_of_epoch && self.barrier.is_behind(&name, stamp.generation) {
@@ -85,13 +52,15 @@ impl LiveRun {
             .report(&name, stamp, commands, Arc::new(report), &mut self.outputs);
     }
 
-    fn on_panel(&mut self, robot: &str, panel: Panel) {
-        if let Some(name) = self.known(robot) {
-            self.epoch.record.observe_panel(name, panel);
+    pub(super) fn on_panel(&mut self, robot: &str, panel: Panel) {
+        if let Some(name) = self.known(robot)
+            && let Some(observed) = self.epoch.record.observed()
+        {
+            observed.panels.insert(name, panel);
         }
     }
 
-    fn on_command(&mut self, from: &str, to: &str, command: Command) {
+    pub(super) fn on_command(&mut self, from: &str, to: &str, command: Command) {
         // Any name will do as a target: the medium drops what goes to robots that do not exist.
         let Ok(to) = RobotName::new(to) else {
             return self.ignore("unknown robot", to);
@@ -119,7 +88,7 @@ impl LiveRun {
         self.epoch.operator.push((to, command));
     }
 
-    fn on_waiting(&mut self, robot: &str, waiting: &Waiting) {
+    pub(super) fn on_waiting(&mut self, robot: &str, waiting: &Waiting) {
         let Some(name) = self.known(robot) else {
             return;
         };
@@ -133,7 +102,7 @@ impl LiveRun {
         );
     }
 
-    fn on_token(&mut self, robot: &str, is_present: bool) {
+    pub(super) fn on_token(&mut self, robot: &str, is_present: bool) {
         let Some(name) = self.known(robot) else {
             return;
         };

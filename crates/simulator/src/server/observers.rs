@@ -113,13 +113,11 @@ impl Observers {
             seconds(status.time_s, status.tick_s),
             name_all(&status.awaiting)
         );
-        tracing::warn!("{text}");
-        Some(self.log_line(status, LogKind::Late, &text))
+        Some(self.log_late(status, &text))
     }
 
-    /// Logs that the clock goes on. Returns the line.
-    pub(super) fn log_released(&mut self, status: &Status) -> LogRecord {
-        let text = "the clock goes on";
+    /// Logs something about robots that are late. Returns the line.
+    pub(super) fn log_late(&mut self, status: &Status, text: &str) -> LogRecord {
         tracing::warn!("{text}");
         self.log_line(status, LogKind::Late, text)
     }

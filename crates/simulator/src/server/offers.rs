@@ -46,7 +46,7 @@ impl LiveRun {
                 let refusal = ask_all(&bus, &keys, &offers).err();
                 inbox.send(Event::Offered {
                     query,
-                    control: Box::new(control),
+                    control,
                     refusal,
                 });
             });

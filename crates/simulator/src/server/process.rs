@@ -16,10 +16,10 @@ pub struct Server<S> {
 }
 
 impl<S> Server<S> {
-    /// What sends an event to this server, from any thread: a signal, for example.
-    pub fn sender(&self) -> impl Fn(Event) + Clone + Send + Sync + 'static {
+    /// What asks this server to end, from any thread: a signal, for example.
+    pub fn stopper(&self) -> impl Fn() + Clone + Send + Sync + 'static {
         let inbox = self.frontend.inbox.clone();
-        move |event| inbox.send(event)
+        move || inbox.send(Event::Terminate)
     }
 }
 

@@ -1,22 +1,18 @@
 //! The record of an epoch: what is written of its ticks, and, while a run that is resumed is executed again, what its record has.
 
-use std::collections::BTreeMap;
 use std::time::Instant;
 
 use config::diagnostic::FileError;
-use protocol::messages::{Awaited, End, LogRecord, Panel};
-use protocol::{RobotName, RunName, Tick};
+use protocol::RunName;
+use protocol::event::WaitedFor;
+use protocol::messages::{End, LogRecord};
 use record::RunFolder;
 use record::summary::{Summary, Wall};
 
 use super::event::{Exit, ServerError};
-use super::replay_log::{Comparison, ReplayLog};
+use super::replay_log::ReplayLog;
 use crate::recorder::{Observed, Recorder};
 use crate::simulation::{Simulation, TickRecord};
-use protocol::event::WaitedFor;
-
-/// Most lines about one tick, of those for whom the clock is held, that are recorded: robots can cause any number.
-const MAX_LATE_LINES: usize = 64;
 
 /// The record of an epoch.
 pub(super) enum EpochRecord {
@@ -31,18 +27,6 @@ pub(super) struct OpenRecord {
     recorder: Recorder,
     /// What of the record of a run that is resumed has not been executed again. Meanwhile the recorder writes drafts.
     replay_log: Option<ReplayLog>,
-    observing: Option<Observing>,
-}
-
-/// What is observed of the tick in progress, for the recording.
-#[derive(Default)]
-struct Observing {
-    /// The tick of the last report of each robot, and when the first of that tick arrived.
-    reports: BTreeMap<RobotName, (Tick, Instant)>,
-    awaited: Vec<Awaited>,
-    /// What people were told of the robots for which the clock is held.
-    late: Vec<LogRecord>,
-    panels: BTreeMap<RobotName, Panel>,
 }
 
 impl EpochRecord {
@@ -63,7 +47,6 @@ impl EpochRecord {
         }
 
         Ok(Self::Open(Box::new(OpenRecord {
-            observing: recorder.is_recording().then(Observing::default),
             recorder,
             replay_log: replay_log.filter(|_| !is_empty),
         })))
@@ -76,8 +59,9 @@ impl EpochRecord {
         }
     }
 
-    fn observing(&mut self) -> Option<&mut Observing> {
-        self.open()?.observing.as_mut()
+    /// What is observed of the tick in progress, if ticks are recorded.
+    pub(super) fn observed(&mut self) -> Option<&mut Observed> {
+        self.open()?.recorder.observed()
     }
 
     pub(super) fn is_closed(&self) -> bool {
@@ -97,43 +81,6 @@ impl EpochRecord {
         self.replay_log().is_some()
     }
 
-    /// A robot's report has arrived.
-    pub(super) fn observe_report(&mut self, robot: &RobotName, tick: Tick) {
-        let Some(observing) = self.observing() else {
-            return;
-        };
-        // The first one counts: a report is repeated when a clock is.
-        let is_known = observing
-            .reports
-            .get(robot)
-            .is_some_and(|last| last.0 == tick);
-        if !is_known {
-            let arrived = (tick, Instant::now());
-            observing.reports.insert(robot.clone(), arrived);
-        }
-    }
-
-    pub(super) fn observe_panel(&mut self, robot: RobotName, panel: Panel) {
-        if let Some(observing) = self.observing() {
-            observing.panels.insert(robot, panel);
-        }
-    }
-
-    pub(super) fn observe_awaited(&mut self, awaited: &[Awaited]) {
-        if let Some(observing) = self.observing() {
-            observing.awaited = awaited.to_vec();
-        }
-    }
-
-    /// People were told of the robots for which the clock is held.
-    pub(super) fn observe_late(&mut self, line: LogRecord) {
-        if let Some(observing) = self.observing()
-            && observing.late.len() < MAX_LATE_LINES
-        {
-            observing.late.push(line);
-        }
-    }
-
     /// Notes a tick that is complete; `is_written` if it is to be written at once. Returns the lines of the log, for observers.
     pub(super) fn note(
         &mut self,
@@ -145,8 +92,8 @@ impl EpochRecord {
         let Some(open) = self.open() else {
             unreachable!("no tick takes place after the end of a run");
         };
-        if let Some(observing) = &mut open.observing {
-            open.recorder.observe(observing.take(record.tick, opened));
+        if let Some(observed) = open.recorder.observed() {
+            observed.opened = Some(opened);
         }
         let lines = open.recorder.note(simulation, record)?;
         if is_written {
@@ -171,17 +118,15 @@ impl EpochRecord {
             return Ok(false);
         };
 
-        match replay_log.compare(record)? {
-            Comparison::Same => Ok(false),
-            Comparison::Different(difference) => {
-                Err(Exit::Failed(ServerError::NotRepeated(difference)))
-            }
-            Comparison::Last => {
-                open.replay_log = None;
-                open.recorder.supersede_record()?;
-                Ok(true)
-            }
+        if let Some(difference) = replay_log.compare(record)? {
+            return Err(Exit::Failed(ServerError::NotRepeated(difference)));
         }
+        let is_last = replay_log.is_empty();
+        if is_last {
+            open.replay_log = None;
+            open.recorder.supersede_record()?;
+        }
+        Ok(is_last)
     }
 
     /// Ends the record of an epoch that another one follows.
@@ -192,43 +137,23 @@ impl EpochRecord {
         }
     }
 
-    /// Writes the end of the run. Returns the lines of the log.
+    /// Writes the end of a run that has not ended yet. Returns the lines of the log, and what came of the run.
     pub(super) fn close(
         &mut self,
         end: End,
         waited_for: Vec<WaitedFor>,
         simulation: &mut Simulation,
         wall: Wall,
-    ) -> Result<Vec<LogRecord>, FileError> {
+    ) -> Result<(Vec<LogRecord>, Summary), FileError> {
         let Some(OpenRecord { recorder, .. }) = self.open() else {
-            return Ok(Vec::new());
+            unreachable!("a run ends once");
         };
         let record = simulation.end_waiting(end, waited_for);
         let lines = recorder.write(simulation, &record)?;
 
         recorder.summary().wall = wall;
         let summary = recorder.finish(simulation)?;
-        *self = Self::Closed(Box::new(summary));
-        Ok(lines)
-    }
-}
-
-impl Observing {
-    /// Takes what was observed of a tick that is complete.
-    fn take(&mut self, tick: Tick, opened: Instant) -> Observed {
-        let mut reports = BTreeMap::new();
-        for (robot, (reported, arrived)) in &self.reports {
-            if *reported == tick {
-                reports.insert(robot.clone(), *arrived);
-            }
-        }
-
-        Observed {
-            opened,
-            reports,
-            awaited: std::mem::take(&mut self.awaited),
-            late: std::mem::take(&mut self.late),
-            panels: std::mem::take(&mut self.panels),
-        }
+        *self = Self::Closed(Box::new(summary.clone()));
+        Ok((lines, summary))
     }
 }

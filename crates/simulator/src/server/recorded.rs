@@ -43,7 +43,7 @@ struct ShownRobot {
     panel: Publisher,
     /// In ticks for which it reported.
     token: Option<Declared>,
-    /// When the panel arrived that is shown; none if none is.
+    /// The tick in which the panel that is shown arrived; `None` if no panel is shown.
     panel_arrived: Option<Tick>,
     /// Whether the panel has not been put since it, or the observers, changed.
     is_panel_due: bool,

@@ -19,18 +19,8 @@ pub struct ReplayLog {
     record: Option<Record>,
     /// The tick that is executed next; `None` if no tick was completed.
     next: Option<Entry>,
-    /// Robots that did a tick too late, by tick. The record says it where they took part again, which is later.
+    /// Robots that did a tick too late, by tick. Their events are in the tick in which they took part again, which is later.
     done_late: BTreeMap<Tick, BTreeSet<RobotName>>,
-}
-
-/// How a tick that was executed again compares with the record.
-pub(super) enum Comparison {
-    /// It is the same, and there are more.
-    Same,
-    /// It is the same, and the last one of the record.
-    Last,
-    /// It is not the same.
-    Different(Box<Difference>),
 }
 
 impl ReplayLog {
@@ -106,11 +96,14 @@ impl ReplayLog {
         robots.is_some_and(|robots| robots.contains(robot))
     }
 
-    /// Compares a tick that was executed again.
+    /// Compares a tick that was executed again, and goes on to the next one. Returns the first difference, if there is one.
     ///
     /// # Errors
     /// [`FileError`] if the record cannot be read on.
-    pub(super) fn compare(&mut self, executed: &TickRecord) -> Result<Comparison, FileError> {
+    pub(super) fn compare(
+        &mut self,
+        executed: &TickRecord,
+    ) -> Result<Option<Box<Difference>>, FileError> {
         let executed = Entry {
             tick: executed.tick,
             events: executed.events.to_vec(),
@@ -118,17 +111,13 @@ impl ReplayLog {
         };
         let recorded = self.next.take().unwrap_or_default();
         if let Some(difference) = between(&recorded, &executed) {
-            return Ok(Comparison::Different(Box::new(difference)));
+            return Ok(Some(Box::new(difference)));
         }
 
         if let Some(record) = &mut self.record {
             self.next = next_tick(record)?;
         }
-        if self.is_empty() {
-            Ok(Comparison::Last)
-        } else {
-            Ok(Comparison::Same)
-        }
+        Ok(None)
     }
 }
 
@@ -146,7 +135,7 @@ fn read_done_late(events: &Path) -> Result<BTreeMap<Tick, BTreeSet<RobotName>>, 
     Ok(done_late)
 }
 
-/// The next tick of a record. The end of a run that was stopped is none: the run goes on after its last tick.
+/// The next tick of a record. The end of a run that was stopped is not a tick: the run goes on after its last one.
 fn next_tick(record: &mut Record) -> Result<Option<Entry>, FileError> {
     let next = record.next_entry()?;
     Ok(next.filter(|entry| !entry.is_end()))

@@ -3,12 +3,12 @@
 use std::time::Duration;
 
 use bus::Query;
-use protocol::messages::{Control, FaultKind, Intervention, OnLate, Phase, Setup};
+use protocol::messages::{Control, ControlAnswer, FaultKind, Intervention, OnLate, Phase, Setup};
 use protocol::{Epoch, RobotName};
 
 use super::control::execute;
 use super::event::Interrupt;
-use super::frontend::{Frontend, Refusal, answer, refuse};
+use super::frontend::{Frontend, answer, refuse, refused};
 use super::live::{LiveRun, WaitsFor};
 use super::source::TickSource;
 use config::diagnostic::Source;
@@ -22,21 +22,6 @@ const NOT_SOUGHT: &str = "a run in progress cannot be sought: its ticks take pla
 const MAX_DEFERRED: usize = 64;
 
 impl LiveRun {
-    /// A request; robots that it would give parameters are asked first.
-    pub(super) fn on_request(
-        &mut self,
-        query: Query,
-        control: Control,
-        frontend: &mut Frontend,
-    ) -> Result<(), Interrupt> {
-        let offers = self.offers(&control);
-        if offers.is_empty() {
-            return self.on_accepted(query, &control, frontend);
-        }
-        Self::offer(query, control, offers, frontend);
-        Ok(())
-    }
-
     /// A request to which no robot objects.
     pub(super) fn on_accepted(
         &mut self,
@@ -211,12 +196,12 @@ impl LiveRun {
 
     fn on_init(
         &mut self,
-        next: Result<Scenario, Refusal>,
+        next: Result<Scenario, ControlAnswer>,
         query: &Query,
         frontend: &mut Frontend,
     ) -> Result<(), Interrupt> {
         match next {
-            Err(refusal) => answer(query, &refusal.into()),
+            Err(refusal) => answer(query, &refusal),
             Ok(_) if frontend.pace.phase == Phase::Gathering => {
                 refuse(query, &format!("the run is {}", frontend.pace.phase));
             }
@@ -233,9 +218,9 @@ impl LiveRun {
 }
 
 /// Checks that an epoch is the one in progress, if it is named.
-fn check_epoch(epoch: Option<Epoch>, now: Epoch) -> Result<(), Refusal> {
+fn check_epoch(epoch: Option<Epoch>, now: Epoch) -> Result<(), ControlAnswer> {
     match epoch {
-        Some(epoch) if epoch != now => Err(Refusal::from(format!(
+        Some(epoch) if epoch != now => Err(refused(format!(
             "epoch {now} has begun meanwhile, perhaps with another set-up: look at that first"
         ))),
         _ => Ok(()),
@@ -247,13 +232,13 @@ fn next_scenario(
     running: &Scenario,
     seed: Option<u64>,
     setup: Option<&Setup>,
-) -> Result<Scenario, Refusal> {
+) -> Result<Scenario, ControlAnswer> {
     if let Some(seed) = seed {
-        config::seed::check(seed).map_err(|error| error.to_string())?;
+        config::seed::check(seed).map_err(|error| refused(error.to_string()))?;
     }
 
     let next = setup.map_or_else(|| Ok(running.clone()), |setup| running.with_setup(setup));
-    let next = next.map_err(|fields| Refusal {
+    let next = next.map_err(|fields| ControlAnswer::Refused {
         explanation: fields
             .iter()
             .map(|e| format!("{}: {}", e.field, e.reason))
@@ -268,11 +253,11 @@ fn next_scenario(
 }
 
 /// The scenario that a text from outside describes, for the robots that are there.
-pub(super) fn load(text: &str, running: &Scenario) -> Result<Scenario, Refusal> {
+pub(super) fn load(text: &str, running: &Scenario) -> Result<Scenario, ControlAnswer> {
     let source = Source {
         name: "the scenario".to_owned(),
         text: text.to_owned(),
     };
-    let loaded = Scenario::parse_alone(&source).map_err(|error| error.in_words())?;
-    Ok(loaded.with_roster_of(running)?)
+    let loaded = Scenario::parse_alone(&source).map_err(|error| refused(error.in_words()))?;
+    loaded.with_roster_of(running).map_err(refused)
 }

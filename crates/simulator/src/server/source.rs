@@ -4,11 +4,11 @@ use std::time::Duration;
 
 use bus::Query;
 use protocol::Tick;
-use protocol::messages::{Control, Status};
+use protocol::messages::{Control, ControlAnswer, Status};
 use scenario::Scenario;
 
 use super::event::{Event, Exit};
-use super::frontend::{Frontend, answer_status};
+use super::frontend::{Frontend, answer};
 
 /// What a server does next.
 pub(super) enum Next {
@@ -59,7 +59,7 @@ pub(super) trait TickSource: Send + Sized + 'static {
     /// Why not, in words.
     fn check_next_tick(&self) -> Result<(), String>;
 
-    /// The tick at which this many further ones are complete; `None` if nobody is to wait for it.
+    /// The tick at which this many further ones are complete; `None` if a client that steps is answered at once.
     fn tick_after(&self, ticks: u64) -> Option<Tick>;
 
     /// The scenario of the epoch.
@@ -75,7 +75,8 @@ pub(super) trait TickSource: Send + Sized + 'static {
     fn show(&mut self, frontend: &mut Frontend);
 
     fn answer_status(&self, query: &Query, frontend: &Frontend) {
-        answer_status(query, self.status(frontend));
+        let status = Box::new(self.status(frontend));
+        answer(query, &ControlAnswer::Done(status));
     }
 
     /// Answers a client whose steps are done.

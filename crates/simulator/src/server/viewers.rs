@@ -13,7 +13,7 @@ pub(super) struct Viewers {
 }
 
 impl Viewers {
-    /// A console says whether browsers show the run there.
+    /// A console declares whether browsers show the run there.
     pub(super) fn note(&mut self, are_present: bool) {
         if self.are_present && !are_present {
             self.gone_at = Some(Instant::now());

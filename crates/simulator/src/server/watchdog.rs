@@ -1,5 +1,5 @@
 //! Names what holds the simulator itself up: a disk that does not take the record, work that takes too long, or a process that
-//! does not run. What robots hold up is the barrier's affair.
+//! does not run. Robots that hold the clock are reported by the barrier.
 
 use std::collections::BTreeMap;
 use std::sync::mpsc::{RecvTimeoutError, SyncSender};
@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 
 /// How often to look.
 const LOOK_EVERY: Duration = Duration::from_millis(200);
-/// What takes longer is named.
-const PATIENCE: Duration = Duration::from_millis(500);
+/// Work that takes longer is reported.
+const STALL: Duration = Duration::from_millis(500);
 /// The same is named no more often than this.
 const NAME_EVERY: Duration = Duration::from_secs(10);
 
@@ -77,7 +77,7 @@ impl Watchdog {
 /// What takes too long, once in a while. `slept` is how long the thread that looks was asleep.
 fn look(activity: &Mutex<ActivityLog>, slept: Duration) -> Option<String> {
     let oversleep = slept.saturating_sub(LOOK_EVERY);
-    if oversleep > PATIENCE {
+    if oversleep > STALL {
         let seconds = oversleep.as_secs_f64();
         return Some(format!(
             "the simulator's process did not run for {seconds:.1} s: it was stopped, or the machine is overloaded"
@@ -88,7 +88,7 @@ fn look(activity: &Mutex<ActivityLog>, slept: Duration) -> Option<String> {
     let (doing, since) = activity.present?;
     let named_at = activity.named_at.get(&doing);
     let was_named = named_at.is_some_and(|at| at.elapsed() < NAME_EVERY);
-    if since.elapsed() < PATIENCE || was_named {
+    if since.elapsed() < STALL || was_named {
         return None;
     }
     activity.named_at.insert(doing, Instant::now());

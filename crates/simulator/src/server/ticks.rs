@@ -1,0 +1,277 @@
+//! The ticks of a run whose robots are in lock-step: when one is opened, and what comes of it.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use bus::BusError;
+use config::diagnostic::FileError;
+use lockstep::{IncarnationNotice, Outcome, Output};
+use protocol::keys::STATE;
+use protocol::messages::{Clock, CommandText, End, Reason, Report};
+use protocol::{RobotName, Tick, encode};
+
+use super::control::on_control;
+use super::event::{Exit, Interrupt};
+use super::frame::frame;
+use super::frontend::Frontend;
+use super::live::{LiveRun, WaitsFor};
+use super::source::{Next, TickSource};
+use super::watchdog::Activity;
+
+impl LiveRun {
+    /// Opens the next tick if it is due, or finds out how long to wait at most before looking again.
+    pub(super) fn open_next_tick(&mut self, frontend: &mut Frontend) -> Result<Next, Interrupt> {
+        match &self.epoch.waits_for {
+            WaitsFor::Robots => return Ok(Next::Wait(self.timers.next(Instant::now()))),
+            WaitsFor::Rejoins(_) => {
+                if let Some(rest) = self.await_rejoins() {
+                    return Ok(Next::Wait(Some(rest)));
+                }
+                self.epoch.waits_for = WaitsFor::Pace;
+                return Ok(Next::GoOn);
+            }
+            WaitsFor::Pace => {
+                let tick_s = self.epoch.simulation.scenario().tick_s;
+                // A run that is executed again goes as fast as its robots answer.
+                if !self.epoch.record.is_repeating()
+                    && let Err(rest) = frontend.pace.take_grant(tick_s)
+                {
+                    return Ok(Next::Wait(self.put_due_frame(rest, frontend)));
+                }
+                // Changes first: they may be about late robots, and about faults.
+                self.repeat_changes();
+                self.follow_lateness();
+                if let Some(pending_orders) = self.order_faults() {
+                    self.epoch.waits_for = WaitsFor::Faults(pending_orders);
+                    return Ok(Next::GoOn);
+                }
+            }
+            WaitsFor::Faults(pending_orders) => {
+                let is_before_tick_zero = pending_orders.order.tick == 0;
+                if let Some(rest) = self.await_faults()? {
+                    return Ok(Next::Wait(Some(rest)));
+                }
+                if is_before_tick_zero {
+                    self.gather();
+                    return Ok(Next::GoOn);
+                }
+            }
+        }
+
+        let epoch = &mut self.epoch;
+        let commands = match epoch.record.replay_log() {
+            Some(replay_log) => replay_log.commands(),
+            None => std::mem::take(&mut epoch.operator),
+        };
+        for (to, command) in commands {
+            epoch.simulation.command(&to, &command);
+        }
+        let tick = epoch.simulation.begin_tick();
+        self.open_tick(tick);
+        // Interventions that waited while faults were carried out: this tick has begun, so they are for the one after it.
+        for query in std::mem::take(&mut self.epoch.deferred) {
+            on_control(query, self, frontend)?;
+        }
+        Ok(Next::GoOn)
+    }
+
+    fn open_tick(&mut self, tick: Tick) {
+        self.epoch.waits_for = WaitsFor::Robots;
+        self.epoch.waiting_since = Instant::now();
+        self.recall_attendance();
+        let news = self.epoch.simulation.robots_with_news();
+        self.barrier.open(tick, news, &mut self.outputs);
+    }
+
+    /// While a run is executed again, what was done by hand is done again.
+    fn repeat_changes(&mut self) {
+        let Some(replay_log) = self.epoch.record.replay_log() else {
+            return;
+        };
+        let changes = replay_log.changes_by_hand();
+        if let Err(reason) = self.epoch.simulation.repeat_changes(&changes) {
+            // The tick differs from its record then, which ends the repetition.
+            tracing::error!("what was done by hand cannot be done again: {reason}");
+        }
+    }
+
+    /// What a change sets for late robots holds from its tick on.
+    fn follow_lateness(&mut self) {
+        let Some(due) = self.epoch.simulation.lateness_due() else {
+            return;
+        };
+        let mut lateness = self.barrier.lateness().clone();
+        lateness.on_late = due.on_late;
+        lateness.own.clone_from(&due.own);
+        self.barrier.set_lateness(lateness, &mut self.outputs);
+    }
+
+    /// Carries out what the barrier wants done, also what it wants because of that.
+    pub(super) fn carry_out(&mut self, frontend: &mut Frontend) -> Result<(), Exit> {
+        while !self.outputs.is_empty() {
+            for output in std::mem::take(&mut self.outputs) {
+                match output {
+                    // The faults of the epoch before are ended first, and then robots are gathered once more.
+                    Output::Gathered if matches!(self.epoch.waits_for, WaitsFor::Faults(_)) => {}
+                    Output::Gathered => self.open_tick_zero(),
+                    Output::Grant { news, clock } => self.put(&news, clock)?,
+                    Output::Complete(outcome) => self.complete(outcome, frontend)?,
+                    Output::StandIn(robot) => self.stand_in(&robot, frontend)?,
+                    Output::Held => self.report_held(frontend),
+                    Output::Released => self.report_released(frontend),
+                    Output::Aborted => return Err(Exit::End(End::Aborted)),
+                    Output::SetTimer(timer, after) => self.timers.set(timer, after, Instant::now()),
+                    Output::Ignored(reason, robot) => self.ignore(reason.as_str(), robot.as_str()),
+                }
+            }
+        }
+
+        Ok(())
+    }
+
+    /// Puts what a robot would have answered: those that follow its state wait for it no longer.
+    fn stand_in(&self, robot: &RobotName, frontend: &Frontend) -> Result<(), BusError> {
+        let Some(state) = self.epoch.simulation.last_state(robot) else {
+            return Ok(());
+        };
+        let key = frontend.keys.query(robot, STATE);
+        frontend.bus.put(&key, encode(&state))
+    }
+
+    /// Every robot of the roster is connected.
+    fn open_tick_zero(&mut self) {
+        self.epoch.simulation.begin_init();
+        self.open_tick(0);
+    }
+
+    /// News first, then the clock: on one session they arrive in this order.
+    fn put(
+        &mut self,
+        news: &[(RobotName, IncarnationNotice)],
+        clock: Clock,
+    ) -> Result<(), BusError> {
+        for (name, notice) in news {
+            if let Some(publisher) = self.news.get(name) {
+                publisher.put(encode(&self.epoch.simulation.news(name, *notice)))?;
+            }
+        }
+
+        self.clock.put(encode(&clock))
+    }
+
+    /// A tick is complete.
+    fn complete(
+        &mut self,
+        mut outcome: Outcome<Arc<Report>, CommandText>,
+        frontend: &mut Frontend,
+    ) -> Result<(), Exit> {
+        self.count_stragglers();
+        // Before the tick ends: what does not count must not reach the events.
+        self.drop_late(&mut outcome);
+        let epoch = &mut self.epoch;
+        let record = epoch.simulation.end_tick(outcome);
+        frontend.observers.note(record.tick, &record.events);
+
+        self.watchdog.note(Some(Activity::Record));
+        // At full speed a tick is written while the robots run the next one: at the end of this work, after the next clock.
+        let is_written = !frontend.pace.is_at_full_speed();
+        let opened = epoch.waiting_since;
+        let lines = epoch
+            .record
+            .note(&epoch.simulation, &record, opened, is_written)?;
+        self.watchdog.note(Some(Activity::Work));
+        frontend.observers.log(&lines);
+
+        epoch.waits_for = WaitsFor::Pace;
+        if epoch.record.is_repeating() {
+            if epoch.record.compare(&record)? {
+                frontend.pace.ready();
+                tracing::info!("resumed after tick {}", record.tick);
+            }
+            self.hold_for_rejoins();
+        } else if record.tick == 0 {
+            frontend.pace.ready();
+        }
+
+        self.answer_reached(record.tick, frontend);
+        frontend.observers.request_frame();
+        self.put_due_frame(None, frontend);
+        Ok(())
+    }
+
+    /// Writes the tick that is complete and not written, if there is one.
+    pub(super) fn write_noted(&mut self) -> Result<(), FileError> {
+        let Some(recorder) = self.epoch.record.pending() else {
+            return Ok(());
+        };
+        self.watchdog.note(Some(Activity::Record));
+        recorder.write_noted()
+    }
+
+    pub(super) fn put_frame(&mut self, frontend: &mut Frontend) {
+        let status = self.status(frontend);
+        frontend
+            .observers
+            .put(frame(&self.epoch.simulation, &status));
+    }
+
+    /// Shows a tick that observers have not seen, if it is time for a frame. Returns how long to wait at most before looking
+    /// again, at most `rest`.
+    fn put_due_frame(
+        &mut self,
+        rest: Option<Duration>,
+        frontend: &mut Frontend,
+    ) -> Option<Duration> {
+        match frontend.observers.frame_due_in() {
+            Some(Duration::ZERO) => {
+                self.put_frame(frontend);
+                rest
+            }
+            due => rest.into_iter().chain(due).min(),
+        }
+    }
+
+    /// The clock is held: tells people for which robots, and answers a client that waits for a step.
+    fn report_held(&mut self, frontend: &mut Frontend) {
+        if self.epoch.stragglers.is_empty() && self.barrier.is_open() {
+            for (name, reason) in self.barrier.awaited() {
+                if !matches!(reason, Reason::WaitsFor(_)) {
+                    self.epoch.stragglers.push(name);
+                }
+            }
+        }
+
+        let status = self.status(frontend);
+        let line = frontend.observers.log_held(&status);
+        let is_logged = line.is_some();
+        if let Some(observed) = self.epoch.record.observed() {
+            line.into_iter().for_each(|line| observed.late(line));
+            observed.awaited = status.awaiting;
+        }
+        if is_logged {
+            self.put_frame(frontend);
+        }
+        self.answer_stepping(frontend);
+    }
+
+    fn report_released(&mut self, frontend: &mut Frontend) {
+        let status = self.status(frontend);
+        let line = frontend.observers.log_late(&status, "the clock goes on");
+        if let Some(observed) = self.epoch.record.observed() {
+            observed.late(line);
+        }
+        self.put_frame(frontend);
+    }
+
+    /// Counts the tick that is complete for the robots that held it up.
+    fn count_stragglers(&mut self) {
+        let epoch = &mut self.epoch;
+        let held_s = epoch.waiting_since.elapsed().as_secs_f64();
+        for name in std::mem::take(&mut epoch.stragglers) {
+            let held = epoch.wall.held_up_by.entry(name).or_default();
+            held.ticks += 1;
+            held.waited_s += held_s;
+            held.longest_s = held.longest_s.max(held_s);
+        }
+    }
+}
