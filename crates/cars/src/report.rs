@@ -30,7 +30,7 @@ pub(crate) struct ReportArgs {
 /// Writes a report.
 pub(crate) fn report(args: &ReportArgs) -> miette::Result<ExitCode> {
     let mut folders = Vec::new();
-    let html = match &args.subjects[..] {
+    let page = match &args.subjects[..] {
         [subject] if let Some(experiment) = find_experiment(&args.out, subject) => {
             of_experiment(&experiment)?
         }
@@ -42,7 +42,7 @@ pub(crate) fn report(args: &ReportArgs) -> miette::Result<ExitCode> {
         }
     };
 
-    output::write(args.output.as_deref(), &html)?;
+    output::write(args.output.as_deref(), &page.finish())?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -14,5 +14,5 @@ mod study;
 mod transitions;
 mod words;
 
-pub use experiment::{of_experiment, page_of_experiment};
-pub use runs::{MAX_RUNS, of_runs, page_of_runs};
+pub use experiment::of_experiment;
+pub use runs::{MAX_RUNS, of_runs};

@@ -6,7 +6,7 @@ use crate::scale::Scale;
 
 /// Draws an axis below a plot, with grid lines through it. `top` and `bottom` are the ends of the plot.
 pub(crate) fn draw_below(svg: &mut Markup, scale: &Scale, top: f64, bottom: f64, title: &str) {
-    let (left, right) = (scale.from_px(), scale.to_px());
+    let (left, right) = (scale.begin_px(), scale.end_px());
     let (ticks, decimals) = scale.ticks(distance(right - left, 50.0, 3.0));
     for value in ticks {
         let x = scale.at(value);
@@ -22,7 +22,7 @@ pub(crate) fn draw_below(svg: &mut Markup, scale: &Scale, top: f64, bottom: f64,
 
 /// Draws an axis at the left of a plot, with grid lines through it. `scale` runs upward.
 pub(crate) fn draw_left(svg: &mut Markup, scale: &Scale, left: f64, right: f64) {
-    let (ticks, decimals) = scale.ticks(distance(scale.from_px() - scale.to_px(), 40.0, 2.0));
+    let (ticks, decimals) = scale.ticks(distance(scale.begin_px() - scale.end_px(), 40.0, 2.0));
     for value in ticks {
         let y = scale.at(value);
         svg.line("grid", &[(left, y), (right, y)]);

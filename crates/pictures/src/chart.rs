@@ -30,6 +30,8 @@ pub struct Estimate {
     pub interval: Option<(f64, f64)>,
     /// Size of the sample.
     pub n: usize,
+    /// Whether its marker is filled; otherwise it is hollow.
+    pub is_filled: bool,
 }
 
 impl Estimate {
@@ -77,12 +79,16 @@ fn line_class(arm: usize) -> String {
     format!("curve {} d{dashes}", arm_class(arm))
 }
 
-/// Draws the interval of an arm's estimate.
-fn draw_interval(svg: &mut Markup, arm: usize, from: Point, to: Point) {
-    svg.line(&format!("curve solid {}", arm_class(arm)), &[from, to]);
+/// Draws an arm's estimate with its interval. `at` is the place of a value.
+fn draw_estimate(svg: &mut Markup, arm: usize, estimate: &Estimate, at: impl Fn(f64) -> Point) {
+    if let Some((low, high)) = estimate.interval {
+        let class = format!("curve solid {}", arm_class(arm));
+        svg.line(&class, &[at(low), at(high)]);
+    }
+    draw_marker(svg, arm, at(estimate.value), estimate.is_filled);
 }
 
-/// Draws the marker of an arm around a point: a shape of its own. It is hollow if it is not `is_filled`.
+/// Draws the marker of an arm around a point: a shape of its own.
 fn draw_marker(svg: &mut Markup, arm: usize, point: Point, is_filled: bool) {
     let fill = if is_filled { "mark" } else { "mark hollow" };
     let class = format!("{fill} {}", arm_class(arm));
@@ -125,7 +131,7 @@ struct Name<'a> {
 /// Draws the names of arms beside the ends of their lines, none over another one.
 fn draw_names(svg: &mut Markup, names: &[Name<'_>], y: &Scale, right: f64) {
     let wanted: Vec<f64> = names.iter().map(|name| y.at(name.last)).collect();
-    let places = spread(&wanted, 14.0, (y.to_px(), y.from_px()));
+    let places = spread(&wanted, 14.0, (y.end_px(), y.begin_px()));
     for ((name, wanted), place) in names.iter().zip(wanted).zip(places) {
         svg.line("leader", &[(right, wanted), (right + 6.0, place)]);
         let sample = [(right + 6.0, place), (right + 24.0, place)];

@@ -40,16 +40,12 @@ pub struct TooMuch {
 #[derive(Debug, Clone)]
 pub struct Diagram {
     timeline: Timeline,
-    tick_s: f64,
-    from: Tick,
-    /// The last tick of the window so far.
-    to: Tick,
+    /// Up to the last tick so far.
+    window: Window,
     options: Options,
     items: Items,
     /// Number of things beyond [`MAX_ITEMS`], which are not kept.
     beyond: usize,
-    /// Whether the run ended with the last tick of the window.
-    has_end: bool,
 }
 
 impl Diagram {
@@ -58,33 +54,32 @@ impl Diagram {
     pub fn new(timeline: Timeline, tick_s: f64, from: Tick, options: Options) -> Self {
         Self {
             timeline,
-            tick_s,
-            from,
-            to: from,
+            window: Window {
+                from,
+                to: from,
+                tick_s,
+                has_end: false,
+            },
             options,
             items: Items::default(),
             beyond: 0,
-            has_end: false,
         }
     }
 
     /// Adds what happened in a tick. `awaited` are the robots for which the clock was held.
     pub fn tick(&mut self, tick: Tick, events: &[Event], awaited: &[Awaited]) {
-        self.to = self.to.max(tick);
+        self.window.to = self.window.to.max(tick);
         let mut items = Items::default();
 
         for event in events {
             for span in self.timeline.apply(tick, event) {
                 self.add(span, &mut items);
             }
-            self.has_end |= matches!(event, Event::End { .. });
+            self.window.has_end |= matches!(event, Event::End { .. });
         }
-        for awaited in awaited {
-            items.held_up.push(HeldUp {
-                tick,
-                awaited: awaited.clone(),
-            });
-        }
+        let held_up = awaited.iter().cloned();
+        let held_up = held_up.map(|awaited| HeldUp { tick, awaited });
+        items.held_up.extend(held_up);
 
         if self.items.count() <= MAX_ITEMS {
             self.items.append(items);
@@ -107,14 +102,8 @@ impl Diagram {
             return Err(TooMuch { items: count });
         }
 
-        let window = Window {
-            from: self.from,
-            to: self.to,
-            tick_s: self.tick_s,
-            has_end: self.has_end,
-        };
         let robots: Vec<RobotName> = self.timeline.robots().cloned().collect();
-        Ok(draw(robots, &items, window, &self.options))
+        Ok(draw(robots, &items, self.window, &self.options))
     }
 
     /// Adds what is shown.

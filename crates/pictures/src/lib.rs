@@ -22,7 +22,7 @@ pub use chart::floor::Floor;
 pub use chart::intervals::{IntervalRow, Intervals};
 pub use chart::matrix::{Matrix, MatrixCell, MatrixLabel};
 pub use chart::steps::{Curve, Step, Steps};
-pub use chart::trend::{Trend, TrendLine, TrendPoint};
+pub use chart::trend::{Trend, TrendLine};
 pub use labels::width_px;
 pub use number::{decimals_for, fixed};
 pub use page::{Figure, Page, Panel, Text};

@@ -100,6 +100,18 @@ pub struct Figure {
     pub table: Option<Table>,
 }
 
+impl Figure {
+    /// A figure of these charts.
+    #[must_use]
+    pub fn new(panels: Vec<Panel>, caption: impl Into<Text>, table: Option<Table>) -> Self {
+        Self {
+            panels,
+            caption: caption.into(),
+            table,
+        }
+    }
+}
+
 /// A page that is being written.
 #[derive(Debug)]
 pub struct Page {

@@ -88,12 +88,12 @@ impl Scale {
     }
 
     /// Where the scale begins.
-    pub(crate) fn from_px(&self) -> f64 {
+    pub(crate) fn begin_px(&self) -> f64 {
         self.first().from_px
     }
 
     /// Where the scale ends.
-    pub(crate) fn to_px(&self) -> f64 {
+    pub(crate) fn end_px(&self) -> f64 {
         self.last().to_px
     }
 
@@ -139,7 +139,7 @@ impl Scale {
             // Infallible: it is written to memory.
             let _ = write!(text, "{:.1} {}, ", piece.from_px, piece.from);
         }
-        let _ = write!(text, "{:.1} {}", self.to_px(), self.last().to);
+        let _ = write!(text, "{:.1} {}", self.end_px(), self.last().to);
         text
     }
 }

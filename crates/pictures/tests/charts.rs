@@ -9,8 +9,7 @@ use std::collections::BTreeMap;
 
 use pictures::{
     Band, BandRow, Bands, Cell, Curve, Estimate, Figure, Floor, IntervalRow, Intervals, Matrix,
-    MatrixCell, MatrixLabel, Page, Panel, Step, Steps, Table, Text, Trend, TrendLine, TrendPoint,
-    state_class,
+    MatrixCell, MatrixLabel, Page, Panel, Step, Steps, Table, Text, Trend, TrendLine, state_class,
 };
 use roxmltree::{Document, Node, ParsingOptions};
 use timeline::Kind;
@@ -55,6 +54,7 @@ fn estimate(value: f64) -> Estimate {
         value,
         interval: Some((value - 1.0, value + 2.0)),
         n: 32,
+        is_filled: true,
     }
 }
 
@@ -183,8 +183,10 @@ fn intervals_have_a_marker_for_each_estimate() {
         rows.push(IntervalRow {
             label: format!("{HOSTILE} {arm}"),
             arm,
-            estimate: (arm != 3).then(|| estimate(arm as f64)),
-            is_filled: arm % 2 == 0,
+            estimate: (arm != 3).then(|| Estimate {
+                is_filled: arm % 2 == 0,
+                ..estimate(arm as f64)
+            }),
         });
     }
     let chart = Intervals {
@@ -205,11 +207,7 @@ fn a_trend_has_a_marker_for_each_estimate_and_each_name() {
     let levels = [0.0, 0.1, 0.25, 0.5, 1.0];
     let mut lines = Vec::new();
     for arm in 0..5 {
-        let point = |x: &f64| TrendPoint {
-            x: *x,
-            estimate: estimate(100.0 * x + arm as f64),
-            is_filled: true,
-        };
+        let point = |x: &f64| (*x, estimate(100.0 * x + arm as f64));
         lines.push(TrendLine {
             label: format!("arm {arm}"),
             arm,
@@ -235,11 +233,7 @@ fn the_arms_at_a_value_are_nearer_to_it_than_to_the_next_one() {
     let levels = [0.0, 0.1, 1.0];
     let mut lines = Vec::new();
     for _ in 0..8 {
-        let point = |x: &f64| TrendPoint {
-            x: *x,
-            estimate: estimate(*x),
-            is_filled: true,
-        };
+        let point = |x: &f64| (*x, estimate(*x));
         lines.push(TrendLine {
             label: String::new(),
             arm: 0,
@@ -288,7 +282,6 @@ fn intervals_with_one_range_have_one_axis() {
             label: "arm".to_owned(),
             arm: 0,
             estimate: Some(estimate(value)),
-            is_filled: true,
         }],
     };
     let axis = |value: f64| {

@@ -6,7 +6,7 @@ use lab::diagram::{Options, Window, draw};
 use lab::experiment::PLAN;
 use lab::folder::{recorded_epoch, recorded_epochs};
 use lab::moment::Moment;
-use lab::report::{page_of_experiment, page_of_runs};
+use lab::report::{of_experiment, of_runs};
 use pictures::Page;
 use pyo3::prelude::*;
 use record::RunFolder;
@@ -31,10 +31,10 @@ fn page(folders: Vec<PathBuf>) -> miette::Result<Page> {
     if let [folder] = &folders[..]
         && folder.join(PLAN).exists()
     {
-        return page_of_experiment(folder);
+        return of_experiment(folder);
     }
     let runs: Vec<RunFolder> = folders.into_iter().map(RunFolder::at).collect();
-    page_of_runs(&runs)
+    of_runs(&runs)
 }
 
 /// The space-time diagram of the last epoch of a run: SVG, and what it lacks, a sentence each.

@@ -39,15 +39,7 @@ const EXAMPLE_PARTS: [Shown; 3] = [Shown::Runs, Shown::Transitions, Shown::Floor
 ///
 /// # Errors
 /// If it is not the folder of an experiment, none of its units has been played, or a file cannot be read.
-pub fn of_experiment(folder: &Path) -> miette::Result<String> {
-    Ok(page_of_experiment(folder)?.finish())
-}
-
-/// The page of that report.
-///
-/// # Errors
-/// As [`of_experiment`].
-pub fn page_of_experiment(folder: &Path) -> miette::Result<Page> {
+pub fn of_experiment(folder: &Path) -> miette::Result<Page> {
     let results = Results::load(folder)?;
     if let (true, Some(first)) = (results.outcomes.is_empty(), results.failures.first()) {
         return Err(miette!(
@@ -303,30 +295,20 @@ fn typical_and_worst<'a>(
     values.sort_by(f64::total_cmp);
     let median = *values.get(values.len() / 2)?;
 
-    let mut typical: Option<(&Outcome, f64)> = None;
-    let mut worst: Option<(&Outcome, usize, f64)> = None;
-    for outcome in outcomes {
-        let Some(value) = value(outcome) else {
-            continue;
-        };
-        let distance = (value - median).abs();
-        let is_nearer = typical.is_none_or(|(_, least)| distance < least);
-        if outcome.arm == baseline && is_nearer {
-            typical = Some((outcome, distance));
-        }
-
-        let fails = outcome
-            .verdicts
-            .values()
-            .filter(|verdict| *verdict == "fail")
-            .count();
-        let is_worse = worst.is_none_or(|(_, most, farthest)| {
-            fails > most || (fails == most && distance > farthest)
-        });
-        if is_worse {
-            worst = Some((outcome, fails, distance));
-        }
-    }
+    let valued = outcomes
+        .iter()
+        .filter_map(|outcome| Some((outcome, (value(outcome)? - median).abs())));
+    let of_baseline = valued.clone().filter(|(one, _)| one.arm == baseline);
+    let typical = of_baseline.min_by(|a, b| a.1.total_cmp(&b.1));
+    let fails = |outcome: &Outcome| {
+        let verdicts = outcome.verdicts.values();
+        verdicts.filter(|verdict| *verdict == "fail").count()
+    };
+    // The first one of several that are equally bad.
+    let worst = valued.rev().max_by(|a, b| {
+        let by_fails = fails(a.0).cmp(&fails(b.0));
+        by_fails.then(a.1.total_cmp(&b.1))
+    });
     Some((typical?.0, worst?.0))
 }
 
@@ -418,11 +400,7 @@ fn course(outcome: &Outcome, facts: &RunFacts, files: &EpochFiles) -> miette::Re
         caption += &format!(" The diagram ends at tick {last} of {of}.");
     }
 
-    Ok(Figure {
-        panels,
-        caption: caption.into(),
-        table: None,
-    })
+    Ok(Figure::new(panels, caption, None))
 }
 
 fn write_reproduction(

@@ -56,15 +56,15 @@ pub(super) fn estimates(study: &Study<'_>, measure: &Measure) -> Figure {
     };
 
     let caption = pictures::Text::from(format!("{caption}{sentence} Data: column "));
-    Figure {
+    Figure::new(
         panels,
-        caption: caption
+        caption
             .code(&measure.name)
             .text(" of ")
             .code("runs.csv")
             .text("."),
-        table: Some(estimates_table(study, measure)),
-    }
+        Some(estimates_table(study, measure)),
+    )
 }
 
 /// What differences beside estimates are.
@@ -199,11 +199,11 @@ pub(super) fn differences(study: &Study<'_>, measure: &Measure, of: Of) -> Optio
         of.interval(),
         correction(&contrasts)
     );
-    Some(Figure {
+    Some(Figure::new(
         panels,
-        caption: caption.into(),
-        table: Some(differences_table(study, &contrasts, of)),
-    })
+        caption,
+        Some(differences_table(study, &contrasts, of)),
+    ))
 }
 
 /// Up to which times the mean times of contrasts count: as far as both curves are known.
@@ -363,11 +363,7 @@ fn curves(
     chart: impl Fn(&str, Vec<Curve>) -> Steps,
 ) -> Figure {
     let (panels, sentence) = study.panels(curve, |heading, curves| chart(heading, curves).draw());
-    Figure {
-        panels,
-        caption: (caption + &sentence).into(),
-        table: None,
-    }
+    Figure::new(panels, caption + &sentence, None)
 }
 
 /// A heat map for each arm over two factors; `None` if there are not two.
@@ -414,11 +410,7 @@ pub(super) fn heat_maps(study: &Study<'_>, measure: &Measure) -> Option<Figure> 
         capitalized(&axis(measure)),
         sample_sizes(study, measure)
     );
-    Some(Figure {
-        panels,
-        caption: caption.into(),
-        table: None,
-    })
+    Some(Figure::new(panels, caption, None))
 }
 
 /// The values of a factor in their order.
@@ -504,11 +496,7 @@ pub(super) fn verdicts(study: &Study<'_>) -> Option<Figure> {
          (open), because the run ended first. It is not asked where what it is expected after did not happen. Darker is a larger \
          share of runs that fail.{sentence}"
     );
-    Some(Figure {
-        panels,
-        caption: caption.into(),
-        table: Some(table),
-    })
+    Some(Figure::new(panels, caption, Some(table)))
 }
 
 /// How many runs pass of those in which an expectation was asked.

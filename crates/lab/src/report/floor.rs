@@ -47,11 +47,7 @@ pub(super) fn occupancy(runs: &[&RunFacts]) -> Option<Figure> {
     if others > 0 {
         caption += " Runs in a field of another size are left out.";
     }
-    Some(Figure {
-        panels,
-        caption: caption.into(),
-        table: Some(table),
-    })
+    Some(Figure::new(panels, caption, Some(table)))
 }
 
 fn add_row(table: &mut Table, name: &RobotName, floor: &Floor) {

@@ -3,9 +3,7 @@
 use std::collections::BTreeMap;
 
 use observe::Measure;
-use pictures::{
-    Estimate, IntervalRow, Intervals, Panel, Trend, TrendLine, TrendPoint, round_range,
-};
+use pictures::{Estimate, IntervalRow, Intervals, Panel, Trend, TrendLine, round_range};
 
 use super::study::{CellPlace, Line, Study, axis, drawn, is_shown, label};
 use super::words::capitalized;
@@ -54,8 +52,8 @@ pub(super) struct Quantity {
     pub(super) range: (f64, f64),
     /// A value that is marked.
     reference: Option<f64>,
-    /// The number of each arm that is shown, and whether its marker is filled.
-    cells: BTreeMap<CellPlace, (Option<Estimate>, bool)>,
+    /// The number of each arm that is shown; `None` if there is no finite one.
+    cells: BTreeMap<CellPlace, Option<Estimate>>,
 }
 
 impl Quantity {
@@ -63,7 +61,7 @@ impl Quantity {
     pub(super) fn estimates(study: &Study<'_>, measure: &Measure) -> Self {
         let mut cells = BTreeMap::new();
         for place in study.places() {
-            cells.insert(place, (study.estimate(measure, place), true));
+            cells.insert(place, study.estimate(measure, place));
         }
         let range = match measure.is_time() {
             true => (0.0, 100.0),
@@ -84,8 +82,11 @@ impl Quantity {
         let mut cells = BTreeMap::new();
         for place in study.places() {
             if let Some(contrast) = study.contrast(measure, place) {
-                let estimate = difference(contrast, of).as_ref().map(drawn);
-                cells.insert(place, (estimate, is_shown(contrast)));
+                let estimate = difference(contrast, of).map(|estimate| Estimate {
+                    is_filled: is_shown(contrast),
+                    ..drawn(&estimate)
+                });
+                cells.insert(place, estimate);
             }
         }
         let baseline = &study.contrasts_of(measure).first()?.baseline;
@@ -106,19 +107,18 @@ impl Quantity {
 
     /// The number of an arm under a condition.
     pub(super) fn estimate(&self, place: CellPlace) -> Option<Estimate> {
-        self.cells.get(&place)?.0
+        *self.cells.get(&place)?
     }
 
     /// A chart for each condition, with a row for each arm.
     pub(super) fn intervals(&self, study: &Study<'_>) -> (Vec<Panel>, String) {
         let row = |place: CellPlace| {
-            let (estimate, is_filled) = *self.cells.get(&place)?;
+            let estimate = *self.cells.get(&place)?;
             let (label, arm) = study.arm(place);
             Some(IntervalRow {
                 label,
                 arm,
                 estimate,
-                is_filled,
             })
         };
         study.panels(row, |heading, rows| {
@@ -139,14 +139,8 @@ impl Quantity {
         for arm in 0..study.arms.len() {
             let mut points = Vec::new();
             for level in &line.levels {
-                let cell = self.cells.get(&(level.condition, arm));
-                if let Some((Some(estimate), is_filled)) = cell {
-                    points.push(TrendPoint {
-                        x: level.x,
-                        estimate: *estimate,
-                        is_filled: *is_filled,
-                    });
-                }
+                let estimate = self.estimate((level.condition, arm));
+                points.extend(estimate.map(|estimate| (level.x, estimate)));
             }
             if !points.is_empty() || self.name.is_none() {
                 let (label, arm) = study.arm((0, arm));
@@ -193,8 +187,8 @@ pub(super) fn difference(contrast: &Contrast, of: Of) -> Option<statistics::Esti
 }
 
 /// The ends of all intervals.
-fn ends(cells: &BTreeMap<CellPlace, (Option<Estimate>, bool)>) -> Vec<f64> {
-    let estimates = cells.values().filter_map(|(estimate, _)| estimate.as_ref());
+fn ends(cells: &BTreeMap<CellPlace, Option<Estimate>>) -> Vec<f64> {
+    let estimates = cells.values().flatten();
     estimates.flat_map(Estimate::ends).collect()
 }
 

@@ -45,15 +45,7 @@ struct Run {
 ///
 /// # Errors
 /// If there is no run or there are too many, or one cannot be read.
-pub fn of_runs(folders: &[RunFolder]) -> miette::Result<String> {
-    Ok(page_of_runs(folders)?.finish())
-}
-
-/// The page of that report.
-///
-/// # Errors
-/// As [`of_runs`].
-pub fn page_of_runs(folders: &[RunFolder]) -> miette::Result<Page> {
+pub fn of_runs(folders: &[RunFolder]) -> miette::Result<Page> {
     if folders.len() > MAX_RUNS {
         return Err(miette!(
             help = "compare many runs by an experiment: `cars experiment run FILE`, then `cars report` with its folder",
@@ -297,11 +289,11 @@ fn write_states(page: &mut Page, runs: &[Run]) {
             states_in_words(kind),
             counted(runs.len(), "run")
         );
-        page.figure(&Figure {
+        page.figure(&Figure::new(
             panels,
-            caption: caption.into(),
-            table: Some(states_table(runs, kind)),
-        });
+            caption,
+            Some(states_table(runs, kind)),
+        ));
     }
 }
 
@@ -390,11 +382,7 @@ fn write_diagrams(page: &mut Page, runs: &[Run]) {
             ));
             caption = caption.code(format!("cars diagram {path} --from {next}"));
         }
-        page.figure(&Figure {
-            panels: diagram.lines,
-            caption,
-            table: None,
-        });
+        page.figure(&Figure::new(diagram.lines, caption, None));
     }
 
     if let Some(run) = runs.get(MAX_DIAGRAMS) {

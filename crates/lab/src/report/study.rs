@@ -305,6 +305,7 @@ pub(super) fn drawn(estimate: &statistics::Estimate) -> Estimate {
         value: estimate.value,
         interval: estimate.bounds(),
         n: estimate.n,
+        is_filled: true,
     }
 }
 

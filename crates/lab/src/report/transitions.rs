@@ -45,11 +45,7 @@ fn figure(runs: &[&RunFacts], kind: Kind, what: &str) -> Option<Figure> {
          of all transitions from the row. Darker is a larger share. n = {}.{sentence}",
         counted(runs.len(), "run")
     );
-    Some(Figure {
-        panels,
-        caption: caption.into(),
-        table: Some(table),
-    })
+    Some(Figure::new(panels, caption, Some(table)))
 }
 
 /// The matrix of a robot, whose numbers are added to the table.

@@ -126,7 +126,7 @@ impl Bands {
         let label = shortened(&row.label, NAME_LETTERS);
         let baseline = y + height / 2.0 + 4.0;
         let class = if height < LABEL_PX { "small" } else { "" };
-        svg.text(class, scale.from_px() - 8.0, baseline, "end", &label);
+        svg.text(class, scale.begin_px() - 8.0, baseline, "end", &label);
 
         let columns = (row.bands.len() > MAX_BANDS).then(|| columns(&row.bands, scale));
         let bands = columns.as_ref().unwrap_or(&row.bands);
@@ -168,7 +168,7 @@ fn key_text(name: &str, share: f64) -> String {
 /// Bands of whole columns: each column has the state that lasted longest in it.
 fn columns(bands: &[Band], scale: &Scale) -> Vec<Band> {
     let (from_s, to_s) = scale.range();
-    let column_s = (to_s - from_s) / (scale.to_px() - scale.from_px()) * COLUMN_PX;
+    let column_s = (to_s - from_s) / (scale.end_px() - scale.begin_px()) * COLUMN_PX;
     let mut columns: Vec<Band> = Vec::new();
     let mut next = 0;
     let mut begin_s = from_s;

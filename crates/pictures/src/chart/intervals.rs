@@ -1,7 +1,7 @@
 //! Estimates with their intervals, a row for each arm: means of arms, or differences to a baseline (a forest plot).
 
 use crate::axis::draw_below;
-use crate::chart::{Estimate, PANEL_PX, begin, draw_interval, draw_marker, end};
+use crate::chart::{Estimate, PANEL_PX, begin, draw_estimate, end};
 use crate::labels::{shortened, widest_px, width_px};
 use crate::markup::Markup;
 use crate::number::{decimals_for, typeset};
@@ -22,8 +22,6 @@ pub struct IntervalRow {
     pub arm: usize,
     /// Its estimate; `None` if there is none.
     pub estimate: Option<Estimate>,
-    /// Whether the marker is filled; otherwise it is hollow.
-    pub is_filled: bool,
 }
 
 /// A chart of estimates.
@@ -72,16 +70,11 @@ impl Intervals {
 
     fn draw_row(&self, svg: &mut Markup, scale: &Scale, row: &IntervalRow, middle: f64) {
         let label = shortened(&row.label, LABEL_LETTERS);
-        svg.text("", scale.from_px() - 12.0, middle + 4.0, "end", &label);
-        if let Some(estimate) = row.estimate {
-            if let Some((low, high)) = estimate.interval {
-                let ends = [low, high].map(|value| (scale.at(value), middle));
-                draw_interval(svg, row.arm, ends[0], ends[1]);
-            }
-            let place = (scale.at(estimate.value), middle);
-            draw_marker(svg, row.arm, place, row.is_filled);
+        svg.text("", scale.begin_px() - 12.0, middle + 4.0, "end", &label);
+        if let Some(estimate) = &row.estimate {
+            let at = |value| (scale.at(value), middle);
+            draw_estimate(svg, row.arm, estimate, at);
         }
-
         let numbers = self.numbers(row);
         svg.text("tick", PANEL_PX - 1.0, middle + 4.0, "end", &numbers);
     }

@@ -102,7 +102,7 @@ impl Steps {
         for (index, curve) in self.curves.iter().enumerate() {
             let baseline = top + (index + 1) as f64 * ROW_PX;
             let name = shortened(&curve.label, NAME_LETTERS);
-            svg.text("tick", x.from_px() - 14.0, baseline, "end", &name);
+            svg.text("tick", x.begin_px() - 14.0, baseline, "end", &name);
             for (time, count) in times.iter().zip(&curve.at_risk) {
                 svg.text("tick", x.at(*time), baseline, "middle", &count.to_string());
             }
@@ -168,7 +168,7 @@ impl Curve {
 }
 
 fn draw_curve(svg: &mut Markup, curve: &Curve, x: &Scale, y: &Scale) {
-    let mut path = format!("M{} {}", number(x.from_px()), number(y.at(curve.begin)));
+    let mut path = format!("M{} {}", number(x.begin_px()), number(y.at(curve.begin)));
     for step in curve.visible(x) {
         path += &format!("H{}V{}", number(x.at(step.x)), number(y.at(step.y)));
     }
@@ -201,7 +201,7 @@ fn draw_ribbon(svg: &mut Markup, curve: &Curve, x: &Scale, y: &Scale) {
         return;
     }
 
-    let mut upper = format!("M{} {}", number(x.from_px()), number(y.at(curve.begin)));
+    let mut upper = format!("M{} {}", number(x.begin_px()), number(y.at(curve.begin)));
     let mut lower = Vec::new();
     for step in &steps {
         let band = step.band.unwrap_or((step.y, step.y));
@@ -214,6 +214,6 @@ fn draw_ribbon(svg: &mut Markup, curve: &Curve, x: &Scale, y: &Scale) {
     for part in lower.iter().rev() {
         path += part;
     }
-    path += &format!("V{}H{}z", number(y.at(curve.begin)), number(x.from_px()));
+    path += &format!("V{}H{}z", number(y.at(curve.begin)), number(x.begin_px()));
     svg.path(&format!("ribbon {}", arm_class(curve.arm)), &path);
 }

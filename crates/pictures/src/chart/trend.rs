@@ -2,14 +2,13 @@
 
 use crate::axis::draw_left;
 use crate::chart::{
-    Estimate, NAME_LETTERS, Name, PANEL_PX, begin, draw_interval, draw_marker, draw_names, end,
-    line_class,
+    Estimate, NAME_LETTERS, Name, PANEL_PX, begin, draw_estimate, draw_names, end, line_class,
 };
 use crate::labels::{widest_px, width_px};
 use crate::markup::Markup;
 use crate::number::{decimals_for, fixed};
 use crate::scale::Scale;
-use crate::shapes::LABEL_PX;
+use crate::shapes::{LABEL_PX, Point};
 
 /// Height of the plot, pixels.
 const PLOT_PX: f64 = 230.0;
@@ -18,17 +17,6 @@ const DODGE_PX: f64 = 5.0;
 /// Space between the ends of the plot and what is in it, pixels.
 const MARGIN_PX: f64 = 16.0;
 
-/// An estimate at a value of the factor.
-#[derive(Debug, Clone)]
-pub struct TrendPoint {
-    /// Value of the factor.
-    pub x: f64,
-    /// The estimate.
-    pub estimate: Estimate,
-    /// Whether the marker is filled; otherwise it is hollow.
-    pub is_filled: bool,
-}
-
 /// An arm.
 #[derive(Debug, Clone)]
 pub struct TrendLine {
@@ -36,8 +24,8 @@ pub struct TrendLine {
     pub label: String,
     /// Its index, which has its color, marker and dashes.
     pub arm: usize,
-    /// Its estimates, with growing values of the factor.
-    pub points: Vec<TrendPoint>,
+    /// Its estimates, each after the value of the factor, which grows.
+    pub points: Vec<(f64, Estimate)>,
 }
 
 /// A chart of a measure over a factor.
@@ -106,7 +94,7 @@ impl Trend {
     }
 
     fn draw_levels(&self, svg: &mut Markup, x: &Scale, bottom: f64) {
-        let (left, right) = (x.from_px() - MARGIN_PX, x.to_px() + MARGIN_PX);
+        let (left, right) = (x.begin_px() - MARGIN_PX, x.end_px() + MARGIN_PX);
         svg.line("axis", &[(left, bottom), (right, bottom)]);
 
         let mut free_from = f64::NEG_INFINITY;
@@ -126,19 +114,16 @@ impl Trend {
     }
 
     fn draw_line(&self, svg: &mut Markup, line: &TrendLine, x: &Scale, y: &Scale, aside: f64) {
-        let mut points = Vec::new();
-        for point in &line.points {
-            points.push((x.at(point.x) + aside, y.at(point.estimate.value)));
-        }
+        let x_of = |level: f64| x.at(level) + aside;
+        let points = line.points.iter();
+        let points = points.map(|(level, estimate)| (x_of(*level), y.at(estimate.value)));
+        let points: Vec<Point> = points.collect();
         svg.line(&format!("{} thin", line_class(line.arm)), &points);
 
-        for (point, place) in line.points.iter().zip(points) {
-            svg.group("row", &self.point_title(line, point));
-            if let Some((low, high)) = point.estimate.interval {
-                let ends = [low, high].map(|value| (place.0, y.at(value)));
-                draw_interval(svg, line.arm, ends[0], ends[1]);
-            }
-            draw_marker(svg, line.arm, place, point.is_filled);
+        for (level, estimate) in &line.points {
+            svg.group("row", &self.point_title(line, *level, estimate));
+            let at = |value| (x_of(*level), y.at(value));
+            draw_estimate(svg, line.arm, estimate, at);
             svg.close("g");
         }
     }
@@ -148,15 +133,14 @@ impl Trend {
         Name {
             label: &line.label,
             arm: line.arm,
-            last: last.map_or(self.range.0, |point| point.estimate.value),
+            last: last.map_or(self.range.0, |(_, estimate)| estimate.value),
             has_marker: true,
         }
     }
 
-    fn point_title(&self, line: &TrendLine, point: &TrendPoint) -> String {
-        let level = fixed(point.x, 4);
+    fn point_title(&self, line: &TrendLine, level: f64, estimate: &Estimate) -> String {
+        let level = fixed(level, 4);
         let level = level.trim_end_matches('0').trim_end_matches('.');
-        let estimate = point.estimate;
         let numbers = estimate.words(decimals_for(self.range.1 - self.range.0));
         let (label, factor, n) = (&line.label, &self.x_axis, estimate.n);
         format!("{label}, {factor} {level}: {numbers}, n = {n}")
@@ -165,11 +149,9 @@ impl Trend {
     fn description(&self) -> String {
         let mut parts = Vec::new();
         for line in &self.lines {
-            parts.extend(
-                line.points
-                    .iter()
-                    .map(|point| self.point_title(line, point)),
-            );
+            for (level, estimate) in &line.points {
+                parts.push(self.point_title(line, *level, estimate));
+            }
         }
         format!("{} over {}. {}", self.y_axis, self.x_axis, parts.join("; "))
     }

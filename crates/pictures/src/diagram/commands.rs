@@ -164,7 +164,7 @@ fn course(picture: &Picture, command: &Command) -> Option<Course> {
     };
 
     let start_x = if command.sent < picture.window.from {
-        picture.scale.from_px() - OUTSIDE_PX
+        picture.scale.begin_px() - OUTSIDE_PX
     } else {
         picture.x(command.sent)
     };
@@ -205,7 +205,7 @@ fn route(picture: &Picture, command: &Command, waits: &mut Waits) -> Option<Rout
             add_ends(&mut route, command, turn, end, course.down);
         }
         (None, None) => {
-            let out_x = picture.scale.to_px() + OUTSIDE_PX;
+            let out_x = picture.scale.end_px() + OUTSIDE_PX;
             let half_y = (course.start.1 + course.end_y) / 2.0;
             route.line.push((out_x, half_y));
         }
@@ -232,7 +232,7 @@ fn add_wait(
         picture.x(command.sent + 1)
     };
     let end_x = if over > window.to {
-        picture.scale.to_px() + OUTSIDE_PX
+        picture.scale.end_px() + OUTSIDE_PX
     } else {
         picture.x(over)
     };

@@ -146,8 +146,8 @@ fn busy_ticks(items: &Items) -> BTreeSet<Tick> {
 }
 
 fn draw_lanes(picture: &mut Picture) {
-    let left = picture.scale.from_px();
-    let right = picture.scale.to_px();
+    let left = picture.scale.begin_px();
+    let right = picture.scale.end_px();
 
     for lane in picture.lanes.all.clone() {
         let tag = picture.svg.tag("g").class("lane");
@@ -187,7 +187,7 @@ fn finish(picture: Picture, height: f64, heading: &str, has_style: bool) -> Stri
         svg.style(&style());
     }
     svg.rect("paper", (0.0, 0.0), width, height);
-    let left = picture.scale.from_px();
+    let left = picture.scale.begin_px();
     svg.text("heading muted", left, 18.0, "start", heading);
     svg.add(&picture.svg.finish());
     svg.close("svg");

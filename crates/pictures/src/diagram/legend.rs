@@ -129,7 +129,7 @@ fn draw_entries<N: AsRef<str>>(
         return y;
     }
 
-    let left = picture.scale.from_px();
+    let left = picture.scale.begin_px();
     let svg = &mut picture.svg;
     svg.text("muted", left - CAPTION_PX, y, "end", caption);
     let names = names.iter().map(AsRef::as_ref);

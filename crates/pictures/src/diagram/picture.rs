@@ -79,7 +79,7 @@ pub(crate) struct Picture {
 impl Picture {
     /// A picture in which nothing is drawn yet. What is above and below the lanes has at least `least_px`.
     pub(crate) fn new(lanes: Lanes, scale: Scale, least_px: f64, window: Window) -> Self {
-        let (left, right) = (scale.from_px(), scale.to_px());
+        let (left, right) = (scale.begin_px(), scale.end_px());
         let right_px = right.max(left + least_px);
         let mut labels = Labels::between(left, right_px + OUTSIDE_PX);
         for lane in &lanes.all {

@@ -93,8 +93,8 @@ pub(crate) fn draw_grid(picture: &mut Picture) {
 pub(crate) fn draw_axis(picture: &mut Picture) {
     let top = picture.lanes.top();
     let bottom = picture.lanes.bottom;
-    let left = picture.scale.from_px();
-    let right = picture.scale.to_px();
+    let left = picture.scale.begin_px();
+    let right = picture.scale.end_px();
     picture.line("axis", &[(left, bottom), (right, bottom)]);
     if picture.window.has_end {
         picture.open("end-of-run", picture.window.to, "the run ended");
@@ -184,7 +184,7 @@ mod tests {
         assert!((scale.at(510.0) - scale.at(500.0) - 10.0 * px).abs() < 1e-9);
         assert!((scale.at(500.0) - scale.at(20.0) - 8.0 * px - GAP_PX).abs() < 1e-9);
         assert_eq!(scale.at(0.0), 100.0);
-        assert_eq!(scale.at(10_000.0), scale.to_px());
+        assert_eq!(scale.at(10_000.0), scale.end_px());
     }
 
     #[test]
@@ -203,7 +203,7 @@ mod tests {
                 ..most(4000.0)
             };
             let scale = scale((5, 6), None, 50.0, width);
-            assert_eq!(scale.to_px() - scale.from_px(), expected_px);
+            assert_eq!(scale.end_px() - scale.begin_px(), expected_px);
         }
     }
 
@@ -213,7 +213,7 @@ mod tests {
             let busy: BTreeSet<Tick> = (0..ticks).step_by(100).collect();
             for busy in [Some(&busy), None] {
                 let scale = scale((0, ticks), busy, 50.0, most(1500.0));
-                let width_px = scale.to_px() - scale.from_px();
+                let width_px = scale.end_px() - scale.begin_px();
                 assert!(width_px <= 1500.1, "{ticks} ticks: {width_px} px");
             }
         }
