@@ -34,16 +34,16 @@ pub enum RobotTimer {
 /// What a participant wants done.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub enum Action<N, S, C, R> {
-    /// Ask the simulator to be admitted; answer by [`Participant::admitted`], [`Participant::refused`] or
-    /// [`Participant::unanswered`].
+    /// Ask the simulator to be admitted; answer by `Participant::admitted`, `Participant::refused` or
+    /// `Participant::unanswered`.
     Join,
     /// Declare the liveliness token.
     DeclareToken,
-    /// Run the robot for a tick; answer by [`Participant::done`].
+    /// Run the robot for a tick; answer by `Participant::done`.
     Run(Turn<N>),
     /// Put what came of a tick, in this order: the commands, the state, the report.
     Put(Box<Answer<S, C, R>>),
-    /// Query the state of another robot as of this tick, and subscribe to it; answer by [`Participant::heard`].
+    /// Query the state of another robot as of this tick, and subscribe to it; answer by `Participant::heard`.
     Query {
         /// The other robot.
         of: RobotName,
@@ -63,7 +63,7 @@ pub enum Action<N, S, C, R> {
         /// The other robot.
         on: RobotName,
     },
-    /// Call [`Participant::timer`] after this time.
+    /// Call `Participant::timer` after this time.
     SetTimer(RobotTimer, Duration),
     /// Leave the run: withdraw the token, close the session, end.
     Leave(Leave),

@@ -63,7 +63,7 @@ pub enum Output<R, C> {
     Released,
     /// A robot is late and the run ends because of it.
     Aborted,
-    /// Call [`Barrier::timer`] after this time.
+    /// Call `Barrier::timer` after this time.
     SetTimer(Timer, Duration),
     /// A message changed nothing.
     Ignored(Ignored, RobotName),

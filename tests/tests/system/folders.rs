@@ -960,7 +960,7 @@ fn no_output_replaces_a_part_of_a_record() {
     );
 
     // A log may be called what a table is called.
-    let name = "record.log_name=events.csv";
+    let name = "record.log_name=states.csv";
     place.lab.ok(&[
         "run",
         HALL,
