@@ -56,10 +56,10 @@ pub enum OnArrival {
 }
 
 /// A queue of items, and the worker that [`Inbox::run`] is given.
-pub struct Inbox<T>(Arc<Shared<T>>);
+pub struct Inbox<T>(Arc<InboxShared<T>>);
 
-struct Shared<T> {
-    queue: Mutex<Queue<T>>,
+struct InboxShared<T> {
+    queue: Mutex<ItemQueue<T>>,
     wake_owner: Condvar,
     wake_worker: Condvar,
     has_room: Condvar,
@@ -68,9 +68,9 @@ struct Shared<T> {
     try_work: OnceLock<TryWork<T>>,
 }
 
-type TryWork<T> = Box<dyn Fn(&Shared<T>) + Send + Sync>;
+type TryWork<T> = Box<dyn Fn(&InboxShared<T>) + Send + Sync>;
 
-struct Queue<T> {
+struct ItemQueue<T> {
     items: VecDeque<T>,
     /// When the owner's thread wakes by itself.
     wakes_at: Option<Instant>,
@@ -99,14 +99,14 @@ impl<T: Send + 'static> Inbox<T> {
     /// An empty queue.
     #[must_use]
     pub fn new(on_arrival: OnArrival) -> Self {
-        let queue = Queue {
+        let queue = ItemQueue {
             items: VecDeque::new(),
             wakes_at: None,
             is_owner_woken: false,
             is_worker_waiting: false,
             has_changed: false,
         };
-        Self(Arc::new(Shared {
+        Self(Arc::new(InboxShared {
             queue: Mutex::new(queue),
             wake_owner: Condvar::new(),
             wake_worker: Condvar::new(),
@@ -264,8 +264,8 @@ impl<T: Send + 'static> Inbox<T> {
     }
 }
 
-impl<T> Shared<T> {
-    fn lock(&self) -> MutexGuard<'_, Queue<T>> {
+impl<T> InboxShared<T> {
+    fn lock(&self) -> MutexGuard<'_, ItemQueue<T>> {
         // Nothing panics under this lock.
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -363,7 +363,7 @@ impl<T> Shared<T> {
     }
 }
 
-impl<T> Queue<T> {
+impl<T> ItemQueue<T> {
     fn push(&mut self, item: T) {
         self.items.push_back(item);
         self.has_changed = true;

@@ -113,7 +113,7 @@ impl RunRef {
 #[derive(Debug, Args)]
 pub(crate) struct CtlArgs {
     #[command(subcommand)]
-    request: Request,
+    request: ControlRequest,
     #[command(flatten)]
     run: RunRef,
     /// Print the answer as JSON.
@@ -122,7 +122,7 @@ pub(crate) struct CtlArgs {
 }
 
 #[derive(Debug, Subcommand)]
-enum Request {
+enum ControlRequest {
     #[command(flatten)]
     Control(CtlRequest),
     /// Query a robot, for example `cars ctl query Leguin emotion_state`.
@@ -353,9 +353,9 @@ impl From<ByHand> for Intervention {
 /// Carries out a request and prints its answer.
 pub(crate) fn ctl(args: CtlArgs) -> miette::Result<ExitCode> {
     match args.request {
-        Request::Query { robot, what } => query(&args.run, &robot, what.as_deref()),
-        Request::Command { robot, command } => send_command(&args.run, &robot, command),
-        Request::Control(request) => {
+        ControlRequest::Query { robot, what } => query(&args.run, &robot, what.as_deref()),
+        ControlRequest::Command { robot, command } => send_command(&args.run, &robot, command),
+        ControlRequest::Control(request) => {
             let control = request.control()?;
             print_answer(&args.run, &control, args.json)
         }

@@ -41,13 +41,13 @@ const NAMED: usize = 10;
 #[derive(Debug, Args)]
 pub(crate) struct ExperimentArgs {
     #[command(subcommand)]
-    what: What,
+    what: ExperimentCommand,
 }
 
 #[derive(Debug, Subcommand)]
-enum What {
+enum ExperimentCommand {
     /// Play an experiment, or go on with it where it was interrupted: what has been played is not played again.
-    Run(RunArgs),
+    Run(ExperimentRunArgs),
     /// Have the units played by Slurm, Kubernetes or GNU parallel, on machines that all see the folder of the experiment.
     ///
     /// An experiment is planned as by `cars experiment run`; the folder of one that has been planned may be given instead.
@@ -91,7 +91,7 @@ struct PlanArgs {
 
 /// `cars experiment run`.
 #[derive(Debug, Args)]
-struct RunArgs {
+struct ExperimentRunArgs {
     #[command(flatten)]
     plan: PlanArgs,
     /// Write the plan and play nothing: the units are played by `cars experiment unit`.
@@ -186,19 +186,19 @@ fn parse_range<T: FromStr + PartialOrd>(text: &str) -> Option<RangeInclusive<T>>
 /// Plays experiments and shows their results.
 pub(crate) fn experiment(args: ExperimentArgs) -> miette::Result<ExitCode> {
     match args.what {
-        What::Run(args) => run(&args),
-        What::Submit(args) => submit(&args),
-        What::Unit(args) => play_units(&args),
-        What::Merge(args) => {
+        ExperimentCommand::Run(args) => run(&args),
+        ExperimentCommand::Submit(args) => submit(&args),
+        ExperimentCommand::Unit(args) => play_units(&args),
+        ExperimentCommand::Merge(args) => {
             let results = Results::load(&args.folder)?;
             conclude(&results, &args.folder, args.json)
         }
-        What::Status(args) => status(&args.folder),
-        What::Replay(args) => replay::replay(args),
+        ExperimentCommand::Status(args) => status(&args.folder),
+        ExperimentCommand::Replay(args) => replay::replay(args),
     }
 }
 
-fn run(args: &RunArgs) -> miette::Result<ExitCode> {
+fn run(args: &ExperimentRunArgs) -> miette::Result<ExitCode> {
     let (plan, folder) = args.plan.save()?;
     if args.plan_only {
         let units = plan.units();

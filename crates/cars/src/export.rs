@@ -22,7 +22,7 @@ pub(crate) struct ExportArgs {
     #[arg(default_value = LATEST)]
     run: PathBuf,
     #[command(flatten)]
-    format: Format,
+    format: ExportFormat,
     /// Folder of the tables, which is made if it does not exist; file of any other format, without it the standard output.
     #[arg(long, short, value_name = "PATH", required_if_eq("csv", "true"))]
     output: Option<PathBuf>,
@@ -49,7 +49,7 @@ pub(crate) struct ExportArgs {
 /// The format.
 #[derive(Debug, Args)]
 #[group(required = true, multiple = false)]
-struct Format {
+struct ExportFormat {
     /// Tables of events, states and variables as CSV.
     #[arg(long)]
     csv: bool,

@@ -25,7 +25,7 @@ use crate::table;
 pub(crate) struct ForkArgs {
     /// The run and the last tick that it shares with the fork, for example `latest@240`, or `latest@120s`.
     #[arg(value_name = "RUN@TICK")]
-    at: Place,
+    at: TickOfRun,
     /// What changes from the next tick on, for example `network.commands.loss=0.3` or `robot.Butler.params.affect=off`.
     #[arg(long = "set", value_name = "PATH=VALUE")]
     set: Vec<Override>,
@@ -51,12 +51,12 @@ pub(crate) struct ForkArgs {
 
 /// A tick of a run.
 #[derive(Debug, Clone)]
-struct Place {
+struct TickOfRun {
     run: PathBuf,
     moment: Moment,
 }
 
-impl FromStr for Place {
+impl FromStr for TickOfRun {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {

@@ -38,7 +38,7 @@ pub(crate) struct LaunchArgs {
     dry_run: bool,
     /// Print a file for another launcher.
     #[arg(long, value_name = "FORMAT", conflicts_with = "dry_run")]
-    export: Option<Format>,
+    export: Option<LauncherFormat>,
     /// Wait for `cars ctl start` once all robots have joined.
     #[arg(long)]
     paused: bool,
@@ -105,7 +105,7 @@ impl FromStr for ReplayArg {
 
 /// Launchers that `--export` writes for.
 #[derive(Debug, Clone, Copy, ValueEnum)]
-enum Format {
+enum LauncherFormat {
     /// A docker-compose.yml with one service for each process.
     Compose,
 }
@@ -121,7 +121,7 @@ pub(crate) fn launch(args: LaunchArgs) -> miette::Result<ExitCode> {
     let is_quiet = args.quiet;
     let mut launch = args.load()?;
     match export {
-        Some(Format::Compose) => {
+        Some(LauncherFormat::Compose) => {
             terminal::data(launch.export()?)?;
             Ok(ExitCode::SUCCESS)
         }

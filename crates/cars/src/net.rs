@@ -59,7 +59,7 @@ pub(crate) struct PlayArgs {
     plan: Option<PathBuf>,
     /// Kind of link.
     #[arg(long)]
-    via: Via,
+    via: LinkKind,
     #[command(flatten)]
     execution: ExecutionArgs,
     /// Further options of `cars launch`, after `--`.
@@ -69,7 +69,7 @@ pub(crate) struct PlayArgs {
 
 /// Kinds of links.
 #[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
-enum Via {
+enum LinkKind {
     /// A TCP proxy for each process: cut, close, delay, jitter, bandwidth. Needs no privileges.
     Proxy,
     /// A network namespace for each process, connected by a veth pair: cut. Needs root and `ip` (iproute2).
@@ -165,9 +165,9 @@ fn play(args: PlayArgs) -> miette::Result<ExitCode> {
     siblings::build()?;
 
     let via = match args.via {
-        Via::Proxy => net::Via::Proxy,
-        Via::Namespaces => net::Via::Namespaces,
-        Via::Compose => net::Via::Compose,
+        LinkKind::Proxy => net::Via::Proxy,
+        LinkKind::Namespaces => net::Via::Namespaces,
+        LinkKind::Compose => net::Via::Compose,
     };
     let play = net::Play {
         file: args.file,

@@ -16,17 +16,17 @@ use scenario::Scenario;
 #[derive(Debug, Args)]
 pub(crate) struct NewArgs {
     #[command(subcommand)]
-    what: What,
+    what: NewCommand,
 }
 
 #[derive(Debug, Subcommand)]
-enum What {
+enum NewCommand {
     /// A folder with a robot program, a scenario and a launch file.
-    Robot(RobotArgs),
+    Robot(NewRobotArgs),
 }
 
 #[derive(Debug, Args)]
-struct RobotArgs {
+struct NewRobotArgs {
     /// Name of the robot and of its folder.
     name: RobotName,
     /// Programming language.
@@ -160,7 +160,7 @@ impl Language {
 
 /// Makes a skeleton and prints the next steps.
 pub(crate) fn new(args: &NewArgs) -> miette::Result<ExitCode> {
-    let What::Robot(args) = &args.what;
+    let NewCommand::Robot(args) = &args.what;
     let folder = args.out.join(args.name.as_str());
     let skeleton = args.lang.skeleton();
     check_launch(&skeleton, &args.name)?;

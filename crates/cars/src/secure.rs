@@ -12,18 +12,18 @@ use terminal::OutputError;
 #[derive(Debug, Args)]
 pub(crate) struct SecureArgs {
     #[command(subcommand)]
-    task: Task,
+    task: SecureCommand,
 }
 
 #[derive(Debug, Subcommand)]
-enum Task {
+enum SecureCommand {
     /// Make certificates, private keys and configuration files for a roster.
-    Init(InitArgs),
+    Init(SecureInitArgs),
 }
 
 /// `cars secure init`.
 #[derive(Debug, Args)]
-struct InitArgs {
+struct SecureInitArgs {
     /// The folder to make.
     folder: PathBuf,
     /// The robots that may take part, for example `Butler,Leguin`.
@@ -45,7 +45,7 @@ struct InitArgs {
 
 /// Makes the certificates and configuration files of a secured run.
 pub(crate) fn secure(args: SecureArgs) -> miette::Result<ExitCode> {
-    let Task::Init(init) = args.task;
+    let SecureCommand::Init(init) = args.task;
     let certificates = Certificates {
         folder: init.folder,
         robots: init.robots,

@@ -22,12 +22,12 @@ pub struct FileError {
     message: String,
     is_warning: bool,
     help: Option<String>,
-    place: Option<Box<Place>>,
+    place: Option<Box<ErrorLocation>>,
 }
 
 /// The place of an error in a text.
 #[derive(Debug)]
-struct Place {
+struct ErrorLocation {
     source: NamedSource<String>,
     label: LabeledSpan,
 }
@@ -83,7 +83,7 @@ impl FileError {
     pub fn at(source: &Source, span: Option<Range<usize>>, message: &str) -> Self {
         let name = escape_line(&source.name);
         let (text, span) = escaped_with_span(&source.text, span.unwrap_or(0..0));
-        let place = Place {
+        let place = ErrorLocation {
             source: NamedSource::new(&name, text).with_language("toml"),
             label: LabeledSpan::at(span, escape_text(message)),
         };

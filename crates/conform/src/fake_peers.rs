@@ -27,7 +27,7 @@ pub(crate) struct Asked {
 }
 
 #[derive(Default)]
-struct State {
+struct PeersState {
     now: (Epoch, Tick),
     asked: Vec<Asked>,
     is_holding: bool,
@@ -38,7 +38,7 @@ struct State {
 #[derive(Clone, Default)]
 pub(crate) struct FakePeers {
     others: Arc<BTreeMap<RobotName, Role>>,
-    state: Arc<Mutex<State>>,
+    state: Arc<Mutex<PeersState>>,
     /// Whether everything that is put carries unknown fields.
     has_extras: bool,
     /// Whether whole numbers are written without a fraction wherever a fraction is possible.
@@ -64,7 +64,7 @@ impl FakePeers {
         self.others.keys()
     }
 
-    fn state(&self) -> MutexGuard<'_, State> {
+    fn state(&self) -> MutexGuard<'_, PeersState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 

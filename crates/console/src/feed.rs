@@ -23,13 +23,13 @@ const MAX_PANEL_BYTES: usize = 32 << 20;
 
 /// What a run shows now.
 pub(crate) struct Feed {
-    state: Mutex<State>,
+    state: Mutex<FeedState>,
     /// Notified of every change of `state`.
     changed: watch::Sender<()>,
 }
 
 #[derive(Default)]
-struct State {
+struct FeedState {
     /// Whether the simulator's liveliness token is declared.
     is_present: bool,
     /// Whether it ever was.
@@ -81,11 +81,11 @@ impl Feed {
         }
     }
 
-    fn lock(&self) -> MutexGuard<'_, State> {
+    fn lock(&self) -> MutexGuard<'_, FeedState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn change<T>(&self, change: impl FnOnce(&mut State) -> T) -> T {
+    fn change<T>(&self, change: impl FnOnce(&mut FeedState) -> T) -> T {
         let outcome = change(&mut self.lock());
         self.changed.send_replace(());
         outcome
@@ -178,7 +178,7 @@ impl Feed {
     }
 }
 
-impl State {
+impl FeedState {
     fn put_frame(&mut self, encoded: EncodedFrame) {
         let frame = &encoded.frame;
         let previous = self.frame.as_ref().map(|previous| &previous.frame);

@@ -68,7 +68,7 @@ impl std::str::FromStr for AllowedHost {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let is_part = |c: char| c.is_ascii_alphanumeric() || "-.:[]".contains(c);
-        let is_host = !Host::parse(text).name.is_empty() && text.chars().all(is_part);
+        let is_host = !HostHeader::parse(text).name.is_empty() && text.chars().all(is_part);
         if !is_host || text.len() > MAX_HOST_BYTES {
             return Err(format!(
                 "{text:?} is not a host such as cars.example.org or cars.example.org:8443, without http:// and path"
@@ -193,7 +193,7 @@ impl Guard {
     }
 
     fn is_own(&self, host: &str) -> bool {
-        let host = Host::parse(host);
+        let host = HostHeader::parse(host);
         if host.port != Some(self.address.port()) {
             return false;
         }
@@ -243,14 +243,14 @@ fn is_static(path: &str) -> bool {
 }
 
 /// The value of a `Host` header.
-struct Host<'a> {
+struct HostHeader<'a> {
     /// A name or an IP address, without brackets.
     name: &'a str,
     /// `None` if it is not a port number.
     port: Option<u16>,
 }
 
-impl<'a> Host<'a> {
+impl<'a> HostHeader<'a> {
     fn parse(text: &'a str) -> Self {
         // The colons in `[::1]` are not followed by a port.
         let with_port = text

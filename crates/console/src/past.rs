@@ -17,13 +17,13 @@ const MAX_EPOCHS: usize = 100;
 /// The recorded epochs of a run.
 #[derive(Debug)]
 pub(crate) struct Past {
-    place: Place,
+    place: RecordingSource,
     open: Mutex<Open>,
 }
 
 /// Where the recordings are.
 #[derive(Debug)]
-enum Place {
+enum RecordingSource {
     /// A run that is over, or the recording of one epoch.
     Finished {
         /// Folder of the other epochs; none if one epoch was asked for.
@@ -60,7 +60,7 @@ impl Past {
 
         let last = Arc::new(Recording::open(&file, 1)?);
         Ok(Self {
-            place: Place::Finished { folder },
+            place: RecordingSource::Finished { folder },
             open: Mutex::new(Open {
                 last: Some(last),
                 ..Open::default()
@@ -71,7 +71,7 @@ impl Past {
     /// What a run in progress has recorded in its folder.
     pub(crate) fn growing(folder: PathBuf, run: RunName) -> Self {
         Self {
-            place: Place::Growing { folder, run },
+            place: RecordingSource::Growing { folder, run },
             open: Mutex::default(),
         }
     }
@@ -86,7 +86,7 @@ impl Past {
     /// [`OpenError`] if there is none, or it cannot be read.
     pub(crate) fn last(&self) -> Result<Arc<Recording>, OpenError> {
         let mut open = self.lock();
-        let Place::Growing { folder, run } = &self.place else {
+        let RecordingSource::Growing { folder, run } = &self.place else {
             return open.last.clone().ok_or(OpenError::NoEpoch);
         };
 
@@ -159,8 +159,8 @@ impl Past {
 
     fn folder(&self) -> Option<&Path> {
         match &self.place {
-            Place::Finished { folder } => folder.as_deref(),
-            Place::Growing { folder, .. } => Some(folder),
+            RecordingSource::Finished { folder } => folder.as_deref(),
+            RecordingSource::Growing { folder, .. } => Some(folder),
         }
     }
 }

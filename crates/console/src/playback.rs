@@ -56,7 +56,7 @@ pub(crate) struct Recording {
 
 /// The header of a recording, and its length.
 #[derive(Debug, Serialize)]
-struct Summary<'a> {
+struct RecordingHeader<'a> {
     #[serde(flatten)]
     header: &'a Header,
     /// The last tick.
@@ -71,7 +71,7 @@ struct Summary<'a> {
 /// What happened in a range of ticks, as a JSON object. Reports and panels are in it as they were recorded: to decode them and
 /// encode them again would take most of the time of a seek.
 #[derive(Debug, Default)]
-struct Range {
+struct EncodedRange {
     /// The tick after the range.
     end: Tick,
     /// Elements of a list: each tick as a frame of a run in progress shows it.
@@ -182,7 +182,7 @@ impl Recording {
     /// What holds for the whole recording, as JSON. `epochs` are those that have a recording.
     pub(crate) fn summary(&self, epochs: &[Epoch]) -> Vec<u8> {
         let file = self.file();
-        to_json(&Summary {
+        to_json(&RecordingHeader {
             header: &self.header,
             ticks: file.len().saturating_sub(1),
             is_finished: file.is_finished(),
@@ -206,9 +206,9 @@ impl Recording {
             from
         };
 
-        let mut range = Range {
+        let mut range = EncodedRange {
             end: to.min(file.len()).max(from),
-            ..Range::default()
+            ..EncodedRange::default()
         };
         let mut timeline = self.diagrams.before(&file, begin)?;
         let mut last_reports = BTreeMap::new();
@@ -255,7 +255,7 @@ fn add_tick(
     mut recorded: RawTick,
     timeline: &Timeline,
     last_reports: &mut BTreeMap<RobotName, Json>,
-    range: &mut Range,
+    range: &mut EncodedRange,
 ) -> Result<(), RecordingError> {
     let tick = recorded.tick();
     last_reports.append(&mut recorded.reports);
@@ -297,7 +297,7 @@ fn add_tick(
     Ok(())
 }
 
-impl Range {
+impl EncodedRange {
     /// Adds a panel with the tick in which it arrived.
     fn add_panel(&mut self, tick: Tick, robot: &RobotName, panel: &Json) {
         self.panels.add_object(&[

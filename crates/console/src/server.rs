@@ -70,17 +70,17 @@ fn routes(app: Arc<App>) -> Router {
 
 /// Connections that have not sent a complete request yet, the oldest first.
 #[derive(Default)]
-struct Unheard(Mutex<BTreeMap<u64, Arc<Notify>>>);
+struct OpeningConnections(Mutex<BTreeMap<u64, Arc<Notify>>>);
 
 /// A connection that has not sent a complete request yet; it is counted until it has, or is dropped.
 struct Newcomer {
-    unheard: Arc<Unheard>,
+    unheard: Arc<OpeningConnections>,
     number: u64,
     /// Notified when the connection has to make room.
     evicted: Arc<Notify>,
 }
 
-impl Unheard {
+impl OpeningConnections {
     fn lock(&self) -> MutexGuard<'_, BTreeMap<u64, Arc<Notify>>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -121,7 +121,7 @@ impl Drop for Newcomer {
 pub(crate) async fn serve(listener: TcpListener, app: Arc<App>) {
     let routes = routes(app.clone());
     let connections = Arc::new(Semaphore::new(MAX_CONNECTIONS));
-    let unheard = Arc::new(Unheard::default());
+    let unheard = Arc::new(OpeningConnections::default());
     let mut ending = app.ending();
 
     for number in 0.. {

@@ -55,7 +55,7 @@ pub fn write(
     }
 
     let header = recording.header();
-    let mut writer = Writer::begin(out, &header.robots)?;
+    let mut writer = TraceWriter::begin(out, &header.robots)?;
     let mut next = first;
     while next < end {
         let to = next.saturating_add(AT_ONCE).min(end);
@@ -86,7 +86,7 @@ fn notes<W: Write>(
     recording: &Recording,
     first: Tick,
     end: Tick,
-    writer: &Writer<W>,
+    writer: &TraceWriter<W>,
 ) -> Vec<String> {
     let mut notes = Vec::new();
     if !writer.has_reports && writer.untimed < end - first {
@@ -113,12 +113,12 @@ fn notes<W: Write>(
 
 /// Writes the events of a trace. Their kind is `ph`: `X` is a slice of time, `i` an instant, `C` the value of counters, `M` the
 /// name of a track.
-struct Writer<'a, W: Write> {
+struct TraceWriter<'a, W: Write> {
     out: &'a mut W,
     /// The threads of the robots.
     threads: BTreeMap<RobotName, u32>,
     is_first: bool,
-    rate: Rate,
+    rate: TickRate,
     /// Whether any robot's report had a time.
     has_reports: bool,
     /// Ticks without times.
@@ -127,12 +127,12 @@ struct Writer<'a, W: Write> {
 
 /// Ticks per second since it was stated last.
 #[derive(Default)]
-struct Rate {
+struct TickRate {
     since_ns: Option<u64>,
     ticks: u32,
 }
 
-impl Rate {
+impl TickRate {
     /// Counts a tick. Returns the rate if it is to be stated now, ticks per second.
     fn count(&mut self, completed_ns: u64) -> Option<f64> {
         let since_ns = *self.since_ns.get_or_insert(completed_ns);
@@ -152,7 +152,7 @@ impl Rate {
     }
 }
 
-impl<'a, W: Write> Writer<'a, W> {
+impl<'a, W: Write> TraceWriter<'a, W> {
     /// Writes the names of the tracks.
     fn begin(out: &'a mut W, robots: &[RobotName]) -> std::io::Result<Self> {
         out.write_all(b"{\"displayTimeUnit\":\"ms\",\"traceEvents\":[")?;
@@ -164,7 +164,7 @@ impl<'a, W: Write> Writer<'a, W> {
             out,
             threads: threads.clone(),
             is_first: true,
-            rate: Rate::default(),
+            rate: TickRate::default(),
             has_reports: false,
             untimed: 0,
         };

@@ -67,9 +67,9 @@ pub fn draw(files: &EpochFiles, window: Window, mut options: Options) -> miette:
     }
 
     let mut notes = Vec::new();
-    let held_up = HeldUp::read(files, from, to).unwrap_or_else(|error| {
+    let held_up = HeldTicks::read(files, from, to).unwrap_or_else(|error| {
         notes.push(format!("{error}: ticks that were held up are not marked"));
-        HeldUp::default()
+        HeldTicks::default()
     });
     let mut diagram = Diagram::new(timeline, tick_s, from, options);
     let mut has_end = false;
@@ -117,14 +117,14 @@ fn beginning(entry: &Entry) -> Option<(u64, f64)> {
 
 /// For whom the clock was held, as far as the epoch was recorded.
 #[derive(Default)]
-struct HeldUp {
+struct HeldTicks {
     /// By tick.
     awaited: BTreeMap<Tick, Vec<Awaited>>,
     /// The first tick that the recording does not have; `None` without a recording.
     end: Option<Tick>,
 }
 
-impl HeldUp {
+impl HeldTicks {
     fn read(files: &EpochFiles, from: Tick, to: Tick) -> Result<Self, RecordingError> {
         let mut held_up = Self::default();
         if !files.recording.exists() {

@@ -36,7 +36,7 @@ pub fn judge(
     expectations: &[Expectation],
 ) -> miette::Result<Verdicts> {
     let mut record = Record::of_events(&files.events)?;
-    let mut recorded = States::open(files, expectations)?;
+    let mut recorded = LastReports::open(files, expectations)?;
     let roster = scenario.roster();
     let mut watches = Monitors::new(expectations, scenario.tick_s, scenario.body_m, &roster);
     let mut verdicts = Verdicts::default();
@@ -64,7 +64,7 @@ pub fn judge(
 fn observe(
     watches: &mut Monitors,
     entry: &Entry,
-    recorded: Option<&States>,
+    recorded: Option<&LastReports>,
     tick_s: f64,
 ) -> Vec<Event> {
     watches.observe(&Observation {
@@ -96,12 +96,12 @@ impl Verdicts {
 }
 
 /// What robots reported last, tick by tick, from a recording.
-struct States {
+struct LastReports {
     ticks: Ticks,
     last: LastStates,
 }
 
-impl States {
+impl LastReports {
     /// Opens the recording, if the expectations need it.
     fn open(files: &EpochFiles, expectations: &[Expectation]) -> miette::Result<Option<Self>> {
         let mut needing = expectations.iter().filter(|one| one.needs_states());

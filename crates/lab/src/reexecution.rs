@@ -26,7 +26,7 @@ pub(crate) struct Reexecution {
     run: RunName,
     pub(crate) local: Local,
     /// What robots taken from the record do in the tick in progress.
-    script: Script,
+    script: RecordedReports,
     /// Robots that are taken from the record.
     pub(crate) scripted: BTreeSet<RobotName>,
     /// Robots that missed the last tick.
@@ -65,7 +65,7 @@ impl Reexecution {
     pub(crate) fn new(scenario: Scenario, epoch: Epoch) -> miette::Result<Self> {
         // Robots learn the name of the run, and nothing of the record depends on it.
         let run = RunName::new("verify").into_diagnostic()?;
-        let script = Script::default();
+        let script = RecordedReports::default();
         let mut scripted = BTreeSet::new();
         let mut from_record = BTreeMap::new();
         let mut robots = BTreeMap::new();
@@ -343,9 +343,9 @@ impl Exchange<News, Arc<Report>, CommandText> for Repeated<'_> {
 
 /// What robots that are not executed reported for the tick in progress.
 #[derive(Clone, Default)]
-struct Script(Arc<Mutex<BTreeMap<RobotName, Report>>>);
+struct RecordedReports(Arc<Mutex<BTreeMap<RobotName, Report>>>);
 
-impl Script {
+impl RecordedReports {
     fn set(&self, recorded: &Entry) {
         let reports = recorded.reports.clone().unwrap_or_default();
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = reports;
@@ -353,14 +353,14 @@ impl Script {
 
     /// A robot that does what is recorded of it. It sends no commands: they are taken from the record where they count.
     fn robot(&self) -> Box<dyn Robot> {
-        Box::new(Scripted(self.clone()))
+        Box::new(PublishedRobot(self.clone()))
     }
 }
 
 /// A robot that publishes what is recorded of it, for the robots that query it.
-struct Scripted(Script);
+struct PublishedRobot(RecordedReports);
 
-impl Robot for Scripted {
+impl Robot for PublishedRobot {
     fn init(&mut self, _cars: &mut Cars<'_>) -> Result<(), BadParameters> {
         Ok(())
     }

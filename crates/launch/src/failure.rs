@@ -41,7 +41,7 @@ impl std::fmt::Display for Failure {
 
 /// What the console is told of a failure that ended a run.
 #[derive(Debug, Serialize)]
-struct Shown<'a> {
+struct FailureMessage<'a> {
     text: &'a str,
     lines: &'a [String],
     log: &'a Path,
@@ -56,7 +56,7 @@ impl Failure {
 
     /// Leaves the failure for the console, among the logs of the run, which is resumed by `command`.
     pub(super) fn show(&self, logs: &Path, command: String) -> std::io::Result<()> {
-        let shown = Shown {
+        let shown = FailureMessage {
             text: &self.text,
             lines: &self.tail,
             log: &self.log,

@@ -40,14 +40,14 @@ pub(super) struct Watch {
 
 /// A running observer.
 pub(super) struct Observer {
-    state: Arc<Mutex<State>>,
+    state: Arc<Mutex<ObserverPhase>>,
     /// Receives a word when the simulator's token is undeclared.
     ended: Receiver<()>,
 }
 
 /// How far an observer has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum State {
+enum ObserverPhase {
     /// It tries to reach the simulator.
     Connecting,
     /// It observes.
@@ -65,7 +65,7 @@ impl Observer {
     /// If the system starts no further thread.
     pub(super) fn start(watch: Watch) -> std::io::Result<Self> {
         let (end, ended) = std::sync::mpsc::channel();
-        let state = Arc::new(Mutex::new(State::Connecting));
+        let state = Arc::new(Mutex::new(ObserverPhase::Connecting));
         let observer = Self {
             state: state.clone(),
             ended,
@@ -78,17 +78,17 @@ impl Observer {
 
     /// Waits a short time until everything that the simulator has put is shown.
     pub(super) fn finish(&self) {
-        if advance(&self.state, State::Over) == State::Observing {
+        if advance(&self.state, ObserverPhase::Over) == ObserverPhase::Observing {
             let _in_time = self.ended.recv_timeout(Duration::from_millis(500));
         }
     }
 }
 
 /// Sets the state, which returns to no earlier one, and returns the one before.
-fn advance(state: &Mutex<State>, next: State) -> State {
+fn advance(state: &Mutex<ObserverPhase>, next: ObserverPhase) -> ObserverPhase {
     let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
     let before = *state;
-    if before != State::Over {
+    if before != ObserverPhase::Over {
         *state = next;
     }
     before
@@ -96,11 +96,11 @@ fn advance(state: &Mutex<State>, next: State) -> State {
 
 impl Watch {
     /// Observes until the launch is over.
-    fn observe(self, state: &Mutex<State>, end: &Sender<()>) {
-        while advance(state, State::Connecting) != State::Over {
+    fn observe(self, state: &Mutex<ObserverPhase>, end: &Sender<()>) {
+        while advance(state, ObserverPhase::Connecting) != ObserverPhase::Over {
             match self.open(end.clone()) {
                 Ok((bus, _declared)) => {
-                    advance(state, State::Observing);
+                    advance(state, ObserverPhase::Observing);
                     for gone in &self.gone {
                         self.report(&bus, gone);
                     }

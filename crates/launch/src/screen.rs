@@ -183,7 +183,7 @@ struct Painter {
 }
 
 /// Text for one of the two streams.
-struct Piece {
+struct ScreenText {
     is_out: bool,
     text: String,
 }
@@ -221,7 +221,7 @@ impl Painter {
 
     /// Writes a batch: all lines first, then the newest progress.
     fn show(&mut self, batch: Vec<Show>) {
-        let mut pieces: Vec<Piece> = Vec::new();
+        let mut pieces: Vec<ScreenText> = Vec::new();
         let mut progress = None;
         for show in batch {
             if !matches!(show, Show::Notice(_) | Show::Finish) {
@@ -248,7 +248,7 @@ impl Painter {
         }
     }
 
-    fn write(&mut self, pieces: &[Piece]) {
+    fn write(&mut self, pieces: &[ScreenText]) {
         if pieces.is_empty() {
             return;
         }
@@ -271,7 +271,7 @@ impl Painter {
             "{count} lines came too fast to be shown; the run's folder contains all of them"
         );
         let text = self.notice_line(&text);
-        self.write(&[Piece {
+        self.write(&[ScreenText {
             is_out: false,
             text,
         }]);
@@ -317,14 +317,14 @@ impl Painter {
 }
 
 /// Appends a line to the last piece, or begins a new one if that belongs to the other stream.
-fn append(pieces: &mut Vec<Piece>, is_out: bool, line: String) {
+fn append(pieces: &mut Vec<ScreenText>, is_out: bool, line: String) {
     match pieces.last_mut() {
         Some(piece) if piece.is_out == is_out => piece.text += &line,
-        _ => pieces.push(Piece { is_out, text: line }),
+        _ => pieces.push(ScreenText { is_out, text: line }),
     }
 }
 
-fn write(pieces: &[Piece], out: &mut Writer, err: &mut Writer) {
+fn write(pieces: &[ScreenText], out: &mut Writer, err: &mut Writer) {
     for piece in pieces {
         let to = if piece.is_out { &mut *out } else { &mut *err };
         let written = to.write_all(piece.text.as_bytes());

@@ -15,7 +15,7 @@ use crate::outputs::{Ignored, Output, Refused, Stamp, Timer, Timing};
 
 /// What the barrier is doing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-enum Phase {
+enum BarrierPhase {
     /// Robots of the roster are missing.
     Gathering,
     /// Every robot is connected, and tick 0 is not granted yet.
@@ -35,7 +35,7 @@ pub struct Barrier<R, C> {
     lateness: Lateness,
     timing: Timing,
     max_commands: u32,
-    phase: Phase,
+    phase: BarrierPhase,
     epoch: Epoch,
     tick: Tick,
     /// Robots for which the simulation has news of the open tick.
@@ -63,7 +63,7 @@ impl<R, C> Barrier<R, C> {
             lateness,
             timing,
             max_commands,
-            phase: Phase::Gathering,
+            phase: BarrierPhase::Gathering,
             epoch: 0,
             tick: 0,
             news: BTreeSet::new(),
@@ -76,7 +76,7 @@ impl<R, C> Barrier<R, C> {
     /// Begins an epoch: waits until every robot of the roster is connected, then asks for tick 0 by
     /// [`Output::Gathered`]. An open tick is given up.
     pub fn gather(&mut self, epoch: Epoch, lateness: Lateness, out: &mut Vec<Output<R, C>>) {
-        self.phase = Phase::Gathering;
+        self.phase = BarrierPhase::Gathering;
         self.epoch = epoch;
         self.tick = 0;
         self.lateness = lateness;
@@ -108,10 +108,10 @@ impl<R, C> Barrier<R, C> {
     /// Grants a tick. `news` are the robots for which the simulation has something new.
     pub fn open(&mut self, tick: Tick, news: BTreeSet<RobotName>, out: &mut Vec<Output<R, C>>) {
         assert!(
-            matches!(self.phase, Phase::Gathered | Phase::Between),
+            matches!(self.phase, BarrierPhase::Gathered | BarrierPhase::Between),
             "a tick is granted when the one before is complete"
         );
-        self.phase = Phase::Open;
+        self.phase = BarrierPhase::Open;
         self.tick = tick;
         self.news = news;
 
@@ -153,7 +153,7 @@ impl<R, C> Barrier<R, C> {
         instance: &str,
         out: &mut Vec<Output<R, C>>,
     ) -> Result<Admission, Refused> {
-        if self.phase == Phase::Over {
+        if self.phase == BarrierPhase::Over {
             return Err(Refused::Ended);
         }
         let index = self.members.keys().position(|own| own == name);
@@ -180,7 +180,7 @@ impl<R, C> Barrier<R, C> {
 
     /// A robot's liveliness token was declared or undeclared.
     pub fn token(&mut self, name: &RobotName, is_present: bool, out: &mut Vec<Output<R, C>>) {
-        let is_open = self.phase == Phase::Open;
+        let is_open = self.phase == BarrierPhase::Open;
         let Some(member) = self.members.get_mut(name) else {
             out.push(Output::Ignored(Ignored::UnknownRobot, name.clone()));
             return;
@@ -208,7 +208,7 @@ impl<R, C> Barrier<R, C> {
             self.settle(out);
         }
 
-        if self.phase == Phase::Gathering {
+        if self.phase == BarrierPhase::Gathering {
             self.check_all_joined(out);
         }
         if self.is_announced {
@@ -295,10 +295,10 @@ impl<R, C> Barrier<R, C> {
     /// A timer that was set has fired. It may be of a tick that is over: a timer is replaced, never withdrawn, so it
     /// decides nothing that the state does not bear out.
     pub fn timer(&mut self, timer: &Timer, out: &mut Vec<Output<R, C>>) {
-        let is_open = self.phase == Phase::Open;
+        let is_open = self.phase == BarrierPhase::Open;
         match timer {
             Timer::Announce => {
-                let is_waiting = is_open || self.phase == Phase::Gathering;
+                let is_waiting = is_open || self.phase == BarrierPhase::Gathering;
                 if is_waiting && !self.is_announced {
                     self.is_announced = true;
                     out.push(Output::Held);
@@ -325,7 +325,7 @@ impl<R, C> Barrier<R, C> {
     /// Puts the last clock and its news again. Between two ticks that is the clock of the complete one: it reaches a
     /// robot that is asked to join again, and changes nothing for any other.
     pub fn repeat(&mut self, out: &mut Vec<Output<R, C>>) {
-        if matches!(self.phase, Phase::Open | Phase::Between) {
+        if matches!(self.phase, BarrierPhase::Open | BarrierPhase::Between) {
             self.grant(out);
         }
     }
@@ -340,7 +340,7 @@ impl<R, C> Barrier<R, C> {
 
     /// The run is over: returns the clock to put.
     pub fn end(&mut self, end: End) -> Clock {
-        self.phase = Phase::Over;
+        self.phase = BarrierPhase::Over;
 
         Clock {
             epoch: self.epoch,
@@ -353,7 +353,7 @@ impl<R, C> Barrier<R, C> {
     /// Changes what the clock does about late robots.
     pub fn set_lateness(&mut self, lateness: Lateness, out: &mut Vec<Output<R, C>>) {
         self.lateness = lateness;
-        if self.phase == Phase::Open {
+        if self.phase == BarrierPhase::Open {
             self.set_timers(out);
         }
     }
@@ -378,7 +378,7 @@ impl<R, C> Barrier<R, C> {
     /// Whether a tick is open.
     #[must_use]
     pub fn is_open(&self) -> bool {
-        self.phase == Phase::Open
+        self.phase == BarrierPhase::Open
     }
 
     /// Whether people have been told that the clock is held.
@@ -448,8 +448,8 @@ impl<R, C> Barrier<R, C> {
         let mut awaited = Vec::new();
         for (name, member) in &self.members {
             let reason = match self.phase {
-                Phase::Gathering if !member.is_ready() => Reason::NotJoined,
-                Phase::Open if member.is_awaited() => match member.waits_for() {
+                BarrierPhase::Gathering if !member.is_ready() => Reason::NotJoined,
+                BarrierPhase::Open if member.is_awaited() => match member.waits_for() {
                     _ if !member.has_token => Reason::Gone,
                     Some(other) => Reason::WaitsFor(other.clone()),
                     None => Reason::Silent,
@@ -467,7 +467,7 @@ impl<R, C> Barrier<R, C> {
     }
 
     fn is_open_at(&self, epoch: Epoch, tick: Tick) -> bool {
-        self.phase == Phase::Open && (epoch, tick) == (self.epoch, self.tick)
+        self.phase == BarrierPhase::Open && (epoch, tick) == (self.epoch, self.tick)
     }
 
     /// What has come from a robot for the open tick, if a message with this stamp counts.
@@ -498,7 +498,7 @@ impl<R, C> Barrier<R, C> {
 
     fn check_all_joined(&mut self, out: &mut Vec<Output<R, C>>) {
         if self.members.values().all(Member::is_ready) {
-            self.phase = Phase::Gathered;
+            self.phase = BarrierPhase::Gathered;
             if std::mem::take(&mut self.is_announced) {
                 out.push(Output::Released);
             }
@@ -508,7 +508,7 @@ impl<R, C> Barrier<R, C> {
 
     /// Has the state of a robot put that cannot answer, because the clock goes on without it in the open tick.
     fn stand_in(&self, robot: &RobotName, out: &mut Vec<Output<R, C>>) {
-        if self.phase == Phase::Open && self.is_member(robot, Member::is_given_up) {
+        if self.phase == BarrierPhase::Open && self.is_member(robot, Member::is_given_up) {
             out.push(Output::StandIn(robot.clone()));
         }
     }
@@ -621,13 +621,13 @@ impl<R, C> Barrier<R, C> {
     /// Completes the open tick if no robot is awaited any more. Whatever may have been the last thing that it waited
     /// for calls this.
     fn settle(&mut self, out: &mut Vec<Output<R, C>>) {
-        if self.phase != Phase::Open || self.members.values().any(Member::is_awaited) {
+        if self.phase != BarrierPhase::Open || self.members.values().any(Member::is_awaited) {
             return;
         }
 
         // From here on nothing that arrives can change the tick: reports, tokens and timers ask for the phase, so
         // those that come between two ticks are for the next one, or stale.
-        self.phase = Phase::Between;
+        self.phase = BarrierPhase::Between;
         if std::mem::take(&mut self.is_announced) {
             out.push(Output::Released);
         }

@@ -76,7 +76,7 @@ struct Asking {
 
 /// News as they arrived.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-struct Arrived<N> {
+struct ArrivedNews<N> {
     joined: Option<Generation>,
     news: N,
 }
@@ -91,7 +91,7 @@ pub struct Participant<N, S, C, R> {
     /// The newest clock that has not been run, of the epoch that it was admitted to.
     pending: Option<Clock>,
     /// News of ticks that have not been run.
-    news: BTreeMap<(Epoch, Tick), Arrived<N>>,
+    news: BTreeMap<(Epoch, Tick), ArrivedNews<N>>,
     states: States<S>,
     /// States of other robots, with the tick when each was last asked for.
     others: BTreeMap<RobotName, States<S>>,
@@ -280,7 +280,8 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         if is_over {
             return;
         }
-        self.news.insert((epoch, tick), Arrived { joined, news });
+        self.news
+            .insert((epoch, tick), ArrivedNews { joined, news });
         // Those of later epochs, which only a welcome confirms, take no room from the others.
         let mut later = self.news.split_off(&(admission.epoch, Tick::MAX));
         for kept in [&mut self.news, &mut later] {

@@ -332,14 +332,14 @@ struct RawMeasure {
 #[serde(deny_unknown_fields)]
 struct RawShare {
     robot: RobotName,
-    emotion: Option<Words>,
-    behavior: Option<Words>,
+    emotion: Option<OneOrMoreWords>,
+    behavior: Option<OneOrMoreWords>,
 }
 
 /// One word, or several.
 #[derive(Debug, Deserialize)]
 #[serde(untagged, expecting = "a word, or a list of words")]
-enum Words {
+enum OneOrMoreWords {
     One(String),
     Several(Vec<String>),
 }
@@ -476,7 +476,7 @@ impl TryFrom<RawShare> for Share {
     }
 }
 
-impl Words {
+impl OneOrMoreWords {
     fn list(self) -> Result<Vec<String>, MeasureError> {
         match self {
             Self::One(word) => Ok(vec![word]),

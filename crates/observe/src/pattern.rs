@@ -15,12 +15,12 @@ use crate::words::{self, Word};
 #[serde(try_from = "BTreeMap<String, Value>", into = "Value")]
 pub struct Pattern {
     kind: String,
-    fields: BTreeMap<String, Wanted>,
+    fields: BTreeMap<String, FieldValues>,
 }
 
 /// The values of a field that match; empty for every robot.
 #[derive(Debug, Clone, PartialEq)]
-struct Wanted(Vec<Value>);
+struct FieldValues(Vec<Value>);
 
 /// Every robot, as the value of a field.
 const EVERY_ROBOT: &str = "*";
@@ -216,7 +216,7 @@ impl TryFrom<BTreeMap<String, Value>> for Pattern {
                 return Err(PatternError::NoValue { kind, field });
             }
             if *domain == Domain::Robot && values == [EVERY_ROBOT] {
-                fields.insert(field, Wanted(Vec::new()));
+                fields.insert(field, FieldValues(Vec::new()));
                 continue;
             }
             if let Some(value) = values.iter().find(|value| !domain.has(value)) {
@@ -227,7 +227,7 @@ impl TryFrom<BTreeMap<String, Value>> for Pattern {
                     known: domain.known(),
                 });
             }
-            fields.insert(field, Wanted(values));
+            fields.insert(field, FieldValues(values));
         }
         Ok(Self { kind, fields })
     }
@@ -248,7 +248,7 @@ impl From<Pattern> for Value {
     fn from(pattern: Pattern) -> Self {
         let mut table = serde_json::Map::new();
         table.insert("event".to_owned(), Self::String(pattern.kind));
-        for (field, Wanted(mut values)) in pattern.fields {
+        for (field, FieldValues(mut values)) in pattern.fields {
             let value = match values.len() {
                 0 => EVERY_ROBOT.into(),
                 1 => values.remove(0),
@@ -340,7 +340,7 @@ impl Pattern {
     }
 }
 
-impl Wanted {
+impl FieldValues {
     fn has(&self, value: &Value) -> bool {
         self.0.is_empty() || self.0.iter().any(|wanted| equal(wanted, value))
     }

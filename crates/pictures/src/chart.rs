@@ -120,7 +120,7 @@ fn marker_shape(arm: usize, (x, y): Point) -> String {
 }
 
 /// An arm at the right of a plot.
-struct Name<'a> {
+struct ArmName<'a> {
     label: &'a str,
     arm: usize,
     /// The value at the end of its line.
@@ -129,7 +129,7 @@ struct Name<'a> {
 }
 
 /// Draws the names of arms beside the ends of their lines, none over another one.
-fn draw_names(svg: &mut Markup, names: &[Name<'_>], y: &Scale, right: f64) {
+fn draw_names(svg: &mut Markup, names: &[ArmName<'_>], y: &Scale, right: f64) {
     let wanted: Vec<f64> = names.iter().map(|name| y.at(name.last)).collect();
     let places = spread(&wanted, 14.0, (y.end_px(), y.begin_px()));
     for ((name, wanted), place) in names.iter().zip(wanted).zip(places) {

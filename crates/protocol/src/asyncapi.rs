@@ -18,7 +18,7 @@ const PLACEHOLDERS: [(&str, &str); 3] =
     [("RUN-", "{run}"), ("NAME-", "{name}"), ("FROM-", "{from}")];
 
 /// Where something is said, by what a robot does there.
-struct Channel {
+struct ChannelEntry {
     name: &'static str,
     key: String,
     what: &'static str,
@@ -51,13 +51,13 @@ fn placeholder(name: &'static str) -> RobotName {
 }
 
 /// The keys of a run, with placeholders for what is open.
-fn channels() -> Vec<Channel> {
+fn channels() -> Vec<ChannelEntry> {
     let run = RunName::new("RUN-").unwrap_or_else(|error| unreachable!("a legal name: {error}"));
     let keys = Keys::new(&run);
     let robot = placeholder("NAME-");
     let from = placeholder("FROM-");
 
-    let channel = |name, key, what, messages, operations| Channel {
+    let channel = |name, key, what, messages, operations| ChannelEntry {
         name,
         key,
         what,
@@ -241,7 +241,7 @@ fn reference(path: &[&str]) -> Value {
     json!({ "$ref": format!("#/{}", path.join("/")) })
 }
 
-impl Channel {
+impl ChannelEntry {
     fn document(&self) -> Value {
         let address = address(&self.key);
         let message = |name: &&str| {

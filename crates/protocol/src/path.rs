@@ -2,7 +2,7 @@
 //! of its code that keeps track of paths.
 
 /// What encloses a place in JSON.
-enum Level {
+enum JsonLevel {
     /// An object, and its field that was named last.
     Object {
         field: Option<String>,
@@ -24,11 +24,11 @@ pub(crate) fn of(error: &serde_json::Error, json: &[u8]) -> String {
                 next = end_of_text(json, at).min(end);
                 name_field(&mut levels, &json[at + 1..next]);
             }
-            b'{' => levels.push(Level::Object {
+            b'{' => levels.push(JsonLevel::Object {
                 field: None,
                 expects_name: true,
             }),
-            b'[' => levels.push(Level::Array(0)),
+            b'[' => levels.push(JsonLevel::Array(0)),
             b'}' | b']' => drop(levels.pop()),
             b':' => expect_value(&mut levels),
             b',' => go_on(&mut levels),
@@ -69,8 +69,8 @@ fn end_of_text(json: &[u8], start: usize) -> usize {
 }
 
 /// A text where an object expects a name is that of its next field.
-fn name_field(levels: &mut [Level], text: &[u8]) {
-    if let Some(Level::Object {
+fn name_field(levels: &mut [JsonLevel], text: &[u8]) {
+    if let Some(JsonLevel::Object {
         field,
         expects_name: true,
     }) = levels.last_mut()
@@ -80,31 +80,31 @@ fn name_field(levels: &mut [Level], text: &[u8]) {
     }
 }
 
-fn expect_value(levels: &mut [Level]) {
-    if let Some(Level::Object { expects_name, .. }) = levels.last_mut() {
+fn expect_value(levels: &mut [JsonLevel]) {
+    if let Some(JsonLevel::Object { expects_name, .. }) = levels.last_mut() {
         *expects_name = false;
     }
 }
 
-fn go_on(levels: &mut [Level]) {
+fn go_on(levels: &mut [JsonLevel]) {
     match levels.last_mut() {
-        Some(Level::Object {
+        Some(JsonLevel::Object {
             field,
             expects_name,
         }) => {
             *field = None;
             *expects_name = true;
         }
-        Some(Level::Array(index)) => *index += 1,
+        Some(JsonLevel::Array(index)) => *index += 1,
         None => {}
     }
 }
 
-fn written(levels: &[Level]) -> String {
+fn written(levels: &[JsonLevel]) -> String {
     let mut path = String::new();
     for level in levels {
         match level {
-            Level::Object {
+            JsonLevel::Object {
                 field: Some(field), ..
             } => {
                 if !path.is_empty() {
@@ -112,8 +112,8 @@ fn written(levels: &[Level]) -> String {
                 }
                 path += field;
             }
-            Level::Object { field: None, .. } => {}
-            Level::Array(index) => path += &format!("[{index}]"),
+            JsonLevel::Object { field: None, .. } => {}
+            JsonLevel::Array(index) => path += &format!("[{index}]"),
         }
     }
 

@@ -8,9 +8,9 @@ use crate::scoped_borrow::with_cars;
 
 /// A generator of random numbers, xoshiro256++.
 #[pyclass(module = "cars")]
-pub(crate) struct Stream(Source);
+pub(crate) struct Stream(StreamState);
 
-enum Source {
+enum StreamState {
     /// The stream of the robot whose tick it is.
     OfRobot,
     Own(robot::Stream),
@@ -19,13 +19,13 @@ enum Source {
 impl Stream {
     /// The stream of the robot whose tick it is.
     pub(crate) fn of_robot() -> Self {
-        Self(Source::OfRobot)
+        Self(StreamState::OfRobot)
     }
 
     fn draw<T>(&mut self, draw: impl FnOnce(&mut robot::Stream) -> T) -> PyResult<T> {
         match &mut self.0 {
-            Source::Own(stream) => Ok(draw(stream)),
-            Source::OfRobot => with_cars(|cars| draw(cars.random())),
+            StreamState::Own(stream) => Ok(draw(stream)),
+            StreamState::OfRobot => with_cars(|cars| draw(cars.random())),
         }
     }
 }
@@ -35,7 +35,7 @@ impl Stream {
     /// A stream from a seed of 64 bits.
     #[new]
     fn new(seed: u64) -> Self {
-        Self(Source::Own(robot::Stream::seed_from_u64(seed)))
+        Self(StreamState::Own(robot::Stream::seed_from_u64(seed)))
     }
 
     /// The next draw: an integer from 0 up to but not including 2^64.
@@ -52,7 +52,7 @@ impl Stream {
 /// The stream called `name` of a run with `seed`: the same numbers as in every other language.
 #[pyfunction]
 pub(crate) fn stream(seed: u64, name: &str) -> Stream {
-    Stream(Source::Own(protocol::random::stream(seed, name)))
+    Stream(StreamState::Own(protocol::random::stream(seed, name)))
 }
 
 /// An angle rounded to 1e-6 rad, so that languages whose arc tangents differ in the last bit publish the same number.

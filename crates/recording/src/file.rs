@@ -142,12 +142,12 @@ pub(crate) struct McapFile {
     records: Vec<u8>,
     /// The content of a chunk, compressed; kept for its memory.
     compressed: Vec<u8>,
-    index: Index,
+    index: WrittenIndex,
 }
 
 /// What the index at the end of a file is made of.
 #[derive(Default)]
-struct Index {
+struct WrittenIndex {
     channels: Channels,
     chunks: Vec<u8>,
     chunk_count: u32,
@@ -171,9 +171,9 @@ impl McapFile {
             crc: crc32fast::Hasher::new(),
             records: MAGIC.to_vec(),
             compressed: Vec::new(),
-            index: Index {
+            index: WrittenIndex {
                 channels,
-                ..Index::default()
+                ..WrittenIndex::default()
             },
         };
 
@@ -358,7 +358,7 @@ impl McapFile {
     }
 }
 
-impl Index {
+impl WrittenIndex {
     fn statistics(&self) -> Vec<u8> {
         let (first_ns, last_ns) = self.times_ns.unwrap_or((0, 0));
         let mut bytes = Vec::new();

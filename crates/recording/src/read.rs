@@ -42,7 +42,7 @@ struct TickChunk {
 }
 
 /// A message of a chunk.
-struct Message<'a> {
+struct ChunkMessage<'a> {
     channel: u16,
     time_ns: u64,
     json: &'a [u8],
@@ -469,7 +469,7 @@ fn records(content: &[u8]) -> Option<Vec<(u8, &[u8])>> {
 }
 
 /// The messages of a chunk; `None` if a length is wrong.
-fn messages(content: &[u8]) -> Option<Vec<Message<'_>>> {
+fn messages(content: &[u8]) -> Option<Vec<ChunkMessage<'_>>> {
     let mut messages = Vec::new();
     for (op, body) in records(content)? {
         if op != op::MESSAGE {
@@ -481,7 +481,7 @@ fn messages(content: &[u8]) -> Option<Vec<Message<'_>>> {
         let _sequence = fields.u32()?;
         let time_ns = fields.u64()?;
         let _publish_time_ns = fields.u64()?;
-        messages.push(Message {
+        messages.push(ChunkMessage {
             channel,
             time_ns,
             json: fields.0,

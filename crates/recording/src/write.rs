@@ -37,14 +37,14 @@ pub struct WriteError {
 pub struct Writer {
     path: PathBuf,
     encoder: Encoder,
-    queue: Arc<Queue>,
+    queue: Arc<WriteQueue>,
     thread: Option<JoinHandle<io::Result<()>>>,
 }
 
 /// What is to be written.
 #[derive(Default)]
-struct Queue {
-    state: Mutex<State>,
+struct WriteQueue {
+    state: Mutex<WriterState>,
     /// The thread that writes has something to do.
     due: Condvar,
     /// The thread that writes has done something.
@@ -52,7 +52,7 @@ struct Queue {
 }
 
 #[derive(Default)]
-struct State {
+struct WriterState {
     /// Chunks in their order. The last one gets further ticks if it is open.
     chunks: VecDeque<OpenChunk>,
     /// Chunks that have been written, for their memory.
@@ -73,7 +73,7 @@ struct OpenChunk {
 }
 
 /// What the thread that writes does next.
-enum Task {
+enum WriterTask {
     Write(Chunk),
     Sync,
     Finish,
@@ -92,7 +92,7 @@ impl Writer {
         };
         let file = begin(path, header, scenario, &encoder).map_err(failed)?;
 
-        let queue = Arc::new(Queue::default());
+        let queue = Arc::new(WriteQueue::default());
         let tasks = queue.clone();
         let thread = Builder::new().spawn(move || write(file, &tasks));
         Ok(Self {
@@ -192,23 +192,23 @@ impl Drop for Writer {
     }
 }
 
-impl Queue {
-    fn lock(&self) -> MutexGuard<'_, State> {
+impl WriteQueue {
+    fn lock(&self) -> MutexGuard<'_, WriterState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Waits for something to do.
-    fn next(&self) -> Task {
+    fn next(&self) -> WriterTask {
         let mut state = self.lock();
         loop {
             if let Some(chunk) = state.next_chunk() {
-                return Task::Write(chunk);
+                return WriterTask::Write(chunk);
             }
             if state.wants_sync {
-                return Task::Sync;
+                return WriterTask::Sync;
             }
             if state.is_ended {
-                return Task::Finish;
+                return WriterTask::Finish;
             }
 
             let waited = self.due.wait_timeout(state, CHUNK_INTERVAL);
@@ -217,7 +217,7 @@ impl Queue {
     }
 }
 
-impl State {
+impl WriterState {
     /// The chunk that gets the next tick.
     fn open_chunk(&mut self) -> &mut OpenChunk {
         if self.chunks.back().is_none_or(|last| last.is_full) {
@@ -251,21 +251,21 @@ impl OpenChunk {
 }
 
 /// Writes until there is nothing more to come.
-fn write(mut file: McapFile, queue: &Queue) -> io::Result<()> {
+fn write(mut file: McapFile, queue: &WriteQueue) -> io::Result<()> {
     let _over = Over(queue);
 
     loop {
         match queue.next() {
-            Task::Write(mut chunk) => {
+            WriterTask::Write(mut chunk) => {
                 file.add_chunk(&chunk)?;
                 chunk.clear();
                 queue.lock().spare.push(chunk);
             }
-            Task::Sync => {
+            WriterTask::Sync => {
                 file.sync()?;
                 queue.lock().wants_sync = false;
             }
-            Task::Finish => return file.finish(),
+            WriterTask::Finish => return file.finish(),
         }
 
         queue.done.notify_one();
@@ -273,7 +273,7 @@ fn write(mut file: McapFile, queue: &Queue) -> io::Result<()> {
 }
 
 /// The thread that writes, which no caller waits for after it has ended, however it ended.
-struct Over<'a>(&'a Queue);
+struct Over<'a>(&'a WriteQueue);
 
 impl Drop for Over<'_> {
     fn drop(&mut self) {
@@ -291,6 +291,6 @@ fn begin(path: &Path, header: &Header, scenario: &str, encoder: &Encoder) -> io:
     Ok(file)
 }
 
-fn wait<'a>(done: &Condvar, state: MutexGuard<'a, State>) -> MutexGuard<'a, State> {
+fn wait<'a>(done: &Condvar, state: MutexGuard<'a, WriterState>) -> MutexGuard<'a, WriterState> {
     done.wait(state).unwrap_or_else(PoisonError::into_inner)
 }

@@ -112,7 +112,7 @@ pub struct Host {
     keys: Keys,
     participants: Arc<Participants>,
     actions: Actions,
-    members: BTreeMap<RobotName, Member>,
+    members: BTreeMap<RobotName, HostedRobot>,
     declared: Vec<Declared>,
     /// Subscriptions to other robots' states, by subscriber and robot.
     followed: BTreeMap<(RobotName, RobotName), Declared>,
@@ -133,7 +133,7 @@ impl Stopper {
 }
 
 /// One robot of the process.
-struct Member {
+struct HostedRobot {
     /// The robot, until its first welcome makes a runner of it.
     robot: Option<Box<dyn Robot>>,
     runner: Option<Runner>,
@@ -192,7 +192,7 @@ impl Host {
         let participants = Arc::new(Participants::new(&names, timeouts, actions.clone()));
         let mut members = BTreeMap::new();
         for (name, robot) in robots {
-            let member = Member {
+            let member = HostedRobot {
                 senses_bodies: robot.senses_bodies(),
                 robot: Some(robot),
                 runner: None,
@@ -595,7 +595,7 @@ impl Worker for Host {
     }
 }
 
-impl Member {
+impl HostedRobot {
     /// Makes the robot's runner with its newest welcome, or starts it over.
     fn take_runner(&mut self) {
         let Some(welcome) = self.welcome.take() else {

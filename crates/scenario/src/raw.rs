@@ -68,7 +68,7 @@ pub(super) struct Scenario {
     #[serde(default, rename = "obstacle", skip_serializing_if = "Vec::is_empty")]
     obstacles: Vec<Obstacle>,
     #[serde(default, rename = "robot", skip_serializing_if = "Vec::is_empty")]
-    robots: Vec<Spanned<Robot>>,
+    robots: Vec<Spanned<RawRobot>>,
 }
 
 #[derive(Debug, Deserialize, Serialize)]
@@ -111,7 +111,7 @@ struct Obstacle {
 
 #[derive(Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-struct Robot {
+struct RawRobot {
     name: RobotName,
     class: Option<String>,
     at: FixedList<Length, 2>,
@@ -196,7 +196,7 @@ impl Scenario {
         let sensing_range = self.sensing.as_ref().map(|table| &table.range);
         let sensing_range_m = positive(source, sensing_range, SENSING_RANGE, "the range")?.0;
         let guests = self.guests(source)?;
-        let places = Places::of(&self);
+        let places = FilePlaces::of(&self);
         let obstacles = self.obstacles.iter();
         let obstacles = obstacles.map(|obstacle| point(*obstacle.at.get_ref()));
         let obstacles = obstacles.collect();
@@ -318,7 +318,7 @@ impl Scenario {
 }
 
 /// A distribution in SI units, or its default.
-fn triangular<Q: Quantity>(
+fn triangular<Q: CheckedNumber>(
     source: &Source,
     raw: Option<&Spanned<Range<Q>>>,
     default: Range<Q>,
@@ -330,30 +330,30 @@ fn triangular<Q: Quantity>(
 }
 
 /// A value with a number that can be checked.
-trait Quantity: Copy {
+trait CheckedNumber: Copy {
     /// The number in SI units.
     fn number(self) -> f64;
 }
 
-impl Quantity for Time {
+impl CheckedNumber for Time {
     fn number(self) -> f64 {
         self.0
     }
 }
 
-impl Quantity for Speed {
+impl CheckedNumber for Speed {
     fn number(self) -> f64 {
         self.0
     }
 }
 
-impl Quantity for Length {
+impl CheckedNumber for Length {
     fn number(self) -> f64 {
         self.0
     }
 }
 
-impl Quantity for u32 {
+impl CheckedNumber for u32 {
     fn number(self) -> f64 {
         f64::from(self)
     }
@@ -380,7 +380,7 @@ fn record(raw: Option<RecordTable>, source: &Source) -> Result<Record, FileError
 }
 
 fn robots(
-    raw: Vec<Spanned<Robot>>,
+    raw: Vec<Spanned<RawRobot>>,
     source: &Source,
     folder: Option<&Path>,
 ) -> Result<BTreeMap<RobotName, RobotSpec>, FileError> {
@@ -407,7 +407,7 @@ fn robots(
 }
 
 /// The specification of a robot. Its own parameters replace those of the file that it names, key by key, also within tables.
-fn spec(robot: Robot, source: &Source, folder: Option<&Path>) -> Result<RobotSpec, FileError> {
+fn spec(robot: RawRobot, source: &Source, folder: Option<&Path>) -> Result<RobotSpec, FileError> {
     let mut parameters = toml::Table::new();
     if let Some(file) = &robot.params_from {
         parameters = named_parameters(file, source, folder)?;
@@ -445,7 +445,7 @@ fn named_parameters(
 }
 
 /// Where in the file is what can keep a hall from being placed.
-struct Places {
+struct FilePlaces {
     tick: Option<Span<usize>>,
     field: Option<Span<usize>>,
     guests: Option<Span<usize>>,
@@ -453,7 +453,7 @@ struct Places {
     robots: BTreeMap<RobotName, Span<usize>>,
 }
 
-impl Places {
+impl FilePlaces {
     fn of(raw: &Scenario) -> Self {
         let obstacles = raw.obstacles.iter();
         let robots = raw.robots.iter();
@@ -484,7 +484,7 @@ fn point(FixedList([x, y]): FixedList<Length, 2>) -> Point {
 }
 
 /// A value that must be positive and finite, or its default.
-fn positive<T: Quantity>(
+fn positive<T: CheckedNumber>(
     source: &Source,
     value: Option<&Spanned<T>>,
     default: T,
@@ -556,7 +556,7 @@ impl From<&checked::Scenario> for Scenario {
             at: unplaced(lengths(*at)),
         });
         let robots = scenario.robots.iter();
-        let robots = robots.map(|(name, spec)| unplaced(Robot::of(name, spec, lateness)));
+        let robots = robots.map(|(name, spec)| unplaced(RawRobot::of(name, spec, lateness)));
 
         Self {
             seed: Some(unplaced(scenario.seed)),
@@ -605,7 +605,7 @@ impl From<&world::Guests> for GuestsTable {
     }
 }
 
-impl Robot {
+impl RawRobot {
     fn of(name: &RobotName, spec: &RobotSpec, lateness: &Lateness) -> Self {
         let parameters = spec.parameters.iter();
         let params = parameters.filter_map(|(key, value)| Some((key.clone(), to_toml(value)?)));

@@ -107,7 +107,7 @@ pub struct Medium {
     /// Commands under way with their numbers of copies, by tick of arrival.
     arrivals: BTreeMap<Tick, Vec<(SentCommand, usize)>>,
     /// States of the links with bursts.
-    bursts: BTreeMap<(Kind, Pair), BurstState>,
+    bursts: BTreeMap<(MessageKind, Pair), BurstState>,
     /// Links that are cut now.
     cut: BTreeMap<Pair, Scope>,
     /// Number of commands sent so far on each link, and of those with texts that the scenario names.
@@ -115,12 +115,12 @@ pub struct Medium {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Kind {
+enum MessageKind {
     Commands,
     Queries,
 }
 
-impl Kind {
+impl MessageKind {
     const ALL: [Self; 2] = [Self::Commands, Self::Queries];
 
     /// Name in the names of streams.
@@ -147,10 +147,10 @@ struct Scope {
 }
 
 impl Scope {
-    fn contains(self, kind: Kind) -> bool {
+    fn contains(self, kind: MessageKind) -> bool {
         match kind {
-            Kind::Commands => self.commands,
-            Kind::Queries => self.queries,
+            MessageKind::Commands => self.commands,
+            MessageKind::Queries => self.queries,
         }
     }
 }
@@ -283,7 +283,7 @@ impl Medium {
         }
 
         for pair in pairs(&self.roster) {
-            for kind in Kind::ALL {
+            for kind in MessageKind::ALL {
                 let channel = self.channel(kind, &pair);
                 let Some(Burst { enter, leave, .. }) = channel.burst else {
                     continue;
@@ -302,10 +302,10 @@ impl Medium {
         }
     }
 
-    fn channel(&self, kind: Kind, (from, to): &Pair) -> Channel {
+    fn channel(&self, kind: MessageKind, (from, to): &Pair) -> Channel {
         match kind {
-            Kind::Commands => self.network.commands(from, to),
-            Kind::Queries => self.network.queries(from, to),
+            MessageKind::Commands => self.network.commands(from, to),
+            MessageKind::Queries => self.network.queries(from, to),
         }
     }
 
@@ -341,7 +341,7 @@ impl Medium {
             None => 0.0,
         };
         let pair = (from.clone(), to.clone());
-        if let Some(because) = self.loss(Kind::Commands, &channel, &pair, loss) {
+        if let Some(because) = self.loss(MessageKind::Commands, &channel, &pair, loss) {
             events.push(command.dropped(because));
             return;
         }
@@ -393,7 +393,7 @@ impl Medium {
     }
 
     /// The cause for which a message is lost, if it is. `drawn` is its random number.
-    fn loss(&self, kind: Kind, channel: &Channel, pair: &Pair, drawn: f64) -> Option<Cause> {
+    fn loss(&self, kind: MessageKind, channel: &Channel, pair: &Pair, drawn: f64) -> Option<Cause> {
         let cut = self.cut.get(pair).copied().unwrap_or_default();
         if cut.contains(kind) {
             return Some(Cause::Partition);
@@ -417,7 +417,7 @@ impl Medium {
         let mut bytes: BTreeMap<RobotName, usize> = BTreeMap::new();
         for (command, copies) in arrivals {
             // A cut also loses the commands that are under way.
-            if self.is_cut(&command.from, &command.to, Kind::Commands) {
+            if self.is_cut(&command.from, &command.to, MessageKind::Commands) {
                 decision.events.push(command.dropped(Cause::Partition));
                 continue;
             }
@@ -438,7 +438,7 @@ impl Medium {
         }
     }
 
-    fn is_cut(&self, from: &RobotName, to: &RobotName, kind: Kind) -> bool {
+    fn is_cut(&self, from: &RobotName, to: &RobotName, kind: MessageKind) -> bool {
         let scope = self.cut.get(&(from.clone(), to.clone()));
         scope.is_some_and(|scope| scope.contains(kind))
     }
@@ -452,12 +452,12 @@ impl Medium {
 
         for (asker, target) in pairs(&self.roster) {
             // Nothing is drawn in turn, so it does not matter for which pairs, and in which ticks, this is reached.
-            let answer_is_cut = self.is_cut(&target, &asker, Kind::Queries);
+            let answer_is_cut = self.is_cut(&target, &asker, MessageKind::Queries);
             let name = format!("medium/query/{tick}/{asker}/{target}");
             let drawn = unit(&mut stream(self.seed, &name));
             let pair = (asker.clone(), target.clone());
-            let channel = self.channel(Kind::Queries, &pair);
-            let lost = self.loss(Kind::Queries, &channel, &pair, drawn);
+            let channel = self.channel(MessageKind::Queries, &pair);
+            let lost = self.loss(MessageKind::Queries, &channel, &pair, drawn);
             if lost.is_none() && !answer_is_cut {
                 continue;
             }
@@ -494,7 +494,7 @@ impl Medium {
 
 impl BurstState {
     /// A link that is good before its first tick.
-    fn good(seed: u64, kind: Kind, (from, to): &Pair) -> Self {
+    fn good(seed: u64, kind: MessageKind, (from, to): &Pair) -> Self {
         let kind = kind.name();
         Self {
             is_bad: false,

@@ -30,12 +30,12 @@ use record::names::{EVENTS, RECORDING, SUMMARY};
 const SYNC_INTERVAL: Duration = Duration::from_secs(1);
 
 /// A file of the record. Its errors name it.
-struct Lines {
+struct LineFile {
     path: PathBuf,
     file: BufWriter<File>,
 }
 
-impl Lines {
+impl LineFile {
     fn open(path: PathBuf, options: &OpenOptions) -> Result<Self, FileError> {
         match options.open(&path) {
             Ok(file) => Ok(Self {
@@ -148,10 +148,10 @@ struct PendingTick {
 /// Writes the record of one epoch.
 pub struct Recorder {
     folder: RunFolder,
-    events: Lines,
+    events: LineFile,
     /// The lines of `events` so far.
     seal: Seal,
-    log: Option<Lines>,
+    log: Option<LineFile>,
     recording: Option<Writer>,
     /// The field after the tick that was noted last. Its memory is used again.
     frame: Frame,
@@ -188,8 +188,8 @@ impl Recorder {
         let record = &scenario.record;
         let path = folder.file(&record.log_name);
         let log = record.log.then(|| match epoch {
-            1 => Lines::create(path),
-            _ => Lines::append(path),
+            1 => LineFile::create(path),
+            _ => LineFile::append(path),
         });
         Self::open(folder, run, simulation, log.transpose()?, "")
     }
@@ -212,7 +212,7 @@ impl Recorder {
 
         let mut log = None;
         if record.log {
-            let mut draft = Lines::create(folder.file(&log_name))?;
+            let mut draft = LineFile::create(folder.file(&log_name))?;
             copy_log_of_earlier_epochs(folder, &record.log_name, &mut draft)?;
             log = Some(draft);
         }
@@ -233,7 +233,7 @@ impl Recorder {
         folder: &RunFolder,
         run: &RunName,
         simulation: &Simulation,
-        log: Option<Lines>,
+        log: Option<LineFile>,
         suffix: &str,
     ) -> Result<Self, FileError> {
         let record = &simulation.scenario().record;
@@ -250,7 +250,7 @@ impl Recorder {
 
         Ok(Self {
             folder: folder.clone(),
-            events: Lines::create(folder.file(&format!("{EVENTS}{suffix}")))?,
+            events: LineFile::create(folder.file(&format!("{EVENTS}{suffix}")))?,
             seal: Seal::default(),
             log,
             observed: recording.is_some().then(Observed::default),
@@ -490,7 +490,7 @@ fn remove_draft(path: &Path) -> Result<(), FileError> {
 fn copy_log_of_earlier_epochs(
     folder: &RunFolder,
     log: &str,
-    to: &mut Lines,
+    to: &mut LineFile,
 ) -> Result<(), FileError> {
     let mut epochs = folder.epochs();
     epochs.pop();

@@ -14,7 +14,7 @@ use crate::span::{
 /// What is in progress after an event of a run. Memory is bounded by what is in progress, whatever the length of the run.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Timeline {
-    robots: BTreeMap<RobotName, Robot>,
+    robots: BTreeMap<RobotName, RobotProgress>,
     /// Commands under way, by sender and number.
     commands: BTreeMap<(RobotName, Seq), Command>,
     cuts: BTreeMap<(RobotName, RobotName), Cut>,
@@ -26,9 +26,9 @@ pub struct Timeline {
 
 /// What is in progress at a robot.
 #[derive(Debug, Clone, PartialEq, Default)]
-struct Robot {
-    emotion: Option<State>,
-    behavior: Option<State>,
+struct RobotProgress {
+    emotion: Option<StateSince>,
+    behavior: Option<StateSince>,
     /// Since when it takes no part.
     lost: Option<Tick>,
     /// The last ticks that it missed.
@@ -39,7 +39,7 @@ struct Robot {
 
 /// A state, and the tick in which it began or the robot took part again.
 #[derive(Debug, Clone, PartialEq)]
-struct State {
+struct StateSince {
     name: String,
     begin: Tick,
 }
@@ -207,7 +207,7 @@ impl Timeline {
         self.commands.get(&(from.clone(), seq))
     }
 
-    fn robot(&mut self, name: &RobotName) -> &mut Robot {
+    fn robot(&mut self, name: &RobotName) -> &mut RobotProgress {
         self.robots.entry(name.clone()).or_default()
     }
 
@@ -217,7 +217,7 @@ impl Timeline {
             Kind::Emotion => &mut robot.emotion,
             Kind::Behavior => &mut robot.behavior,
         };
-        let before = state.replace(State {
+        let before = state.replace(StateSince {
             name: to.to_owned(),
             begin: tick,
         });
@@ -351,8 +351,8 @@ impl Timeline {
     }
 }
 
-impl Robot {
-    fn state(&self, kind: Kind) -> Option<&State> {
+impl RobotProgress {
+    fn state(&self, kind: Kind) -> Option<&StateSince> {
         match kind {
             Kind::Emotion => self.emotion.as_ref(),
             Kind::Behavior => self.behavior.as_ref(),
@@ -398,7 +398,7 @@ impl Robot {
     }
 }
 
-impl State {
+impl StateSince {
     /// The stay that is over in a tick; `None` if it has lasted for no tick.
     fn until(self, robot: &RobotName, kind: Kind, end: Tick) -> Option<Span> {
         (self.begin < end).then(|| {

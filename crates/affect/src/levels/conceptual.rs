@@ -248,7 +248,7 @@ impl Conceptual {
         candidates: &[Candidate<A>],
         memory: &Memory<E, A>,
     ) -> Option<Choice<A>> {
-        let condition = Condition {
+        let condition = DeliberationContext {
             feeling,
             tendency,
             pressure: pressure(feeling.affect()),
@@ -299,7 +299,7 @@ impl Conceptual {
         &self,
         candidate: &Candidate<A>,
         anticipated: f64,
-        condition: &Condition<E>,
+        condition: &DeliberationContext<E>,
         memory: &Memory<E, A>,
     ) -> f64 {
         let experience = memory.recall(condition.feeling.emotion, &candidate.action);
@@ -367,7 +367,7 @@ impl Conceptual {
 }
 
 /// The condition in which an agent deliberates.
-struct Condition<E> {
+struct DeliberationContext<E> {
     feeling: Feeling<E>,
     /// The action tendency of the emotion, if it has one.
     tendency: Option<ActionTendency>,

@@ -733,7 +733,7 @@ fn check_measures(
         return Err(refuse(source, span, reason));
     }
 
-    let mut columns = Columns::of(conditions);
+    let mut columns = ReservedColumns::of(conditions);
     for (index, measure) in measures.iter().enumerate() {
         let name = &measure.name;
         if measures[..index].iter().any(|other| other.name == *name) {
@@ -761,9 +761,9 @@ fn check_measures(
 }
 
 /// The names of the columns of the table of units.
-struct Columns(BTreeSet<String>);
+struct ReservedColumns(BTreeSet<String>);
 
-impl Columns {
+impl ReservedColumns {
     /// Those without measures and expectations.
     fn of(conditions: &Conditions) -> Self {
         let mut columns: BTreeSet<String> = RESERVED.iter().map(ToString::to_string).collect();

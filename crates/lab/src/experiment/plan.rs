@@ -64,21 +64,21 @@ pub struct Plan {
     /// The experiment, with the duration and the seeds of its options.
     pub experiment: Experiment,
     conditions: Vec<Condition>,
-    written: Written,
-    cells: Vec<Cell>,
+    written: WrittenPlan,
+    cells: Vec<PlannedCell>,
 }
 
 /// `plan.json`: the plan, and a digest of it. A plan that is not as it was written would play one thing under the name of another.
 #[derive(Debug, Serialize, Deserialize)]
 struct Sealed {
     #[serde(flatten)]
-    plan: Written,
+    plan: WrittenPlan,
     seal: String,
 }
 
 /// A plan, as it is written.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Written {
+struct WrittenPlan {
     name: String,
     program: Program,
     units: usize,
@@ -127,7 +127,7 @@ pub struct Program {
 
 /// An arm under a condition, as it is played.
 #[derive(Debug, Clone)]
-struct Cell {
+struct PlannedCell {
     /// Digest of all that its units have in common.
     content: u128,
     /// The cell whose emotions its robots show.
@@ -158,7 +158,7 @@ pub struct Unit<'a> {
     pub(super) cell: usize,
 }
 
-impl Written {
+impl WrittenPlan {
     /// Whether another plan is the same, wherever its experiment file was.
     fn is_same(&self, other: &Self) -> bool {
         let other = Self {
@@ -270,7 +270,7 @@ impl Plan {
         }
         let units = cells.len() * experiment.seeds.len();
         experiment.report.check_units(experiment.source(), units)?;
-        let written = Written {
+        let written = WrittenPlan {
             name: request.name.clone(),
             program: Program::this(),
             units,
@@ -314,7 +314,7 @@ impl Plan {
         Self::of(written, experiment).wrap_err_with(|| format!("{}", path.display()))
     }
 
-    fn of(written: Written, experiment: Experiment) -> miette::Result<Self> {
+    fn of(written: WrittenPlan, experiment: Experiment) -> miette::Result<Self> {
         let conditions = list_conditions(&experiment)?;
         let arms = &experiment.arms;
         let are_all_there = written.cells.len() == conditions.len() * arms.len();
@@ -346,7 +346,7 @@ impl Plan {
                 add_text(&mut content, &written.cells[other].scenario);
                 yoked_to = Some(other);
             }
-            cells.push(Cell {
+            cells.push(PlannedCell {
                 content: content.digest128(),
                 yoked_to,
                 scenario: OnceLock::new(),
@@ -683,7 +683,7 @@ fn again(folder: &Path) -> String {
 }
 
 /// Reads the plan of a folder; `None` if it has none.
-fn read(folder: &Path) -> miette::Result<Option<Written>> {
+fn read(folder: &Path) -> miette::Result<Option<WrittenPlan>> {
     let path = folder.join(PLAN);
     if !path.exists() {
         return Ok(None);
@@ -709,7 +709,7 @@ fn read(folder: &Path) -> miette::Result<Option<Written>> {
     Ok(Some(sealed.plan))
 }
 
-impl Written {
+impl WrittenPlan {
     /// Digest of all that the plan has.
     fn seal(&self) -> miette::Result<String> {
         let text = serde_json::to_vec(self).into_diagnostic()?;

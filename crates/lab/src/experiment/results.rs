@@ -76,7 +76,7 @@ impl Judged<'_> {
 
 /// `results.json`.
 #[derive(Debug, Serialize)]
-struct Written<'a> {
+struct WrittenResults<'a> {
     name: &'a str,
     question: &'a str,
     units: usize,
@@ -202,7 +202,7 @@ impl Results {
         let table = self.table(&folder.join(RUNS))?;
         let path = folder.join(RESULTS);
         let mut draft = Draft::create(&path)?;
-        let written = Written {
+        let written = WrittenResults {
             name: self.plan.name(),
             question: &self.plan.experiment.question,
             units: self.plan.units(),
@@ -222,7 +222,7 @@ impl Results {
 
     /// The table with a row for each unit.
     fn table(&self, path: &Path) -> Result<Draft, FileError> {
-        let columns = Columns::of(self);
+        let columns = UnitColumns::of(self);
         let mut table = Table::create(path, columns.all.clone())?;
 
         let mut outcomes = self.outcomes.iter().peekable();
@@ -246,7 +246,7 @@ impl Results {
 }
 
 /// The columns of the table of units.
-struct Columns {
+struct UnitColumns {
     all: Vec<String>,
     /// Columns of factors, by the names of the factors, and whether all levels are numbers.
     levels: BTreeMap<String, (String, bool)>,
@@ -256,7 +256,7 @@ struct Columns {
     verdicts: BTreeMap<String, String>,
 }
 
-impl Columns {
+impl UnitColumns {
     fn of(results: &Results) -> Self {
         let mut columns = Self {
             all: Vec::new(),

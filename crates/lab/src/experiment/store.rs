@@ -32,7 +32,7 @@ const KEY_DIGITS: usize = 32;
 pub struct Store {
     folder: PathBuf,
     /// How far each file has been read.
-    read: BTreeMap<PathBuf, Place>,
+    read: BTreeMap<PathBuf, ReadUpTo>,
     units: BTreeMap<Key, unit::Result>,
     damages: Vec<Damage>,
     conflicts: Vec<Key>,
@@ -41,7 +41,7 @@ pub struct Store {
 }
 
 #[derive(Debug, Clone, Copy, Default)]
-struct Place {
+struct ReadUpTo {
     bytes: u64,
     lines: usize,
 }
@@ -58,7 +58,7 @@ struct Damage {
 
 /// A line of a file.
 #[derive(Debug, Serialize, Deserialize)]
-struct Line {
+struct StoreLine {
     key: String,
     #[serde(flatten)]
     content: Content,
@@ -252,7 +252,7 @@ fn encode(key: Key, result: &unit::Result) -> Vec<u8> {
             failed: reason.clone(),
         },
     };
-    let line = Line {
+    let line = StoreLine {
         key: key.to_string(),
         content,
     };
@@ -276,7 +276,7 @@ fn decode(line: &[u8]) -> Option<(Key, unit::Result)> {
         return None;
     }
 
-    let line: Line = serde_json::from_slice(line).ok()?;
+    let line: StoreLine = serde_json::from_slice(line).ok()?;
     let result = match line.content {
         Content::Played(played) => Ok(played),
         Content::Failed { failed } => Err(failed),

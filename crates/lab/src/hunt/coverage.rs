@@ -76,7 +76,7 @@ pub struct Coverage {
 
 /// One row of the coverage, as JSON.
 #[derive(Debug, Serialize)]
-struct Row<'a> {
+struct CoverageRow<'a> {
     #[serde(flatten)]
     feature: &'a Feature,
     plans: u64,
@@ -103,7 +103,7 @@ impl Coverage {
 impl Serialize for Coverage {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let rows = self.counts.iter();
-        serializer.collect_seq(rows.map(|(feature, plans)| Row {
+        serializer.collect_seq(rows.map(|(feature, plans)| CoverageRow {
             feature,
             plans: *plans,
         }))

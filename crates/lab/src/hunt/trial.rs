@@ -161,7 +161,7 @@ impl Subject {
         local: &mut Local,
         run: &RunName,
         wanted: &BTreeSet<String>,
-        notes: &mut Notes,
+        notes: &mut TrialNotes,
     ) -> miette::Result<()> {
         let record = local.simulation.init(&mut local.robots).into_diagnostic()?;
         notes.note(&record);
@@ -184,7 +184,7 @@ impl Trial for Subject {
         let scenario = self.scenario_of(case)?;
         let run = RunName::new("hunt").into_diagnostic()?;
         let robots = make_robots_with(&scenario, &self.file, &|_, class| (self.maker)(class))?;
-        let mut notes = Notes::default();
+        let mut notes = TrialNotes::default();
         notes.played.expectations.insert(RUNS.to_owned());
         for expectation in &scenario.expectations {
             let name = expectation.name.clone();
@@ -216,7 +216,7 @@ impl Trial for Subject {
 
 /// Notes on a run in progress.
 #[derive(Default)]
-struct Notes {
+struct TrialNotes {
     played: Played,
     timeline: Timeline,
     counts: Counts,
@@ -224,7 +224,7 @@ struct Notes {
     commands: Vec<Command>,
 }
 
-impl Notes {
+impl TrialNotes {
     fn has_failed(&self, wanted: &BTreeSet<String>) -> bool {
         let mut failed = self.played.failed.keys();
         failed.any(|name| wanted.contains(name))

@@ -30,7 +30,7 @@ const MAX_DIAGRAMS: usize = 2;
 const MAX_ROWS: usize = 200;
 
 /// A run with its facts.
-struct Run {
+struct ReportedRun {
     /// Name of its folder.
     name: String,
     /// How its folder is given on the command line.
@@ -55,7 +55,7 @@ pub fn of_runs(folders: &[RunFolder]) -> miette::Result<Page> {
     }
     let mut runs = Vec::new();
     for folder in folders {
-        runs.push(Run::read(folder)?);
+        runs.push(ReportedRun::read(folder)?);
     }
     let Some(first) = runs.first() else {
         return Err(miette!("there is no run to report"));
@@ -90,7 +90,7 @@ pub fn of_runs(folders: &[RunFolder]) -> miette::Result<Page> {
     Ok(page)
 }
 
-impl Run {
+impl ReportedRun {
     fn read(folder: &RunFolder) -> miette::Result<Self> {
         let files = recorded_epoch(folder, None)?;
         let facts = RunFacts::read(&files)?;
@@ -107,7 +107,7 @@ impl Run {
     }
 }
 
-fn write_lead(page: &mut Page, runs: &[Run]) {
+fn write_lead(page: &mut Page, runs: &[ReportedRun]) {
     if let [run] = runs {
         let facts = &run.facts;
         page.lead(format!(
@@ -141,7 +141,7 @@ fn ending(end: Option<End>) -> (&'static str, &'static str) {
     }
 }
 
-fn write_summary(page: &mut Page, runs: &[Run]) {
+fn write_summary(page: &mut Page, runs: &[ReportedRun]) {
     page.section("Summary");
     if let [run] = runs {
         let caption = "The robots. Commands are counted where they were sent, arrived, and were lost on the way to the robot.";
@@ -175,7 +175,7 @@ fn write_summary(page: &mut Page, runs: &[Run]) {
     }
 }
 
-fn robots_table(run: &Run) -> Table {
+fn robots_table(run: &ReportedRun) -> Table {
     let mut table =
         Table::new("Robot | sent | arrived | lost | moves refused | ticks missed | returns");
     for (name, robot) in &run.facts.robots {
@@ -201,7 +201,7 @@ fn robots_table(run: &Run) -> Table {
     table
 }
 
-fn runs_table(runs: &[Run]) -> Table {
+fn runs_table(runs: &[ReportedRun]) -> Table {
     let mut table =
         Table::new("Run | seed | end | time, s | sent | arrived | lost | moves refused | digest");
     for run in runs {
@@ -224,7 +224,7 @@ fn runs_table(runs: &[Run]) -> Table {
 }
 
 /// The last state variables that are numbers: of one run, or over several.
-fn variables_table(runs: &[Run]) -> Table {
+fn variables_table(runs: &[ReportedRun]) -> Table {
     let mut values: BTreeMap<(&RobotName, &str), Vec<f64>> = BTreeMap::new();
     for summary in runs.iter().filter_map(|run| run.summary.as_ref()) {
         for (robot, of_robot) in &summary.robots {
@@ -268,7 +268,7 @@ fn variables_table(runs: &[Run]) -> Table {
     table
 }
 
-fn write_states(page: &mut Page, runs: &[Run]) {
+fn write_states(page: &mut Page, runs: &[ReportedRun]) {
     page.section("Emotions and behaviors");
 
     for kind in [Kind::Emotion, Kind::Behavior] {
@@ -298,7 +298,7 @@ fn write_states(page: &mut Page, runs: &[Run]) {
 }
 
 /// A panel for each robot of several runs, with a row for each run.
-fn state_panels(runs: &[Run], kind: Kind) -> (Vec<Panel>, String) {
+fn state_panels(runs: &[ReportedRun], kind: Kind) -> (Vec<Panel>, String) {
     let times_s = runs.iter().map(|run| run.facts.time_s());
     let end_s = times_s.fold(0.0, f64::max);
     let mut robots = Vec::new();
@@ -321,13 +321,13 @@ fn state_panels(runs: &[Run], kind: Kind) -> (Vec<Panel>, String) {
     })
 }
 
-fn all_robots(runs: &[Run]) -> BTreeSet<&RobotName> {
+fn all_robots(runs: &[ReportedRun]) -> BTreeSet<&RobotName> {
     let robots = runs.iter().flat_map(|run| run.facts.robots.keys());
     robots.collect()
 }
 
 /// Time in each state over all runs.
-fn states_table(runs: &[Run], kind: Kind) -> Table {
+fn states_table(runs: &[ReportedRun], kind: Kind) -> Table {
     let mut table = Table::new("Robot | state | time, s | share, % | times entered");
     for name in all_robots(runs) {
         let mut times: BTreeMap<String, (f64, u64)> = BTreeMap::new();
@@ -362,7 +362,7 @@ fn states_table(runs: &[Run], kind: Kind) -> Table {
     table
 }
 
-fn write_diagrams(page: &mut Page, runs: &[Run]) {
+fn write_diagrams(page: &mut Page, runs: &[ReportedRun]) {
     page.section("Space-time diagram");
     for run in runs.iter().take(MAX_DIAGRAMS) {
         let diagram = match diagram_lines(&run.name, &run.facts, &run.files) {
@@ -396,7 +396,7 @@ fn write_diagrams(page: &mut Page, runs: &[Run]) {
     }
 }
 
-fn write_disturbances(page: &mut Page, runs: &[Run]) {
+fn write_disturbances(page: &mut Page, runs: &[ReportedRun]) {
     page.section("Faults and the network");
     let caption = format!(
         "Commands by sender and target. A doubled command arrives twice. n = {}.",
@@ -427,7 +427,7 @@ fn write_disturbances(page: &mut Page, runs: &[Run]) {
 }
 
 /// What the scenarios expect of the runs. Nothing is written if they expect nothing.
-fn write_expectations(page: &mut Page, runs: &[Run]) {
+fn write_expectations(page: &mut Page, runs: &[ReportedRun]) {
     let mut table = Table::new("Run | expectation | verdict | decided at, s | because");
     for run in runs {
         for one in &run.facts.judged {
@@ -466,7 +466,7 @@ fn time_cell(tick: Tick, tick_s: f64) -> Cell {
     Cell::Number(time_s(tick, tick_s), time::decimals(tick_s))
 }
 
-fn links_table(runs: &[Run]) -> Table {
+fn links_table(runs: &[ReportedRun]) -> Table {
     let mut links = BTreeMap::new();
     for (link, facts) in runs.iter().flat_map(|run| &run.facts.links) {
         let sum: &mut [u64; 5] = links.entry(link).or_default();
@@ -491,7 +491,7 @@ fn links_table(runs: &[Run]) -> Table {
     table
 }
 
-fn write_reproduction(page: &mut Page, runs: &[Run]) {
+fn write_reproduction(page: &mut Page, runs: &[ReportedRun]) {
     page.section("Reproduction");
     page.paragraph(
         "This report, the check that a run is what its scenario and seed give, and its events and states as tables:",
@@ -519,7 +519,7 @@ fn write_reproduction(page: &mut Page, runs: &[Run]) {
     }
     page.table("What the runs were made with.", &table);
 
-    let mut scenarios: BTreeMap<String, Vec<&Run>> = BTreeMap::new();
+    let mut scenarios: BTreeMap<String, Vec<&ReportedRun>> = BTreeMap::new();
     for run in runs {
         let lines = run.scenario.lines();
         let without_seed: Vec<&str> = lines.filter(|line| !line.starts_with("seed = ")).collect();

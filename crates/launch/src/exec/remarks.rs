@@ -6,10 +6,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// Counts what was remarked, by kind.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Remarks(Arc<Mutex<BTreeMap<&'static str, Count>>>);
+pub(super) struct Remarks(Arc<Mutex<BTreeMap<&'static str, RemarkCount>>>);
 
 #[derive(Debug, Clone, Copy, Default)]
-struct Count {
+struct RemarkCount {
     total: u64,
     /// Whether it was explained in this epoch.
     is_explained: bool,
@@ -46,7 +46,7 @@ impl Remarks {
         })
     }
 
-    fn with<T>(&self, act: impl FnOnce(&mut BTreeMap<&'static str, Count>) -> T) -> T {
+    fn with<T>(&self, act: impl FnOnce(&mut BTreeMap<&'static str, RemarkCount>) -> T) -> T {
         // Every change is a single step, so a panic leaves consistent counts.
         act(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }

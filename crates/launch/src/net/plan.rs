@@ -53,13 +53,13 @@ struct RawFault {
     expecting = "a fault is \"cut\", \"close\", { delay = \"50 ms\", jitter = \"10 ms\" } or { bandwidth_bps = 64000 }"
 )]
 enum RawShape {
-    Word(Word),
+    Word(PlanWord),
     Slow(Slow),
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "lowercase")]
-enum Word {
+enum PlanWord {
     Cut,
     Close,
 }
@@ -277,8 +277,8 @@ fn time(source: &Source, time: &Spanned<Time>) -> Result<Duration, FileError> {
 
 fn shape(raw: RawShape) -> Result<Shape, String> {
     let slow = match raw {
-        RawShape::Word(Word::Cut) => return Ok(Shape::of_flow(Flow::Cut)),
-        RawShape::Word(Word::Close) => return Ok(Shape::of_flow(Flow::Closed)),
+        RawShape::Word(PlanWord::Cut) => return Ok(Shape::of_flow(Flow::Cut)),
+        RawShape::Word(PlanWord::Close) => return Ok(Shape::of_flow(Flow::Closed)),
         RawShape::Slow(slow) => slow,
     };
     let shape = Shape {

@@ -151,7 +151,7 @@ pub fn play(play: &Play, mut report: impl FnMut(String)) -> miette::Result<u8> {
     let mut links = links.inspect_err(|_| reserved.discard())?;
 
     let mut launch = signals.spawn(links.command(&start)?)?;
-    let player = Player {
+    let player = LinkPlayer {
         plan: &plan,
         process_of: &process_of,
         folder,
@@ -272,13 +272,13 @@ struct LinkRecord<'a> {
 }
 
 /// Plays a plan on the links of a launch.
-struct Player<'a> {
+struct LinkPlayer<'a> {
     plan: &'a Plan,
     process_of: &'a BTreeMap<RobotName, String>,
     folder: &'a RunFolder,
 }
 
-impl Player<'_> {
+impl LinkPlayer<'_> {
     /// Plays the plan, the times of which begin now.
     fn play(
         &self,

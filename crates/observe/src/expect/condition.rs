@@ -64,14 +64,14 @@ pub enum ConditionError {
 #[derive(Debug, Clone, PartialEq)]
 enum Alternative {
     Event(Pattern),
-    State(State),
+    State(LastingState),
     Overlap(Option<Vec<RobotName>>),
-    Stalled(Stalled),
+    Stalled(StalledCondition),
 }
 
 /// A state of a robot, which may have to last.
 #[derive(Debug, Clone, PartialEq)]
-struct State {
+struct LastingState {
     robot: RobotName,
     is: Is,
     lasting: Option<Time>,
@@ -81,12 +81,12 @@ struct State {
 enum Is {
     Behavior(Vec<String>),
     Emotion(Vec<String>),
-    Variable(String, Bounds),
+    Variable(String, ValueBounds),
 }
 
 /// The values of a variable; a flag is 1 or 0. All bounds that are given hold.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-struct Bounds {
+struct ValueBounds {
     at_least: Option<f64>,
     at_most: Option<f64>,
     above: Option<f64>,
@@ -95,14 +95,14 @@ struct Bounds {
 
 /// That no state variable of progress has risen for a time.
 #[derive(Debug, Clone, PartialEq)]
-struct Stalled {
-    progress: Vec<Counter>,
+struct StalledCondition {
+    progress: Vec<VariableOfRobot>,
     lasting: Time,
 }
 
 /// A state variable and its robot.
 #[derive(Debug, Clone, PartialEq)]
-struct Counter {
+struct VariableOfRobot {
     robot: RobotName,
     variable: String,
 }
@@ -110,7 +110,7 @@ struct Counter {
 /// A condition on a state as written.
 #[derive(Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-struct Table {
+struct ConditionTable {
     #[serde(skip_serializing_if = "Option::is_none")]
     robot: Option<RobotName>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -218,19 +218,19 @@ impl TryFrom<Value> for Alternative {
             return Err(ConditionError::Bound);
         }
 
-        let table: Table = serde_json::from_value(value)
+        let table: ConditionTable = serde_json::from_value(value)
             .map_err(|error| ConditionError::Fields(error.to_string()))?;
         table.check()
     }
 }
 
-impl Table {
+impl ConditionTable {
     fn check(self) -> Result<Alternative, ConditionError> {
         if self.lasting.is_some_and(|lasting| lasting.0 <= 0.0) {
             return Err(ConditionError::Lasting);
         }
 
-        let bounds = Bounds {
+        let bounds = ValueBounds {
             at_least: self.at_least,
             at_most: self.at_most,
             above: self.above,
@@ -238,19 +238,19 @@ impl Table {
         };
         let has_state =
             self.behavior.is_some() || self.emotion.is_some() || self.variable.is_some();
-        let has_rest = has_state || self.lasting.is_some() || bounds != Bounds::default();
+        let has_rest = has_state || self.lasting.is_some() || bounds != ValueBounds::default();
         match (self.robot, self.overlap, self.stalled) {
             (None, Some(overlap), None) if !has_rest => check_overlap(overlap),
             (None, None, Some(stalled)) if !has_rest => check_stalled(&stalled),
             (Some(robot), None, None) => {
                 let is = match (self.behavior, self.emotion, self.variable) {
-                    (Some(names), None, None) if bounds == Bounds::default() => {
+                    (Some(names), None, None) if bounds == ValueBounds::default() => {
                         Is::Behavior(at_least_one("behavior", names)?)
                     }
-                    (None, Some(names), None) if bounds == Bounds::default() => {
+                    (None, Some(names), None) if bounds == ValueBounds::default() => {
                         Is::Emotion(at_least_one("emotion", names)?)
                     }
-                    (None, None, Some(_)) if bounds == Bounds::default() => {
+                    (None, None, Some(_)) if bounds == ValueBounds::default() => {
                         return Err(ConditionError::Bound);
                     }
                     (None, None, Some(_)) if bounds.are_contradictory() => {
@@ -259,7 +259,7 @@ impl Table {
                     (None, None, Some(variable)) => Is::Variable(variable, bounds),
                     _ => return Err(ConditionError::Unknown),
                 };
-                Ok(Alternative::State(State {
+                Ok(Alternative::State(LastingState {
                     robot,
                     is,
                     lasting: self.lasting,
@@ -278,7 +278,7 @@ fn at_least_one(key: &'static str, names: Names) -> Result<Vec<String>, Conditio
     Ok(names)
 }
 
-impl Bounds {
+impl ValueBounds {
     /// Whether no number is within them.
     fn are_contradictory(&self) -> bool {
         let above = |low: f64| {
@@ -325,12 +325,12 @@ fn check_stalled(table: &StalledTable) -> Result<Alternative, ConditionError> {
     for text in &table.progress {
         let (robot, variable) = text.split_once('.').ok_or(ConditionError::Progress)?;
         let robot = RobotName::new(robot).map_err(|_| ConditionError::Progress)?;
-        progress.push(Counter {
+        progress.push(VariableOfRobot {
             robot,
             variable: variable.to_owned(),
         });
     }
-    Ok(Alternative::Stalled(Stalled {
+    Ok(Alternative::Stalled(StalledCondition {
         progress,
         lasting: table.lasting,
     }))
@@ -338,10 +338,10 @@ fn check_stalled(table: &StalledTable) -> Result<Alternative, ConditionError> {
 
 impl Alternative {
     fn to_value(&self) -> Value {
-        let mut table = Table::default();
+        let mut table = ConditionTable::default();
         match self {
             Self::Event(pattern) => return pattern.clone().into(),
-            Self::State(State { robot, is, lasting }) => {
+            Self::State(LastingState { robot, is, lasting }) => {
                 table.robot = Some(robot.clone());
                 table.lasting = *lasting;
                 match is {
@@ -362,7 +362,7 @@ impl Alternative {
                 table.overlap = Some(Names::Several(names.collect()));
             }
             Self::Stalled(stalled) => {
-                let progress = stalled.progress.iter().map(Counter::to_string);
+                let progress = stalled.progress.iter().map(VariableOfRobot::to_string);
                 table.stalled = Some(StalledTable {
                     progress: progress.collect(),
                     lasting: stalled.lasting,
@@ -375,7 +375,7 @@ impl Alternative {
     }
 }
 
-impl std::fmt::Display for Counter {
+impl std::fmt::Display for VariableOfRobot {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}.{}", self.robot, self.variable)
     }
@@ -434,7 +434,7 @@ impl Condition {
     }
 }
 
-impl State {
+impl LastingState {
     fn words(&self) -> Vec<Word> {
         let (kind, states) = match &self.is {
             Is::Emotion(states) => (words::Kind::Emotion, states),
@@ -613,7 +613,8 @@ impl Tracked {
             }
             *before = value;
         }
-        self.unknown = missing.map(|Counter { robot, variable }| unpublished(robot, variable));
+        self.unknown =
+            missing.map(|VariableOfRobot { robot, variable }| unpublished(robot, variable));
 
         if has_risen {
             self.since = Some(seen.tick);
@@ -622,7 +623,11 @@ impl Tracked {
         if seen.tick - since < ticks_in(stalled.lasting, tick_s) {
             return None;
         }
-        let names: Vec<String> = stalled.progress.iter().map(Counter::to_string).collect();
+        let names: Vec<String> = stalled
+            .progress
+            .iter()
+            .map(VariableOfRobot::to_string)
+            .collect();
         Some(format!(
             "no progress ({}) for {} s, since {}",
             names.join(", "),
@@ -679,7 +684,7 @@ fn number(state: RobotState<'_>, variable: &str) -> Option<f64> {
     }
 }
 
-impl Bounds {
+impl ValueBounds {
     fn hold(&self, value: f64) -> bool {
         self.at_least.is_none_or(|bound| value >= bound)
             && self.at_most.is_none_or(|bound| value <= bound)

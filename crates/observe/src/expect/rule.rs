@@ -19,7 +19,7 @@ const NOT_OBSERVED: [&str; 3] = ["judged", "tick", "end"];
 
 /// Something that a run is expected to do, an entry of `[[expect]]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Table", into = "Table")]
+#[serde(try_from = "RuleTable", into = "RuleTable")]
 pub struct Expectation {
     /// Its name, under which its verdict is reported.
     pub name: String,
@@ -106,7 +106,7 @@ pub enum ExpectError {
 /// An expectation as written.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Table {
+struct RuleTable {
     name: String,
     #[serde(skip_serializing_if = "Option::is_none")]
     what: Option<String>,
@@ -151,10 +151,10 @@ impl From<Patterns> for serde_json::Value {
     }
 }
 
-impl TryFrom<Table> for Expectation {
+impl TryFrom<RuleTable> for Expectation {
     type Error = ExpectError;
 
-    fn try_from(table: Table) -> Result<Self, ExpectError> {
+    fn try_from(table: RuleTable) -> Result<Self, ExpectError> {
         let length = table.name.chars().count();
         if !(1..=MAX_NAME_CHARS).contains(&length) || table.name.chars().any(char::is_control) {
             return Err(ExpectError::Name);
@@ -172,7 +172,7 @@ impl TryFrom<Table> for Expectation {
     }
 }
 
-impl Table {
+impl RuleTable {
     fn rule(self) -> Result<Rule, ExpectError> {
         let within = self.within;
         if within.is_some_and(|within| within.0 < 0.0) {
@@ -245,7 +245,7 @@ fn check_observed(pattern: &Pattern) -> Result<(), ExpectError> {
     Ok(())
 }
 
-impl From<Expectation> for Table {
+impl From<Expectation> for RuleTable {
     fn from(expectation: Expectation) -> Self {
         let mut table = Self {
             name: expectation.name,

@@ -39,7 +39,7 @@ pub struct Watch {
     /// The last tick that was observed.
     now: Tick,
     /// The earliest event after which the condition has not held yet, if it is waited for.
-    pending: Option<Pending>,
+    pending: Option<OpenCheck>,
     /// How many waits events have begun.
     asked: u64,
     /// How many times the condition held after an event.
@@ -49,7 +49,7 @@ pub struct Watch {
 }
 
 #[derive(Debug, Clone)]
-struct Pending {
+struct OpenCheck {
     since: Tick,
     /// The event in words.
     event: String,
@@ -144,7 +144,7 @@ impl Watch {
     ) -> Option<Judgment> {
         if self.pending.is_none() {
             let since = self.now;
-            self.pending = triggered.map(|event| Pending { since, event });
+            self.pending = triggered.map(|event| OpenCheck { since, event });
             self.asked += u64::from(self.pending.is_some());
         }
         let pending = self.pending.as_ref()?;

@@ -1,7 +1,9 @@
 //! Step functions of arms: survival curves with bands and numbers at risk, and empirical distribution functions.
 
 use crate::axis::{draw_below, draw_left};
-use crate::chart::{NAME_LETTERS, Name, PANEL_PX, arm_class, begin, draw_names, end, line_class};
+use crate::chart::{
+    ArmName, NAME_LETTERS, PANEL_PX, arm_class, begin, draw_names, end, line_class,
+};
 use crate::labels::{shortened, widest_px};
 use crate::markup::{Markup, number};
 use crate::number::fixed;
@@ -89,7 +91,7 @@ impl Steps {
         for curve in &self.curves {
             draw_curve(&mut svg, curve, &x, &y);
         }
-        let names: Vec<Name<'_>> = self.curves.iter().map(Curve::name).collect();
+        let names: Vec<ArmName<'_>> = self.curves.iter().map(Curve::name).collect();
         draw_names(&mut svg, &names, &y, right);
         if let Some(times) = &self.at_risk {
             self.draw_at_risk(&mut svg, times, &x, bottom + 52.0);
@@ -129,8 +131,8 @@ impl Curve {
         self.steps.last().map_or(self.begin, |step| step.y)
     }
 
-    fn name(&self) -> Name<'_> {
-        Name {
+    fn name(&self) -> ArmName<'_> {
+        ArmName {
             label: &self.label,
             arm: self.arm,
             last: self.last(),

@@ -2,7 +2,7 @@
 
 use crate::axis::draw_left;
 use crate::chart::{
-    Estimate, NAME_LETTERS, Name, PANEL_PX, begin, draw_estimate, draw_names, end, line_class,
+    ArmName, Estimate, NAME_LETTERS, PANEL_PX, begin, draw_estimate, draw_names, end, line_class,
 };
 use crate::labels::{widest_px, width_px};
 use crate::markup::Markup;
@@ -78,7 +78,7 @@ impl Trend {
             self.draw_line(&mut svg, line, &x, &y, aside);
         }
         let name = |line| self.name(line);
-        let names: Vec<Name<'_>> = self.lines.iter().map(name).collect();
+        let names: Vec<ArmName<'_>> = self.lines.iter().map(name).collect();
         draw_names(&mut svg, &names, &y, right);
         end(svg)
     }
@@ -128,9 +128,9 @@ impl Trend {
         }
     }
 
-    fn name<'a>(&self, line: &'a TrendLine) -> Name<'a> {
+    fn name<'a>(&self, line: &'a TrendLine) -> ArmName<'a> {
         let last = line.points.last();
-        Name {
+        ArmName {
             label: &line.label,
             arm: line.arm,
             last: last.map_or(self.range.0, |(_, estimate)| estimate.value),

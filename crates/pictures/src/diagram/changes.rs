@@ -24,7 +24,7 @@ type Link = (String, String);
 
 /// An entry of `fault` of a scenario.
 #[derive(Deserialize, PartialEq)]
-struct Fault {
+struct FaultEntry {
     #[serde(rename = "do")]
     kind: String,
     robot: String,
@@ -36,7 +36,7 @@ struct Fault {
 
 /// An entry of `network.partition`.
 #[derive(Deserialize, PartialEq)]
-struct Partition {
+struct PartitionEntry {
     groups: Vec<Vec<String>>,
     #[serde(default)]
     one_way: bool,
@@ -80,11 +80,11 @@ fn known(change: &Change, tick_s: f64) -> Option<Vec<String>> {
     let (path, _) = change.set.split_once('=')?;
     let (what, words, is_empty) = match path.trim() {
         "fault" => {
-            let changed = Changed::<Fault>::read(change, tick_s)?;
+            let changed = Changed::<FaultEntry>::read(change, tick_s)?;
             ("faults", changed.words()?, changed.list.is_empty())
         }
         "network.partition" => {
-            let changed = Changed::<Partition>::read(change, tick_s)?;
+            let changed = Changed::<PartitionEntry>::read(change, tick_s)?;
             ("partitions", changed.words()?, changed.list.is_empty())
         }
         "network.lose" => {
@@ -153,12 +153,12 @@ impl<T: DeserializeOwned + PartialEq> Changed<T> {
     }
 }
 
-impl Changed<Fault> {
+impl Changed<FaultEntry> {
     /// What happens to processes now; if nothing does, what was added, or else removed.
     fn words(&self) -> Option<Vec<String>> {
         let mut words = Vec::new();
         for fault in &self.list {
-            let Fault { kind, robot, .. } = fault;
+            let FaultEntry { kind, robot, .. } = fault;
             if self.tick(fault.at.as_ref())? == Some(self.now) {
                 words.push(format!("{kind} {robot}"));
             } else if self.tick(fault.until.as_ref())? == Some(self.now) {
@@ -182,7 +182,7 @@ impl Changed<Fault> {
     }
 }
 
-impl Changed<Partition> {
+impl Changed<PartitionEntry> {
     /// The links that are cut and healed now; if none is, the partitions that were added.
     fn words(&self) -> Option<Vec<String>> {
         let before = self.before.as_ref().unwrap_or(&self.list);
@@ -206,7 +206,7 @@ impl Changed<Partition> {
     }
 
     /// The links that are cut in a tick.
-    fn cut_at(&self, partitions: &[Partition], tick: Tick) -> Option<BTreeSet<Link>> {
+    fn cut_at(&self, partitions: &[PartitionEntry], tick: Tick) -> Option<BTreeSet<Link>> {
         let mut cut = BTreeSet::new();
         for partition in partitions {
             let from = self.tick(partition.from.as_ref())?;
@@ -232,7 +232,7 @@ impl Changed<Loss> {
 }
 
 /// The links between the groups of a partition.
-fn separated(partition: &Partition) -> BTreeSet<Link> {
+fn separated(partition: &PartitionEntry) -> BTreeSet<Link> {
     let mut links = BTreeSet::new();
     for (own, group) in partition.groups.iter().enumerate() {
         for (other, others) in partition.groups.iter().enumerate() {

@@ -138,7 +138,7 @@ fn draw_route(picture: &mut Picture, route: &Route, comes_in: bool) {
 }
 
 /// Where a command begins and which lane it goes to.
-struct Course {
+struct CommandCourse {
     start: Point,
     /// The edge of the target's lane, or a place beside that of the sender if the target has none.
     end_y: f64,
@@ -150,7 +150,7 @@ struct Course {
 }
 
 /// The course of a command; `None` if its sender has no lane.
-fn course(picture: &Picture, command: &Command) -> Option<Course> {
+fn course(picture: &Picture, command: &Command) -> Option<CommandCourse> {
     let sender = picture.lanes.index(&command.from)?;
     let target = picture.lanes.index(&command.to);
     let goes_down = target.is_none_or(|target| target >= sender);
@@ -168,7 +168,7 @@ fn course(picture: &Picture, command: &Command) -> Option<Course> {
     } else {
         picture.x(command.sent)
     };
-    Some(Course {
+    Some(CommandCourse {
         start: (start_x, start_y),
         end_y,
         down: if goes_down { 1.0 } else { -1.0 },
@@ -218,7 +218,7 @@ fn add_wait(
     route: &mut Route,
     picture: &Picture,
     command: &Command,
-    course: &Course,
+    course: &CommandCourse,
     over: Tick,
     waits: &mut Waits,
 ) {

@@ -56,7 +56,7 @@ struct PointVisitor;
 /// A field of a point.
 #[derive(Deserialize)]
 #[serde(field_identifier, rename_all = "snake_case")]
-enum Field {
+enum PointField {
     X,
     Y,
     #[serde(other)]
@@ -75,11 +75,11 @@ impl<'de> Visitor<'de> for PointVisitor {
         let mut y = None;
         while let Some(field) = map.next_key()? {
             match field {
-                Field::X if x.is_some() => return Err(A::Error::duplicate_field("x")),
-                Field::Y if y.is_some() => return Err(A::Error::duplicate_field("y")),
-                Field::X => x = Some(map.next_value()?),
-                Field::Y => y = Some(map.next_value()?),
-                Field::Unknown => drop(map.next_value::<IgnoredAny>()?),
+                PointField::X if x.is_some() => return Err(A::Error::duplicate_field("x")),
+                PointField::Y if y.is_some() => return Err(A::Error::duplicate_field("y")),
+                PointField::X => x = Some(map.next_value()?),
+                PointField::Y => y = Some(map.next_value()?),
+                PointField::Unknown => drop(map.next_value::<IgnoredAny>()?),
             }
         }
 

@@ -98,14 +98,14 @@ pub(super) struct Mind {
     abandoned: u32,
     /// Whether the refiller was near or came nearer in the last tick.
     was_encouraged: bool,
-    plan: Option<Planned>,
+    plan: Option<ActivePlan>,
     memory: Memory<StandardEmotion, Plan>,
 }
 
 /// A plan that he follows.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Planned {
+struct ActivePlan {
     plan: Plan,
     /// His emotion when he chose it.
     emotion: StandardEmotion,
@@ -252,7 +252,7 @@ impl Deliberator {
         abandoned: u32,
         feeling: Feeling<StandardEmotion>,
         prospects: &Prospects,
-    ) -> Option<Planned> {
+    ) -> Option<ActivePlan> {
         let mut candidates = Vec::new();
         if let Some(intercept_s) = prospects.intercept_s {
             // Guests take no treats meanwhile. The more often he tried in vain, the less he expects of it.
@@ -282,7 +282,7 @@ impl Deliberator {
         let choice = self
             .level
             .deliberate(feeling, tendency, &candidates, memory)?;
-        Some(Planned {
+        Some(ActivePlan {
             plan: choice.action,
             emotion: feeling.emotion,
             lasted_s: 0.0,

@@ -11,11 +11,11 @@ use recording::{Header, LastReports, PlacedRobot, RecordedTick, Recording, Recor
 pub(super) struct Player {
     ticks: Ticks,
     last_reports: LastReports,
-    shown: Shown,
+    shown: ShownTick,
 }
 
 /// What observers see of a tick.
-struct Shown {
+struct ShownTick {
     recorded: RecordedTick,
     robots: Vec<RobotFrame>,
     /// The last two states of each robot.
@@ -28,7 +28,7 @@ impl Player {
     /// Shows tick 0 of a recording, which has one.
     pub(super) fn open(recording: Recording) -> Result<Self, RecordingError> {
         let mut last_reports = LastReports::default();
-        let shown = Shown::at(0, &recording, &mut last_reports)?;
+        let shown = ShownTick::at(0, &recording, &mut last_reports)?;
         let mut ticks = Ticks::of(recording);
         ticks.seek(1);
 
@@ -87,7 +87,7 @@ impl Player {
     /// Shows a tick of the recording. Where it cannot be read, the tick that is shown stays.
     pub(super) fn seek(&mut self, tick: Tick) -> Result<(), RecordingError> {
         let recording = self.ticks.recording();
-        self.shown = Shown::at(tick, recording, &mut self.last_reports)?;
+        self.shown = ShownTick::at(tick, recording, &mut self.last_reports)?;
         self.ticks.seek(tick + 1);
         Ok(())
     }
@@ -166,7 +166,7 @@ impl Player {
     }
 }
 
-impl Shown {
+impl ShownTick {
     /// What is shown of a tick, with what observers know from the ticks before.
     fn at(
         tick: Tick,

@@ -11,12 +11,12 @@ const STALL: Duration = Duration::from_millis(20);
 /// The timers that are set.
 #[derive(Debug, Default)]
 pub(super) struct Timers {
-    set: BTreeMap<Timer, Pending>,
+    set: BTreeMap<Timer, PendingTimer>,
 }
 
 /// A timer that is set.
 #[derive(Debug)]
-struct Pending {
+struct PendingTimer {
     /// When it fires.
     due: Instant,
     /// How long after it was set.
@@ -32,7 +32,7 @@ impl Timers {
             return;
         };
 
-        let pending = Pending {
+        let pending = PendingTimer {
             due,
             after,
             was_put_off: false,
