@@ -5,7 +5,7 @@ use std::process::{Command, ExitCode};
 
 use clap::Args;
 use config::Changes;
-use conform::{Report, Role, Rule, Setting};
+use conform::{CheckSetting, Report, Role, Rule};
 use miette::miette;
 use protocol::{RobotName, Tick};
 use scenario::Scenario;
@@ -91,10 +91,10 @@ fn check(args: &ConformArgs) -> miette::Result<Report> {
 }
 
 /// The setting of the checks: the default one, with what the command line and its scenario change.
-fn setting(args: &ConformArgs) -> miette::Result<Setting> {
-    let mut setting = Setting {
+fn setting(args: &ConformArgs) -> miette::Result<CheckSetting> {
+    let mut setting = CheckSetting {
         name: args.name.clone(),
-        ..Setting::default()
+        ..CheckSetting::default()
     };
     if let Some(ticks) = args.ticks {
         setting.ticks = ticks;
@@ -115,7 +115,7 @@ fn setting(args: &ConformArgs) -> miette::Result<Setting> {
 
 /// Takes field, roster and parameters from a scenario. The states and commands of the other robots are those of a run of
 /// the scenario in this process; if a class cannot run here, the other robots stand still.
-fn take_scenario(setting: &mut Setting, file: &Path) -> miette::Result<()> {
+fn take_scenario(setting: &mut CheckSetting, file: &Path) -> miette::Result<()> {
     let scenario = Scenario::load(file, &Changes::default())?;
     setting.seed = scenario.seed;
     setting.tick_s = scenario.tick_s;

@@ -4,7 +4,7 @@ use protocol::Tick;
 use serde_json::Value;
 
 use crate::kit::Kit;
-use crate::report::Failure;
+use crate::report::RuleFailure;
 use crate::transcript::{Entry, Transcript};
 
 /// What is shown of a value that differs, characters.
@@ -12,7 +12,7 @@ const SHOWN: usize = 200;
 
 /// Where two plays differ: what the first has, and what the second has, in words.
 #[derive(Debug)]
-pub(crate) struct Difference {
+pub(crate) struct PlayDifference {
     pub(crate) first: String,
     pub(crate) second: String,
 }
@@ -33,7 +33,7 @@ fn outcome(entry: &Entry) -> Value {
 }
 
 /// The first difference between the reports and commands of two plays. Their epochs may differ.
-pub(crate) fn difference(one: &Transcript, two: &Transcript) -> Option<Difference> {
+pub(crate) fn difference(one: &Transcript, two: &Transcript) -> Option<PlayDifference> {
     for (one, two) in one.iter().zip(two) {
         let first = outcome(one);
         let second = outcome(two);
@@ -42,13 +42,13 @@ pub(crate) fn difference(one: &Transcript, two: &Transcript) -> Option<Differenc
         }
 
         let field = first_that_differs(&first, &second);
-        return Some(Difference {
+        return Some(PlayDifference {
             first: shown(&first, &field, one.tick),
             second: shown(&second, &field, one.tick),
         });
     }
 
-    (one.len() != two.len()).then(|| Difference {
+    (one.len() != two.len()).then(|| PlayDifference {
         first: format!("{} ticks", one.len()),
         second: format!("{} ticks", two.len()),
     })
@@ -84,14 +84,14 @@ pub(crate) fn demand_same(
     what: &str,
     usual: &Transcript,
     other: &Transcript,
-) -> Result<(), Failure> {
+) -> Result<(), RuleFailure> {
     if kit.is_deterministic.get() == Some(&false) {
         return Ok(());
     }
 
     match difference(usual, other) {
         None => Ok(()),
-        Some(Difference { first, second }) => Err(Failure::new(
+        Some(PlayDifference { first, second }) => Err(RuleFailure::new(
             format!("{what} makes no difference: {first}"),
             second,
         )),

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use crate::report::{Failure, Verdict};
+use crate::report::{RuleFailure, RuleVerdict};
 
 /// What was found, by rule.
-pub(crate) type Verdicts = BTreeMap<&'static str, Verdict>;
+pub(crate) type Verdicts = BTreeMap<&'static str, RuleVerdict>;
 
 /// What one check finds.
 #[derive(Default)]
@@ -13,24 +13,24 @@ pub(crate) struct Findings(pub(crate) Verdicts);
 
 impl Findings {
     /// The rule is broken. The first failure of a rule is the one that is reported.
-    pub(crate) fn fail(&mut self, rule: &'static str, failure: Failure) {
+    pub(crate) fn fail(&mut self, rule: &'static str, failure: RuleFailure) {
         if !self.has_failed(rule) {
-            self.0.insert(rule, Verdict::Failed(failure));
+            self.0.insert(rule, RuleVerdict::Failed(failure));
         }
     }
 
     /// Whether the rule was found broken.
     pub(crate) fn has_failed(&self, rule: &'static str) -> bool {
-        matches!(self.0.get(rule), Some(Verdict::Failed(_)))
+        matches!(self.0.get(rule), Some(RuleVerdict::Failed(_)))
     }
 
     /// The rule holds, unless it was found broken.
     pub(crate) fn pass(&mut self, rule: &'static str) {
-        self.0.entry(rule).or_insert(Verdict::Passed);
+        self.0.entry(rule).or_insert(RuleVerdict::Passed);
     }
 
     /// The rule holds, or is broken.
-    pub(crate) fn settle(&mut self, rule: &'static str, result: Result<(), Failure>) {
+    pub(crate) fn settle(&mut self, rule: &'static str, result: Result<(), RuleFailure>) {
         match result {
             Ok(()) => self.pass(rule),
             Err(failure) => self.fail(rule, failure),
@@ -39,7 +39,7 @@ impl Findings {
 
     /// This robot gives no occasion to see it.
     pub(crate) fn skip(&mut self, rule: &'static str, reason: &str) {
-        self.0.entry(rule).or_insert_with(|| Verdict::Skipped {
+        self.0.entry(rule).or_insert_with(|| RuleVerdict::Skipped {
             reason: reason.to_owned(),
         });
     }
@@ -48,9 +48,9 @@ impl Findings {
     pub(crate) fn merge(&mut self, other: Self) {
         for (rule, verdict) in other.0 {
             match verdict {
-                Verdict::Failed(failure) => self.fail(rule, failure),
-                Verdict::Skipped { reason } => self.skip(rule, &reason),
-                Verdict::Passed => {
+                RuleVerdict::Failed(failure) => self.fail(rule, failure),
+                RuleVerdict::Skipped { reason } => self.skip(rule, &reason),
+                RuleVerdict::Passed => {
                     if !self.has_failed(rule) {
                         self.0.insert(rule, verdict);
                     }
@@ -61,7 +61,7 @@ impl Findings {
 
     /// A check of these rules came to its end, or broke off: then the first rule gets the reason, and nothing is known of
     /// the others.
-    pub(crate) fn close(&mut self, rules: &[&'static str], end: Result<(), Failure>) {
+    pub(crate) fn close(&mut self, rules: &[&'static str], end: Result<(), RuleFailure>) {
         let failure = match end {
             Ok(()) => {
                 rules.iter().for_each(|rule| self.pass(rule));
@@ -81,19 +81,19 @@ impl Findings {
 mod tests {
     use super::*;
 
-    fn broken() -> Verdict {
-        Verdict::Failed(Failure::new("a", "b"))
+    fn broken() -> RuleVerdict {
+        RuleVerdict::Failed(RuleFailure::new("a", "b"))
     }
 
     #[test]
     fn the_worse_verdict_counts() {
         let mut findings = Findings::default();
         findings.skip("x", "nothing to see");
-        findings.merge(Findings([("x", Verdict::Passed)].into()));
-        assert_eq!(findings.0["x"], Verdict::Passed);
+        findings.merge(Findings([("x", RuleVerdict::Passed)].into()));
+        assert_eq!(findings.0["x"], RuleVerdict::Passed);
 
         findings.merge(Findings([("x", broken())].into()));
-        findings.merge(Findings([("x", Verdict::Passed)].into()));
+        findings.merge(Findings([("x", RuleVerdict::Passed)].into()));
         assert_eq!(findings.0["x"], broken());
     }
 }

@@ -12,7 +12,7 @@ use protocol::messages::{JoinRequest, Welcome};
 use protocol::{PROTOCOL_VERSION, RobotName, RunName};
 
 use crate::process;
-use crate::setting::{Role, Setting};
+use crate::setting::{CheckSetting, Role};
 use crate::transcript::Transcript;
 
 /// Why nothing could be checked.
@@ -33,7 +33,7 @@ pub(crate) struct Kit {
     _control: Declared,
     pub(crate) endpoint: String,
     pub(crate) command: Command,
-    pub(crate) setting: Setting,
+    pub(crate) setting: CheckSetting,
     runs: AtomicUsize,
     learned: OnceLock<Learned>,
     /// The usual ticks, without any disturbance.
@@ -55,7 +55,7 @@ const OWN_PATIENCE: Duration = Duration::from_secs(20);
 
 impl Kit {
     /// Opens the kit's sessions. Nothing is started yet.
-    pub(crate) fn open(command: &Command, setting: &Setting) -> Result<Self, CannotRun> {
+    pub(crate) fn open(command: &Command, setting: &CheckSetting) -> Result<Self, CannotRun> {
         let (bus, endpoint) = open_router()?;
         let mut own = process::copy(command);
         // The robot connects to this kit only.

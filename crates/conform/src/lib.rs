@@ -37,6 +37,6 @@ mod wire;
 pub use checks::check;
 pub use flushing::unflushed;
 pub use kit::CannotRun;
-pub use report::{AnswerTimes, Failure, Outcome, Report, Verdict};
+pub use report::{AnswerTimes, Report, RuleFailure, RuleOutcome, RuleVerdict};
 pub use rules::{PAGE, RULES, Rule};
-pub use setting::{Role, Setting};
+pub use setting::{CheckSetting, Role};

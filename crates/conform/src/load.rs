@@ -8,9 +8,9 @@ use nix::unistd::Pid;
 
 /// The processes of a group.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Group(pub(crate) Pid);
+pub(crate) struct ProcessGroup(pub(crate) Pid);
 
-impl Group {
+impl ProcessGroup {
     /// Whether no thread of the group runs or waits for a processor. Where the system does not show it, the group is taken to rest.
     pub(crate) fn is_idle(self) -> bool {
         let mut is_idle = true;
@@ -82,7 +82,7 @@ mod tests {
         for (script, is_idle) in [("sleep 60; :", true), ("while :; do :; done", false)] {
             let mut shell = Command::new("sh");
             let mut child = shell.args(["-c", script]).process_group(0).spawn().unwrap();
-            let group = Group(Pid::from_raw(i32::try_from(child.id()).unwrap()));
+            let group = ProcessGroup(Pid::from_raw(i32::try_from(child.id()).unwrap()));
 
             // A fresh process starts up first, and may pause while it does.
             let mut found = group.is_idle();

@@ -2,8 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-use crate::process::Process;
-use crate::report::Failure;
+use crate::process::RobotProcess;
+use crate::report::RuleFailure;
 
 /// Longest wait for a program to start and to ask to join.
 pub(crate) const START_PATIENCE: Duration = Duration::from_secs(40);
@@ -35,7 +35,7 @@ impl Limit {
     }
 
     /// Whether the robot has had its time.
-    pub(crate) fn is_over(&mut self, process: &Process) -> bool {
+    pub(crate) fn is_over(&mut self, process: &RobotProcess) -> bool {
         let now = Instant::now();
         if now < self.deadline {
             return false;
@@ -57,8 +57,8 @@ const SCALES: [u32; 3] = [1, 3, 9];
 /// Judges what a machine that stands still for a moment could have caused as well: the rule is broken only if it is in
 /// each attempt, and each attempt has more time than the one before.
 pub(crate) fn in_each_attempt(
-    mut judge: impl FnMut(u32) -> Result<(), Failure>,
-) -> Result<(), Failure> {
+    mut judge: impl FnMut(u32) -> Result<(), RuleFailure>,
+) -> Result<(), RuleFailure> {
     let mut first = None;
     for scale in SCALES {
         match judge(scale) {
@@ -82,14 +82,14 @@ mod tests {
         let judged = in_each_attempt(|scale| {
             scales.push(scale);
             if scale < SCALES[2] {
-                return Err(Failure::new("a", format!("at {scale}")));
+                return Err(RuleFailure::new("a", format!("at {scale}")));
             }
             Ok(())
         });
         assert_eq!(judged, Ok(()));
         assert_eq!(scales, SCALES);
 
-        let judged = in_each_attempt(|scale| Err(Failure::new("a", format!("at {scale}"))));
-        assert_eq!(judged, Err(Failure::new("a", "at 1")));
+        let judged = in_each_attempt(|scale| Err(RuleFailure::new("a", format!("at {scale}"))));
+        assert_eq!(judged, Err(RuleFailure::new("a", "at 1")));
     }
 }

@@ -9,7 +9,7 @@ use std::time::Duration;
 use nix::sys::signal::{Signal, killpg};
 use nix::unistd::Pid;
 
-use crate::load::Group;
+use crate::load::ProcessGroup;
 
 /// What is shown of a program's output, bytes from its end.
 const TAIL_BYTES: u64 = 1500;
@@ -34,15 +34,15 @@ pub(crate) fn copy(command: &Command) -> Command {
 }
 
 /// A robot's process, with all that it started.
-pub(crate) struct Process {
+pub(crate) struct RobotProcess {
     child: Child,
-    group: Group,
+    group: ProcessGroup,
     output: File,
     errors: File,
     ended: Option<ExitStatus>,
 }
 
-impl Process {
+impl RobotProcess {
     /// Starts the command as it is, with more in its environment.
     pub(crate) fn start(
         command: &Command,
@@ -60,7 +60,7 @@ impl Process {
         let id = i32::try_from(child.id()).map_err(std::io::Error::other)?;
         Ok(Self {
             child,
-            group: Group(Pid::from_raw(id)),
+            group: ProcessGroup(Pid::from_raw(id)),
             output,
             errors,
             ended: None,
@@ -137,7 +137,7 @@ fn last_bytes(file: &File) -> std::io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-impl Drop for Process {
+impl Drop for RobotProcess {
     fn drop(&mut self) {
         self.signal(Signal::SIGKILL);
         // Only our own child can be waited for; what it started ends with the group.

@@ -9,14 +9,14 @@ use crate::rules::Rule;
 
 /// Why a rule failed.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Failure {
+pub struct RuleFailure {
     /// What a correct robot does.
     pub expected: String,
     /// What this one did.
     pub came: String,
 }
 
-impl Failure {
+impl RuleFailure {
     pub(crate) fn new(expected: impl Into<String>, came: impl Into<String>) -> Self {
         Self {
             expected: expected.into(),
@@ -28,11 +28,11 @@ impl Failure {
 /// What is known of one rule.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(tag = "verdict", rename_all = "snake_case")]
-pub enum Verdict {
+pub enum RuleVerdict {
     /// No check found it broken.
     Passed,
     /// It is broken.
-    Failed(Failure),
+    Failed(RuleFailure),
     /// This robot gives no occasion to see it.
     Skipped {
         /// Why.
@@ -42,11 +42,11 @@ pub enum Verdict {
 
 /// A rule and what is known of it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Outcome {
+pub struct RuleOutcome {
     /// The rule.
     pub rule: Rule,
     /// What is known of it.
-    pub verdict: Verdict,
+    pub verdict: RuleVerdict,
 }
 
 /// How long the robot took from a clock to its report, milliseconds of wall clock. No rule demands
@@ -94,7 +94,7 @@ pub struct Report {
     /// What it is written with, as it states.
     pub sdk: String,
     /// The rules that were asked for, in the order of the page.
-    pub outcomes: Vec<Outcome>,
+    pub outcomes: Vec<RuleOutcome>,
     /// How long it took to answer.
     pub answers: Option<AnswerTimes>,
 }
@@ -107,16 +107,16 @@ impl Report {
     }
 
     /// The rules that failed, and why.
-    pub fn failed(&self) -> impl Iterator<Item = (Rule, &Failure)> {
+    pub fn failed(&self) -> impl Iterator<Item = (Rule, &RuleFailure)> {
         self.outcomes
             .iter()
             .filter_map(|outcome| match &outcome.verdict {
-                Verdict::Failed(failure) => Some((outcome.rule, failure)),
+                RuleVerdict::Failed(failure) => Some((outcome.rule, failure)),
                 _ => None,
             })
     }
 
-    fn count(&self, is_meant: impl Fn(&Verdict) -> bool) -> usize {
+    fn count(&self, is_meant: impl Fn(&RuleVerdict) -> bool) -> usize {
         self.outcomes
             .iter()
             .filter(|outcome| is_meant(&outcome.verdict))
@@ -133,7 +133,7 @@ impl Report {
     #[must_use]
     pub fn to_json(&self) -> serde_json::Value {
         let mut rules = Vec::new();
-        for Outcome { rule, verdict } in &self.outcomes {
+        for RuleOutcome { rule, verdict } in &self.outcomes {
             let mut line = serde_json::json!(verdict);
             line["rule"] = rule.name.into();
             line["see"] = rule.reference().into();
@@ -143,9 +143,9 @@ impl Report {
         serde_json::json!({
             "robot": self.name,
             "sdk": self.sdk,
-            "passed": self.count(|verdict| *verdict == Verdict::Passed),
+            "passed": self.count(|verdict| *verdict == RuleVerdict::Passed),
             "failed": self.failed().count(),
-            "skipped": self.count(|verdict| matches!(verdict, Verdict::Skipped { .. })),
+            "skipped": self.count(|verdict| matches!(verdict, RuleVerdict::Skipped { .. })),
             "rules": rules,
             "time.answer": self.answers,
         })
@@ -161,15 +161,15 @@ impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "TAP version 14")?;
         writeln!(f, "1..{}", self.outcomes.len())?;
-        for (number, Outcome { rule, verdict }) in (1..).zip(&self.outcomes) {
+        for (number, RuleOutcome { rule, verdict }) in (1..).zip(&self.outcomes) {
             match verdict {
-                Verdict::Passed => writeln!(f, "ok {number} - {}", rule.name)?,
+                RuleVerdict::Passed => writeln!(f, "ok {number} - {}", rule.name)?,
                 // A line break would end the directive, and a second '#' would be taken for another one by some.
-                Verdict::Skipped { reason } => {
+                RuleVerdict::Skipped { reason } => {
                     let reason = reason.replace(['\n', '#'], " ");
                     writeln!(f, "ok {number} - {} # SKIP {reason}", rule.name)?;
                 }
-                Verdict::Failed(Failure { expected, came }) => {
+                RuleVerdict::Failed(RuleFailure { expected, came }) => {
                     writeln!(f, "not ok {number} - {}", rule.name)?;
                     writeln!(f, "  ---")?;
                     writeln!(f, "  expected: {}", scalar(expected))?;
@@ -187,7 +187,7 @@ impl fmt::Display for Report {
             )?;
         }
 
-        let passed = self.count(|verdict| *verdict == Verdict::Passed);
+        let passed = self.count(|verdict| *verdict == RuleVerdict::Passed);
         let failed = self.failed().count();
         let skipped = self.outcomes.len() - passed - failed;
         writeln!(

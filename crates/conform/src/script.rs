@@ -5,9 +5,9 @@ use protocol::messages::{Correction, Delivery, News, Performative};
 use protocol::{RobotName, Tick};
 
 use crate::body::{Body, ROUND};
-use crate::harness::{Harness, Options};
+use crate::harness::{Harness, HarnessOptions};
 use crate::kit::Kit;
-use crate::report::Failure;
+use crate::report::RuleFailure;
 use crate::transcript::{Entry, Transcript};
 
 /// In a round of ticks: the robot senses another one, and it cannot query any other.
@@ -16,14 +16,14 @@ const CUT_OFF: Tick = 14;
 
 /// A command that arrives at the robot.
 #[derive(Debug, Clone)]
-pub(crate) struct Arrival {
+pub(crate) struct ArrivingCommand {
     pub(crate) from: RobotName,
     pub(crate) text: String,
     /// The tick in whose news it is.
     pub(crate) tick: Tick,
 }
 
-impl Arrival {
+impl ArrivingCommand {
     /// The command `text` of `from`, in the news of a tick.
     pub(crate) fn new(from: &RobotName, text: &str, tick: Tick) -> Self {
         Self {
@@ -36,27 +36,27 @@ impl Arrival {
 
 /// Ticks to play.
 #[derive(Debug, Clone)]
-pub(crate) struct Script {
+pub(crate) struct PlayScript {
     /// How many after the first.
     pub(crate) ticks: Tick,
     /// Commands, in the order in which they count.
-    pub(crate) arrivals: Vec<Arrival>,
+    pub(crate) arrivals: Vec<ArrivingCommand>,
 }
 
 /// What a check does between the ticks. None of it may make a difference to the robot.
 pub(crate) trait Disturbance {
     /// Before a tick is granted.
-    fn before(&mut self, _stage: &mut Harness<'_>, _tick: Tick) -> Result<(), Failure> {
+    fn before(&mut self, _stage: &mut Harness<'_>, _tick: Tick) -> Result<(), RuleFailure> {
         Ok(())
     }
 
     /// After news and clock of a tick are put.
-    fn during(&mut self, _stage: &mut Harness<'_>, _tick: Tick) -> Result<(), Failure> {
+    fn during(&mut self, _stage: &mut Harness<'_>, _tick: Tick) -> Result<(), RuleFailure> {
         Ok(())
     }
 
     /// After the tick is complete.
-    fn after(&mut self, _stage: &mut Harness<'_>, _entry: &Entry) -> Result<(), Failure> {
+    fn after(&mut self, _stage: &mut Harness<'_>, _entry: &Entry) -> Result<(), RuleFailure> {
         Ok(())
     }
 }
@@ -66,7 +66,7 @@ pub(crate) struct Straight;
 
 impl Disturbance for Straight {}
 
-impl Script {
+impl PlayScript {
     /// The usual ticks: a few commands among them.
     pub(crate) fn usual(kit: &Kit) -> Self {
         let [one, two] = kit.texts();
@@ -75,11 +75,11 @@ impl Script {
         Self {
             ticks: kit.setting.ticks,
             arrivals: vec![
-                Arrival::new(&from, &one, 3),
-                Arrival::new(&from, &two, 7),
-                Arrival::new(&from, &one, 7),
-                Arrival::new(&RobotName::operator(), &one, 10),
-                Arrival::new(&from, &one, 20),
+                ArrivingCommand::new(&from, &one, 3),
+                ArrivingCommand::new(&from, &two, 7),
+                ArrivingCommand::new(&from, &one, 7),
+                ArrivingCommand::new(&RobotName::operator(), &one, 10),
+                ArrivingCommand::new(&from, &one, 20),
             ],
         }
     }
@@ -93,7 +93,7 @@ impl Script {
     }
 
     /// A few ticks with these commands.
-    pub(crate) fn with(ticks: Tick, arrivals: Vec<Arrival>) -> Self {
+    pub(crate) fn with(ticks: Tick, arrivals: Vec<ArrivingCommand>) -> Self {
         Self { ticks, arrivals }
     }
 
@@ -115,31 +115,31 @@ impl Script {
 }
 
 /// A robot that has joined a run of its own, ready for its first clock.
-pub(crate) fn with_robot(kit: &Kit, options: Options) -> Result<Harness<'_>, Failure> {
+pub(crate) fn with_robot(kit: &Kit, options: HarnessOptions) -> Result<Harness<'_>, RuleFailure> {
     let mut harness = Harness::open_run(kit, options)?;
     harness.join()?;
     Ok(harness)
 }
 
 /// A process of its own, taken straight through a script.
-pub(crate) fn played(kit: &Kit, script: &Script) -> Result<Transcript, Failure> {
-    let mut harness = with_robot(kit, Options::default())?;
+pub(crate) fn played(kit: &Kit, script: &PlayScript) -> Result<Transcript, RuleFailure> {
+    let mut harness = with_robot(kit, HarnessOptions::default())?;
     play(&mut harness, script, &mut Straight)
 }
 
 /// The usual ticks, as the robot went through them without any disturbance.
-pub(crate) fn usual(kit: &Kit) -> Result<&Transcript, Failure> {
+pub(crate) fn usual(kit: &Kit) -> Result<&Transcript, RuleFailure> {
     kit.usual
         .get()
-        .ok_or_else(|| Failure::new("the usual ticks are played first", "they were not"))
+        .ok_or_else(|| RuleFailure::new("the usual ticks are played first", "they were not"))
 }
 
 /// Plays a script to a robot that has joined, from the next tick of its harness on.
 pub(crate) fn play(
     harness: &mut Harness<'_>,
-    script: &Script,
+    script: &PlayScript,
     disturbance: &mut dyn Disturbance,
-) -> Result<Transcript, Failure> {
+) -> Result<Transcript, RuleFailure> {
     let mut transcript = Transcript::new();
     for _ in 0..=script.ticks {
         transcript.push(step(harness, script, disturbance)?);
@@ -151,9 +151,9 @@ pub(crate) fn play(
 /// Plays the next tick.
 pub(crate) fn step(
     harness: &mut Harness<'_>,
-    script: &Script,
+    script: &PlayScript,
     disturbance: &mut dyn Disturbance,
-) -> Result<Entry, Failure> {
+) -> Result<Entry, RuleFailure> {
     let epoch = harness.epoch();
     let tick = harness.next_tick();
     let news = news_of(harness, script, tick);
@@ -179,7 +179,7 @@ pub(crate) fn step(
 }
 
 /// What is new for the robot in a tick.
-fn news_of(harness: &mut Harness<'_>, script: &Script, tick: Tick) -> News {
+fn news_of(harness: &mut Harness<'_>, script: &PlayScript, tick: Tick) -> News {
     let epoch = harness.epoch();
     let mut news = News {
         commands: script.deliveries(tick),

@@ -21,7 +21,7 @@ pub(crate) struct Answer {
 
 /// A command of the robot that came.
 #[derive(Debug, Clone)]
-pub(crate) struct Sent {
+pub(crate) struct SentCommand {
     pub(crate) to: String,
     /// The sender that its key names.
     pub(crate) from: String,
@@ -31,7 +31,7 @@ pub(crate) struct Sent {
     pub(crate) order: usize,
 }
 
-impl Sent {
+impl SentCommand {
     /// Its number in its tick, if it can be read.
     pub(crate) fn number(&self) -> Option<u32> {
         self.command.as_ref().ok().map(|command| command.number)
@@ -49,7 +49,7 @@ pub(crate) struct Seen {
     pub(crate) answers: Vec<Answer>,
     /// Reports that cannot be read, and why.
     pub(crate) unreadable: Vec<String>,
-    pub(crate) commands: Vec<Sent>,
+    pub(crate) commands: Vec<SentCommand>,
     /// Integers of commands that are written with a fraction.
     pub(crate) not_integers: Vec<String>,
     /// States that it put, with their place among all that came.
@@ -119,7 +119,7 @@ impl Seen {
     }
 
     /// Files a command of the robot.
-    pub(crate) fn file_command(&mut self, key: &str, bytes: Vec<u8>, order: usize) -> Sent {
+    pub(crate) fn file_command(&mut self, key: &str, bytes: Vec<u8>, order: usize) -> SentCommand {
         let from = Keys::last_chunk(key).to_owned();
         let command = match reading::read_command(key, &from, &bytes) {
             Ok((command, not_integers)) => {
@@ -129,7 +129,7 @@ impl Seen {
             Err(error) => Err(error.to_string()),
         };
 
-        let sent = Sent {
+        let sent = SentCommand {
             to: Keys::robot_of(key).unwrap_or_default().to_owned(),
             from,
             command,

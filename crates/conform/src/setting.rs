@@ -7,7 +7,7 @@ use protocol::{RobotName, Tick};
 
 /// What a conformance check plays.
 #[derive(Debug, Clone)]
-pub struct Setting {
+pub struct CheckSetting {
     /// The name that the robot must ask for; without it any name is accepted.
     pub name: Option<RobotName>,
     /// The seed of the run.
@@ -49,7 +49,7 @@ const BESIDE: Point = Point { x: 7.0, y: 6.0 };
 /// The other one, and what it is called where the robot itself has that name.
 const OTHERS: [&str; 2] = ["Echo", "Echo2"];
 
-impl Default for Setting {
+impl Default for CheckSetting {
     /// A small field with one other robot, and no parameters.
     fn default() -> Self {
         Self {
@@ -66,7 +66,7 @@ impl Default for Setting {
     }
 }
 
-impl Setting {
+impl CheckSetting {
     /// The roster for a robot that asks to be `name`, or why it is not of the roster.
     pub(crate) fn cast_for(&self, name: &RobotName) -> Result<BTreeMap<RobotName, Role>, String> {
         if let Some(wanted) = self.name.as_ref().filter(|wanted| *wanted != name) {

@@ -5,7 +5,7 @@ use std::time::Duration;
 use protocol::messages::{News, Point, Report};
 use protocol::{Epoch, Tick};
 
-use crate::seen::Sent;
+use crate::seen::SentCommand;
 
 /// A tick that was played.
 #[derive(Debug, Clone)]
@@ -17,7 +17,7 @@ pub(crate) struct Entry {
     pub(crate) location: Point,
     pub(crate) report: Report,
     /// Its commands, by number.
-    pub(crate) commands: Vec<Sent>,
+    pub(crate) commands: Vec<SentCommand>,
     /// The place of its report in [`crate::seen::Seen::answers`].
     pub(crate) index: usize,
     /// From the clock to the report, wall clock.

@@ -8,7 +8,7 @@ use protocol::keys::{Keys, STATE};
 use protocol::messages::JoinRequest;
 use protocol::{RobotName, decode};
 
-use crate::report::Failure;
+use crate::report::RuleFailure;
 
 /// Messages that may queue up before the robot's link is slowed down.
 const QUEUE: usize = 65_536;
@@ -16,7 +16,7 @@ const QUEUE: usize = 65_536;
 const ATTEMPTS: usize = 4;
 
 /// All that a robot can put or ask.
-pub(crate) enum Event {
+pub(crate) enum WireEvent {
     Join(Query),
     Report {
         key: String,
@@ -65,7 +65,7 @@ impl Joining {
     }
 }
 
-impl From<BusError> for Failure {
+impl From<BusError> for RuleFailure {
     fn from(error: BusError) -> Self {
         Self::new("the kit's own bus works", error.to_string())
     }
@@ -75,8 +75,8 @@ impl From<BusError> for Failure {
 pub(crate) struct Wire {
     bus: Bus,
     keys: Keys,
-    queue: SyncSender<Event>,
-    events: Receiver<Event>,
+    queue: SyncSender<WireEvent>,
+    events: Receiver<WireEvent>,
     clock: Publisher,
     declared: Vec<Declared>,
     simulator: Option<Declared>,
@@ -109,7 +109,7 @@ impl Wire {
     }
 
     /// The next that arrives.
-    pub(crate) fn receive(&self, patience: Duration) -> Option<Event> {
+    pub(crate) fn receive(&self, patience: Duration) -> Option<WireEvent> {
         self.events.recv_timeout(patience).ok()
     }
 
@@ -118,7 +118,7 @@ impl Wire {
         let sender = self.queue.clone();
         let key = self.keys.query(robot, STATE);
         let states = self.bus.subscribe_with_qos(&key, move |_, bytes, qos| {
-            let _over = sender.send(Event::State {
+            let _over = sender.send(WireEvent::State {
                 bytes: bytes.into(),
                 qos,
             });
@@ -128,17 +128,17 @@ impl Wire {
     }
 
     /// Puts a clock, or something else on the key of clocks.
-    pub(crate) fn put_clock(&self, bytes: Vec<u8>) -> Result<(), Failure> {
+    pub(crate) fn put_clock(&self, bytes: Vec<u8>) -> Result<(), RuleFailure> {
         Ok(self.clock.put(bytes)?)
     }
 
     /// Puts news for a robot, or something else on the key of its news.
-    pub(crate) fn put_news(&self, robot: &RobotName, bytes: Vec<u8>) -> Result<(), Failure> {
+    pub(crate) fn put_news(&self, robot: &RobotName, bytes: Vec<u8>) -> Result<(), RuleFailure> {
         Ok(self.bus.put(&self.keys.news(robot), bytes)?)
     }
 
     /// Undeclares the simulator's liveliness token, or declares it again.
-    pub(crate) fn show_simulator(&mut self, is_present: bool) -> Result<(), Failure> {
+    pub(crate) fn show_simulator(&mut self, is_present: bool) -> Result<(), RuleFailure> {
         self.simulator = None;
         if is_present {
             self.simulator = Some(self.bus.token(&self.keys.alive_sim())?);
@@ -148,7 +148,7 @@ impl Wire {
 
     /// Queries a robot; `None` if no queryable replies. A query whose time is up is sent again: a robot that has the key
     /// and a loaded machine may be late, and a key without a queryable is known at once.
-    pub(crate) fn ask(&self, key: &str, parameters: &str) -> Result<Option<Reply>, Failure> {
+    pub(crate) fn ask(&self, key: &str, parameters: &str) -> Result<Option<Reply>, RuleFailure> {
         for _ in 0..ATTEMPTS {
             let begun = Instant::now();
             let reply = self.bus.get(key, parameters, None)?;
@@ -160,22 +160,30 @@ impl Wire {
     }
 
     /// Queries a key without waiting. The reply arrives as an event with the number that this returns.
-    pub(crate) fn begin_query(&mut self, key: &str, parameters: &str) -> Result<usize, Failure> {
+    pub(crate) fn begin_query(
+        &mut self,
+        key: &str,
+        parameters: &str,
+    ) -> Result<usize, RuleFailure> {
         let number = self.queries;
         self.queries += 1;
         let sender = self.queue.clone();
         self.bus.get_then(key, parameters, move |reply| {
-            let _over = sender.send(Event::Reply(number, reply));
+            let _over = sender.send(WireEvent::Reply(number, reply));
         })?;
         Ok(number)
     }
 }
 
 /// Subscribes to all that the robots of a run put, and receives their requests. A send fails only when the harness is over.
-fn listen(bus: &Bus, keys: &Keys, queue: &SyncSender<Event>) -> Result<Vec<Declared>, BusError> {
+fn listen(
+    bus: &Bus,
+    keys: &Keys,
+    queue: &SyncSender<WireEvent>,
+) -> Result<Vec<Declared>, BusError> {
     let sender = queue.clone();
     let reports = bus.subscribe_with_qos(&keys.reports(), move |key, bytes, qos| {
-        let _over = sender.send(Event::Report {
+        let _over = sender.send(WireEvent::Report {
             key: key.into(),
             bytes: bytes.into(),
             at: Instant::now(),
@@ -185,7 +193,7 @@ fn listen(bus: &Bus, keys: &Keys, queue: &SyncSender<Event>) -> Result<Vec<Decla
 
     let sender = queue.clone();
     let commands = bus.subscribe_with_qos(&keys.commands(), move |key, bytes, qos| {
-        let _over = sender.send(Event::Command {
+        let _over = sender.send(WireEvent::Command {
             key: key.into(),
             bytes: bytes.into(),
             qos,
@@ -194,7 +202,7 @@ fn listen(bus: &Bus, keys: &Keys, queue: &SyncSender<Event>) -> Result<Vec<Decla
 
     let sender = queue.clone();
     let waiting = bus.subscribe_with_qos(&keys.all_waiting(), move |key, bytes, qos| {
-        let _over = sender.send(Event::Waiting {
+        let _over = sender.send(WireEvent::Waiting {
             key: key.into(),
             bytes: bytes.into(),
             qos,
@@ -203,12 +211,12 @@ fn listen(bus: &Bus, keys: &Keys, queue: &SyncSender<Event>) -> Result<Vec<Decla
 
     let sender = queue.clone();
     let joins = bus.queryable(&keys.joins(), move |query| {
-        let _over = sender.send(Event::Join(query));
+        let _over = sender.send(WireEvent::Join(query));
     })?;
 
     let sender = queue.clone();
     let tokens = bus.liveliness(&keys.alive_robots(), move |key, is_present| {
-        let _over = sender.send(Event::Token {
+        let _over = sender.send(WireEvent::Token {
             robot: Keys::last_chunk(key).to_owned(),
             is_present,
         });

@@ -6,7 +6,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::process::Command;
 
-use conform::{PAGE, RULES, Rule, Setting, Verdict};
+use conform::{CheckSetting, PAGE, RULES, Rule, RuleVerdict};
 use system_tests::tools::has_python;
 use system_tests::{Lab, objections, programs, root};
 
@@ -74,10 +74,10 @@ fn wrong(rule: &str) -> Command {
     command
 }
 
-fn setting() -> Setting {
-    Setting {
+fn setting() -> CheckSetting {
+    CheckSetting {
         ticks: 40,
-        ..Setting::default()
+        ..CheckSetting::default()
     }
 }
 
@@ -108,7 +108,7 @@ fn a_robot_by_hand_gives_occasion_to_every_rule() {
     let passed = report
         .outcomes
         .iter()
-        .filter(|outcome| outcome.verdict == Verdict::Passed)
+        .filter(|outcome| outcome.verdict == RuleVerdict::Passed)
         .count();
     assert_eq!(passed, RULES.len(), "{report}");
 }

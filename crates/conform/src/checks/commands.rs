@@ -9,8 +9,8 @@ use serde_json::Value;
 use crate::comparison::is_same;
 use crate::findings::Findings;
 use crate::kit::Kit;
-use crate::report::Failure;
-use crate::script::{Arrival, Script, played};
+use crate::report::RuleFailure;
+use crate::script::{ArrivingCommand, PlayScript, played};
 use crate::transcript::Transcript;
 
 /// The tick in whose news the last commands of these checks arrive, and the last tick.
@@ -18,7 +18,7 @@ const LAST: Tick = 6;
 const TICKS: Tick = 12;
 
 /// Plays ticks in whose news these commands arrive, each from the sender of the kit's commands.
-fn commanded(kit: &Kit, commands: &[(&str, Tick)]) -> Result<Transcript, Failure> {
+fn commanded(kit: &Kit, commands: &[(&str, Tick)]) -> Result<Transcript, RuleFailure> {
     commanded_by(&kit.sender(), kit, commands)
 }
 
@@ -26,12 +26,12 @@ fn commanded_by(
     from: &RobotName,
     kit: &Kit,
     commands: &[(&str, Tick)],
-) -> Result<Transcript, Failure> {
+) -> Result<Transcript, RuleFailure> {
     let arrivals = commands
         .iter()
-        .map(|(text, tick)| Arrival::new(from, text, *tick))
+        .map(|(text, tick)| ArrivingCommand::new(from, text, *tick))
         .collect();
-    played(kit, &Script::with(TICKS, arrivals))
+    played(kit, &PlayScript::with(TICKS, arrivals))
 }
 
 /// For and against something that is seen in several places of a report.
@@ -51,7 +51,7 @@ impl Votes {
 }
 
 /// Two commands in the same news have the effect of the same two in two ticks, in the same order.
-pub(super) fn order(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> {
+pub(super) fn order(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
     for [one, two] in kit.pairs() {
         let straight = values(&commanded(kit, &[(&one, LAST - 1), (&two, LAST)])?);
         let swapped = values(&commanded(kit, &[(&two, LAST - 1), (&one, LAST)])?);
@@ -66,7 +66,7 @@ pub(super) fn order(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> {
         let back = vote(&reversed, &swapped, &straight);
         for (votes, first, second) in [(&votes, &one, &two), (&back, &two, &one)] {
             if votes.is_broken() {
-                return Err(Failure::new(
+                return Err(RuleFailure::new(
                     format!(
                         "news that list {first:?} and then {second:?} have their effect in this order"
                     ),
@@ -140,7 +140,7 @@ fn shown(kit: &Kit) -> String {
 }
 
 /// A command that is listed twice is executed twice.
-pub(super) fn twice(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> {
+pub(super) fn twice(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
     if kit.is_deterministic.get() == Some(&false) {
         findings.skip(
             "command.twice",
@@ -175,7 +175,7 @@ pub(super) fn twice(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> {
         }
 
         if votes.is_broken() {
-            return Err(Failure::new(
+            return Err(RuleFailure::new(
                 format!("a command that the news list twice is executed twice: {text:?}"),
                 format!("{counter} counts it once"),
             ));
@@ -209,7 +209,7 @@ fn numbers(transcript: &Transcript) -> BTreeMap<String, f64> {
 }
 
 /// A command from the operator, who is not a robot of the roster, is executed like any other, and not answered.
-pub(super) fn from_operator(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> {
+pub(super) fn from_operator(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
     let operator = RobotName::operator();
     let none = commanded(kit, &[])?;
     let mut is_seen = false;
@@ -221,7 +221,7 @@ pub(super) fn from_operator(kit: &Kit, findings: &mut Findings) -> Result<(), Fa
             .flat_map(|entry| &entry.commands)
             .find(|sent| sent.to == operator.as_str());
         if answer.is_some() {
-            return Err(Failure::new(
+            return Err(RuleFailure::new(
                 "no command to the operator, who is not a robot of the roster",
                 format!("one, after {text:?} from the operator"),
             ));
@@ -236,7 +236,7 @@ pub(super) fn from_operator(kit: &Kit, findings: &mut Findings) -> Result<(), Fa
         is_seen = true;
         if is_same(&from_operator, &none) {
             let sender = kit.sender();
-            return Err(Failure::new(
+            return Err(RuleFailure::new(
                 format!("{text:?} from the operator is executed like that from {sender}"),
                 "it has no effect at all",
             ));

@@ -10,11 +10,11 @@ use std::time::{Duration, Instant};
 
 use protocol::Tick;
 
-use crate::harness::{Harness, Options};
+use crate::harness::{Harness, HarnessOptions};
 use crate::kit::Kit;
 use crate::patience::PATIENCE;
-use crate::report::Failure;
-use crate::script::{Disturbance, Script, play, with_robot};
+use crate::report::RuleFailure;
+use crate::script::{Disturbance, PlayScript, play, with_robot};
 use crate::transcript::Entry;
 
 /// How often the robot is queried during a tick.
@@ -42,7 +42,7 @@ struct QueriesDuringTicks {
 }
 
 impl Disturbance for QueriesDuringTicks {
-    fn during(&mut self, harness: &mut Harness<'_>, tick: Tick) -> Result<(), Failure> {
+    fn during(&mut self, harness: &mut Harness<'_>, tick: Tick) -> Result<(), RuleFailure> {
         self.pairs.clear();
         loop {
             harness.pass_while(EVERY, Harness::is_open);
@@ -60,7 +60,7 @@ impl Disturbance for QueriesDuringTicks {
         }
     }
 
-    fn after(&mut self, harness: &mut Harness<'_>, entry: &Entry) -> Result<(), Failure> {
+    fn after(&mut self, harness: &mut Harness<'_>, entry: &Entry) -> Result<(), RuleFailure> {
         for pair in &self.pairs {
             let expected = format!("queried during tick {}, a reply", entry.tick);
             for number in [pair.robot, pair.control] {
@@ -82,7 +82,7 @@ impl Disturbance for QueriesDuringTicks {
 }
 
 /// The robot answers while it computes.
-pub(super) fn check(kit: &Kit) -> Result<(), Failure> {
+pub(super) fn check(kit: &Kit) -> Result<(), RuleFailure> {
     let mut late = late_ticks(kit)?;
     for _ in 1..PLAYS {
         if late.is_empty() {
@@ -94,7 +94,7 @@ pub(super) fn check(kit: &Kit) -> Result<(), Failure> {
 
     match late.first_key_value() {
         None => Ok(()),
-        Some((tick, had)) => Err(Failure::new(
+        Some((tick, had)) => Err(RuleFailure::new(
             format!("queried during tick {tick}, a reply at once"),
             format!(
                 "in each of {PLAYS} plays one after its report, which came {} ms after the query",
@@ -105,10 +105,10 @@ pub(super) fn check(kit: &Kit) -> Result<(), Failure> {
 }
 
 /// Plays the usual ticks. The ticks in which an answer came after the report although there was time for it before.
-fn late_ticks(kit: &Kit) -> Result<BTreeMap<Tick, Duration>, Failure> {
-    let mut harness = with_robot(kit, Options::default())?;
+fn late_ticks(kit: &Kit) -> Result<BTreeMap<Tick, Duration>, RuleFailure> {
+    let mut harness = with_robot(kit, HarnessOptions::default())?;
     let mut queries = QueriesDuringTicks::default();
-    play(&mut harness, &Script::usual(kit), &mut queries)?;
+    play(&mut harness, &PlayScript::usual(kit), &mut queries)?;
 
     Ok(queries.late)
 }

@@ -7,11 +7,11 @@ use protocol::messages::End;
 
 use super::waiting;
 use crate::findings::Findings;
-use crate::harness::{Harness, Options};
+use crate::harness::{Harness, HarnessOptions};
 use crate::kit::Kit;
 use crate::patience::{PATIENCE, in_each_attempt};
-use crate::report::Failure;
-use crate::script::{Script, Straight, play, step, with_robot};
+use crate::report::RuleFailure;
+use crate::script::{PlayScript, Straight, play, step, with_robot};
 
 /// A process ends within this time after SIGTERM. The page allows 2 s; signals and the kernel need some, too.
 const END_PATIENCE: Duration = Duration::from_secs(5);
@@ -23,10 +23,10 @@ const LONG_GONE_S: u32 = 60;
 const HASTY: Duration = Duration::from_millis(1200);
 
 /// However a run ends, and whatever the robot waits for: it ends, as it should.
-pub(super) fn clock(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
+pub(super) fn clock(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     for end in [End::Finished, End::Stopped, End::Aborted] {
-        let mut harness = with_robot(kit, Options::default())?;
-        play(&mut harness, &Script::quiet(3), &mut Straight)?;
+        let mut harness = with_robot(kit, HarnessOptions::default())?;
+        play(&mut harness, &PlayScript::quiet(3), &mut Straight)?;
         demand_end(&mut harness, end, "between two ticks")?;
     }
 
@@ -41,12 +41,12 @@ pub(super) fn clock(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     Ok(())
 }
 
-fn demand_end(harness: &mut Harness<'_>, end: End, when: &str) -> Result<(), Failure> {
+fn demand_end(harness: &mut Harness<'_>, end: End, when: &str) -> Result<(), RuleFailure> {
     harness.put_end(end)?;
     let expected = format!("its process ends after a clock with end {end:?} {when}");
     let status = harness.until_ended(&expected, PATIENCE)?;
     if status.code() != Some(0) {
-        return Err(Failure::new(
+        return Err(RuleFailure::new(
             format!("exit status 0 after a clock with end {end:?} {when}"),
             harness.process.fate(),
         ));
@@ -55,9 +55,9 @@ fn demand_end(harness: &mut Harness<'_>, end: End, when: &str) -> Result<(), Fai
 }
 
 /// It is asked to end by a signal, in the middle of a run.
-pub(super) fn sigterm(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
-    let mut harness = with_robot(kit, Options::default())?;
-    play(&mut harness, &Script::quiet(3), &mut Straight)?;
+pub(super) fn sigterm(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
+    let mut harness = with_robot(kit, HarnessOptions::default())?;
+    play(&mut harness, &PlayScript::quiet(3), &mut Straight)?;
 
     harness.process.signal(Signal::SIGTERM);
     harness.until_ended("its process ends within 2 s of SIGTERM", END_PATIENCE)?;
@@ -65,26 +65,26 @@ pub(super) fn sigterm(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
 }
 
 /// The simulator's token goes: the robot waits for it, goes on if it comes back, and ends when its patience is over.
-pub(super) fn gone(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
+pub(super) fn gone(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     gone_for_a_while(kit)?;
     in_each_attempt(|scale| back_in_time(kit, GONE_S * scale))?;
     gone_forever(kit)
 }
 
 /// A robot that lost its simulator, and is to wait so long for it.
-fn without_simulator(kit: &Kit, gone_patience_s: u32) -> Result<Harness<'_>, Failure> {
-    let options = Options {
+fn without_simulator(kit: &Kit, gone_patience_s: u32) -> Result<Harness<'_>, RuleFailure> {
+    let options = HarnessOptions {
         gone_patience_s,
-        ..Options::default()
+        ..HarnessOptions::default()
     };
     let mut harness = with_robot(kit, options)?;
-    play(&mut harness, &Script::quiet(3), &mut Straight)?;
+    play(&mut harness, &PlayScript::quiet(3), &mut Straight)?;
     harness.show_simulator(false)?;
     Ok(harness)
 }
 
 /// It does not end before its patience is over. There is so much of it that no machine uses it up meanwhile.
-fn gone_for_a_while(kit: &Kit) -> Result<(), Failure> {
+fn gone_for_a_while(kit: &Kit) -> Result<(), RuleFailure> {
     let mut harness = without_simulator(kit, LONG_GONE_S)?;
     harness.pass(HASTY);
     let expected =
@@ -92,11 +92,11 @@ fn gone_for_a_while(kit: &Kit) -> Result<(), Failure> {
     demand_running(&mut harness, &expected)?;
 
     harness.show_simulator(true)?;
-    step(&mut harness, &Script::quiet(1), &mut Straight).map(drop)
+    step(&mut harness, &PlayScript::quiet(1), &mut Straight).map(drop)
 }
 
 /// The simulator is back before the robot's patience is over, and the time is over when its patience would have been.
-fn back_in_time(kit: &Kit, gone_patience_s: u32) -> Result<(), Failure> {
+fn back_in_time(kit: &Kit, gone_patience_s: u32) -> Result<(), RuleFailure> {
     let mut harness = without_simulator(kit, gone_patience_s)?;
     let patience = Duration::from_secs(gone_patience_s.into());
     harness.pass(patience / 4);
@@ -106,26 +106,26 @@ fn back_in_time(kit: &Kit, gone_patience_s: u32) -> Result<(), Failure> {
         &mut harness,
         "it goes on when the simulator is back in time, and waits no longer",
     )?;
-    step(&mut harness, &Script::quiet(1), &mut Straight).map(drop)
+    step(&mut harness, &PlayScript::quiet(1), &mut Straight).map(drop)
 }
 
 /// The simulator does not come back.
-fn gone_forever(kit: &Kit) -> Result<(), Failure> {
+fn gone_forever(kit: &Kit) -> Result<(), RuleFailure> {
     let mut harness = without_simulator(kit, GONE_S)?;
     let expected = format!("its process ends when the simulator was gone for {GONE_S} s");
     let patience = PATIENCE + Duration::from_secs(GONE_S.into());
     let status = harness.until_ended(&expected, patience)?;
     if status.success() {
         let expected = "an exit status other than 0 when the simulator is gone";
-        return Err(Failure::new(expected, format!("{status}")));
+        return Err(RuleFailure::new(expected, format!("{status}")));
     }
     harness.until_gone()
 }
 
-fn demand_running(harness: &mut Harness<'_>, expected: &str) -> Result<(), Failure> {
+fn demand_running(harness: &mut Harness<'_>, expected: &str) -> Result<(), RuleFailure> {
     if harness.process.ended().is_none() {
         return Ok(());
     }
 
-    Err(Failure::new(expected, harness.process.fate()))
+    Err(RuleFailure::new(expected, harness.process.fate()))
 }

@@ -5,13 +5,13 @@ use std::time::Duration;
 use protocol::messages::{Clock, Delivery, JoinRequest, News, Performative, Point};
 use protocol::{Epoch, Tick};
 
-use crate::comparison::{Difference, demand_same, difference};
+use crate::comparison::{PlayDifference, demand_same, difference};
 use crate::findings::Findings;
-use crate::harness::{Harness, Options};
+use crate::harness::{Harness, HarnessOptions};
 use crate::kit::Kit;
 use crate::patience::PATIENCE;
-use crate::report::Failure;
-use crate::script::{Disturbance, Script, Straight, play, usual, with_robot};
+use crate::report::RuleFailure;
+use crate::script::{Disturbance, PlayScript, Straight, play, usual, with_robot};
 use crate::transcript::Entry;
 use crate::wire::Joining;
 
@@ -24,16 +24,16 @@ const DRAWS: u64 = 16;
 const DRAWN: Tick = 12;
 
 /// Another process, the same seed: the same reports.
-pub(super) fn same_seed(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> {
-    let mut harness = with_robot(kit, Options::default())?;
-    let again = play(&mut harness, &Script::usual(kit), &mut Straight)?;
+pub(super) fn same_seed(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
+    let mut harness = with_robot(kit, HarnessOptions::default())?;
+    let again = play(&mut harness, &PlayScript::usual(kit), &mut Straight)?;
     if let [Ok(request)] = &harness.seen.requests[..]
         && request.instance == kit.first_instance()
     {
         let came = format!("two processes have {:?}", request.instance);
         findings.fail(
             "join.request",
-            Failure::new("an instance that no other process has", came),
+            RuleFailure::new("an instance that no other process has", came),
         );
     }
 
@@ -43,7 +43,7 @@ pub(super) fn same_seed(kit: &Kit, findings: &mut Findings) -> Result<(), Failur
     }
     match found {
         None => Ok(()),
-        Some(Difference { first, second }) => Err(Failure::new(
+        Some(PlayDifference { first, second }) => Err(RuleFailure::new(
             format!("another process reports the same for the same seed: {first}"),
             second,
         )),
@@ -55,14 +55,14 @@ type Moves = Vec<(Point, f64, f64)>;
 
 /// What is drawn is decided by the seed together with the stream that the welcome names. Each welcome is that of a
 /// further epoch, so that one process does for all.
-pub(super) fn streams(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
+pub(super) fn streams(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     // Of a robot that does not repeat itself nothing can be compared.
     if kit.is_deterministic.get() == Some(&false) {
         return Ok(());
     }
 
-    let mut harness = with_robot(kit, Options::default())?;
-    play(&mut harness, &Script::quiet(DRAWN), &mut Straight)?;
+    let mut harness = with_robot(kit, HarnessOptions::default())?;
+    play(&mut harness, &PlayScript::quiet(DRAWN), &mut Straight)?;
     let seed = harness.template.seed;
     let stream = harness.template.stream.clone();
     let mut by_stream = Vec::new();
@@ -77,13 +77,13 @@ pub(super) fn streams(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
 
     let expected = format!("{DRAWS} streams and {DRAWS} seeds give different moves");
     if are_all_different(&by_seed) && are_all_the_same(&by_stream) {
-        return Err(Failure::new(
+        return Err(RuleFailure::new(
             expected,
             "the name of the stream makes no difference, the seed does",
         ));
     }
     if are_all_different(&by_stream) && are_all_the_same(&by_seed) {
-        return Err(Failure::new(
+        return Err(RuleFailure::new(
             expected,
             "the seed makes no difference, the name of the stream does",
         ));
@@ -101,12 +101,12 @@ fn are_all_different(moves: &[Moves]) -> bool {
 }
 
 /// How the robot moves in a further epoch with this seed and stream.
-fn moves(harness: &mut Harness<'_>, seed: u64, stream: String) -> Result<Moves, Failure> {
+fn moves(harness: &mut Harness<'_>, seed: u64, stream: String) -> Result<Moves, RuleFailure> {
     harness.template.seed = seed;
     harness.template.stream = stream;
     let asked = harness.seen.requests.len();
     harness.begin_epoch(harness.epoch() + 1);
-    let played = play(harness, &Script::quiet(DRAWN), &mut Straight);
+    let played = play(harness, &PlayScript::quiet(DRAWN), &mut Straight);
     // A robot that does not start over shows nothing here; that is another rule's matter.
     if harness.seen.requests.len() == asked {
         return Ok(Moves::new());
@@ -121,11 +121,11 @@ fn moves(harness: &mut Harness<'_>, seed: u64, stream: String) -> Result<Moves, 
 }
 
 /// The clock of a higher epoch: it joins again, and goes through the same ticks as a fresh process.
-pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
+pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     /// At tick 0 the robot is welcomed to the epoch that is over before it is welcomed to the next one.
     struct WrongWelcome;
     impl Disturbance for WrongWelcome {
-        fn during(&mut self, harness: &mut Harness<'_>, tick: Tick) -> Result<(), Failure> {
+        fn during(&mut self, harness: &mut Harness<'_>, tick: Tick) -> Result<(), RuleFailure> {
             if tick > 0 {
                 return Ok(());
             }
@@ -143,10 +143,10 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
             Ok(())
         }
     }
-    let mut harness = with_robot(kit, Options::default())?;
-    let busy = Script {
+    let mut harness = with_robot(kit, HarnessOptions::default())?;
+    let busy = PlayScript {
         ticks: BUSY,
-        ..Script::usual(kit)
+        ..PlayScript::usual(kit)
     };
     play(&mut harness, &busy, &mut Straight)?;
     let [text, _] = kit.texts();
@@ -165,11 +165,11 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
 
     harness.begin_epoch(2);
     harness.keeps_requests = true;
-    let again = play(&mut harness, &Script::usual(kit), &mut WrongWelcome);
+    let again = play(&mut harness, &PlayScript::usual(kit), &mut WrongWelcome);
     demand_same_process(&harness)?;
     let again = again?;
     if harness.seen.tokens_lost > tokens_lost {
-        return Err(Failure::new(
+        return Err(RuleFailure::new(
             "its token stays declared when an epoch begins",
             "it was undeclared",
         ));
@@ -183,9 +183,9 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
 }
 
 /// A robot that has missed the beginning of an epoch joins again, too, and waits until it is named.
-pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
-    let mut harness = with_robot(kit, Options::default())?;
-    play(&mut harness, &Script::quiet(3), &mut Straight)?;
+pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
+    let mut harness = with_robot(kit, HarnessOptions::default())?;
+    play(&mut harness, &PlayScript::quiet(3), &mut Straight)?;
     let tokens_lost = harness.seen.tokens_lost;
 
     harness.begin_epoch(2);
@@ -210,10 +210,10 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     let expected = "admitted in tick 1 of an epoch, no report before its news name its generation";
     demand_silence(&harness, expected)?;
 
-    let transcript = play(&mut harness, &Script::quiet(4), &mut Straight)?;
+    let transcript = play(&mut harness, &PlayScript::quiet(4), &mut Straight)?;
     demand_epoch(&transcript, 2)?;
     if harness.seen.tokens_lost > tokens_lost {
-        return Err(Failure::new(
+        return Err(RuleFailure::new(
             "its token stays declared when it joins a further epoch",
             "it was undeclared",
         ));
@@ -221,16 +221,16 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     Ok(())
 }
 
-fn join_again(harness: &mut Harness<'_>) -> Result<Joining, Failure> {
+fn join_again(harness: &mut Harness<'_>) -> Result<Joining, RuleFailure> {
     let epoch = harness.epoch();
     harness.next_join(PATIENCE).map_err(|failure| {
         let expected = format!("another request to join for a clock of epoch {epoch}");
-        Failure::new(expected, failure.came)
+        RuleFailure::new(expected, failure.came)
     })
 }
 
 /// No report of the epoch under way has come.
-fn demand_silence(harness: &Harness<'_>, expected: &str) -> Result<(), Failure> {
+fn demand_silence(harness: &Harness<'_>, expected: &str) -> Result<(), RuleFailure> {
     let epoch = harness.epoch();
     let mut reports = harness
         .seen
@@ -240,7 +240,7 @@ fn demand_silence(harness: &Harness<'_>, expected: &str) -> Result<(), Failure> 
 
     match reports.find(|report| report.epoch == epoch) {
         None => Ok(()),
-        Some(report) => Err(Failure::new(
+        Some(report) => Err(RuleFailure::new(
             expected,
             format!("a report for tick {} of epoch {epoch}", report.tick),
         )),
@@ -248,18 +248,18 @@ fn demand_silence(harness: &Harness<'_>, expected: &str) -> Result<(), Failure> 
 }
 
 /// It asked to join again as the process that it is.
-fn demand_same_process(harness: &Harness<'_>) -> Result<(), Failure> {
+fn demand_same_process(harness: &Harness<'_>) -> Result<(), RuleFailure> {
     let expected = "further requests to join with the same name and instance when an epoch begins";
     let mut first = None;
     for request in &harness.seen.requests {
         let request = match request {
             Ok(JoinRequest { name, instance, .. }) => format!("{name} with instance {instance:?}"),
-            Err(error) => return Err(Failure::new(expected, error)),
+            Err(error) => return Err(RuleFailure::new(expected, error)),
         };
 
         let first = first.get_or_insert_with(|| request.clone());
         if *first != request {
-            return Err(Failure::new(
+            return Err(RuleFailure::new(
                 expected,
                 format!("{request}, and before {first}"),
             ));
@@ -268,12 +268,12 @@ fn demand_same_process(harness: &Harness<'_>) -> Result<(), Failure> {
     Ok(())
 }
 
-fn demand_epoch(transcript: &[Entry], epoch: Epoch) -> Result<(), Failure> {
+fn demand_epoch(transcript: &[Entry], epoch: Epoch) -> Result<(), RuleFailure> {
     match transcript.iter().find(|entry| entry.report.epoch != epoch) {
         None => Ok(()),
         Some(entry) => {
             let came = format!("epoch {}", entry.report.epoch);
-            Err(Failure::new(format!("reports of epoch {epoch}"), came))
+            Err(RuleFailure::new(format!("reports of epoch {epoch}"), came))
         }
     }
 }

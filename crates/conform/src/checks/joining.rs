@@ -6,11 +6,11 @@ use protocol::keys::{QUERIES, STATE};
 use protocol::messages::Refusal;
 
 use crate::findings::Findings;
-use crate::harness::{Harness, Options};
+use crate::harness::{Harness, HarnessOptions};
 use crate::kit::Kit;
 use crate::patience::{Limit, PATIENCE, START_PATIENCE};
-use crate::report::Failure;
-use crate::script::{Script, Straight, play};
+use crate::report::RuleFailure;
+use crate::script::{PlayScript, Straight, play};
 
 /// For how long a welcome is held back, to see whether the robot waits for it.
 const HELD_BACK: Duration = Duration::from_millis(200);
@@ -20,13 +20,13 @@ const TAKEN: usize = 3;
 const GRACE: Duration = Duration::from_secs(10);
 
 /// Everything is declared before the token, and the token comes after the welcome.
-pub(super) fn ready_last(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
-    let mut harness = Harness::open_run(kit, Options::default())?;
+pub(super) fn ready_last(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
+    let mut harness = Harness::open_run(kit, HarnessOptions::default())?;
     harness.prepare()?;
     let joining = harness.next_join(START_PATIENCE)?;
     harness.settle(HELD_BACK);
     if harness.is_present() {
-        return Err(Failure::new(
+        return Err(RuleFailure::new(
             "its liveliness token after the welcome",
             "it came before",
         ));
@@ -40,34 +40,34 @@ pub(super) fn ready_last(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     for what in QUERIES.iter().chain([&STATE]) {
         if harness.ask(what, "")?.is_none() {
             let expected = format!("a queryable of {what} is declared before the token");
-            return Err(Failure::new(expected, "the token without it"));
+            return Err(RuleFailure::new(expected, "the token without it"));
         }
     }
     for key in [harness.keys.clock(), harness.keys.news(&subject)] {
         if !harness.has_subscriber(&key)? {
             let expected = format!("a subscriber of {key} is declared before the token");
-            return Err(Failure::new(expected, "the token without it"));
+            return Err(RuleFailure::new(expected, "the token without it"));
         }
     }
-    play(&mut harness, &Script::quiet(2), &mut Straight).map(drop)
+    play(&mut harness, &PlayScript::quiet(2), &mut Straight).map(drop)
 }
 
 /// Refused for good, it ends with the reason on its standard error; refused because its place is taken, it tries again until its patience is over.
-pub(super) fn refused(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
+pub(super) fn refused(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     refused_for_good(kit)?;
     taken_for_a_while(kit)?;
     taken_forever(kit)
 }
 
-fn refused_for_good(kit: &Kit) -> Result<(), Failure> {
-    let mut harness = Harness::open_run(kit, Options::default())?;
+fn refused_for_good(kit: &Kit) -> Result<(), RuleFailure> {
+    let mut harness = Harness::open_run(kit, HarnessOptions::default())?;
     let joining = harness.next_join(START_PATIENCE)?;
     let explanation = format!("no robot of {} has this name", harness.run);
     harness.refuse_join(&joining, Refusal::UnknownName, &explanation);
     let expected = "its process ends when it is refused with unknown_name";
     let status = harness.until_ended(expected, PATIENCE)?;
     if status.success() {
-        return Err(Failure::new(
+        return Err(RuleFailure::new(
             "an exit status other than 0 when it is refused",
             format!("{status}"),
         ));
@@ -75,7 +75,7 @@ fn refused_for_good(kit: &Kit) -> Result<(), Failure> {
 
     if !bare(&harness.process.errors()).contains(&bare(&explanation)) {
         let expected = format!("the explanation on its standard error: {explanation}");
-        return Err(Failure::new(expected, harness.process.fate()));
+        return Err(RuleFailure::new(expected, harness.process.fate()));
     }
     Ok(())
 }
@@ -85,8 +85,8 @@ fn bare(text: &str) -> String {
     text.chars().filter(char::is_ascii_graphic).collect()
 }
 
-fn taken_for_a_while(kit: &Kit) -> Result<(), Failure> {
-    let mut harness = Harness::open_run(kit, Options::default())?;
+fn taken_for_a_while(kit: &Kit) -> Result<(), RuleFailure> {
+    let mut harness = Harness::open_run(kit, HarnessOptions::default())?;
     harness.prepare()?;
     for _ in 0..TAKEN {
         let joining = harness.next_join(START_PATIENCE)?;
@@ -98,7 +98,7 @@ fn taken_for_a_while(kit: &Kit) -> Result<(), Failure> {
     }
 
     let joining = harness.next_join(PATIENCE).map_err(|failure| {
-        Failure::new(
+        RuleFailure::new(
             "another request to join after its place was taken (name_taken)",
             failure.came,
         )
@@ -106,13 +106,13 @@ fn taken_for_a_while(kit: &Kit) -> Result<(), Failure> {
     harness.admit(&joining);
     harness.keeps_requests = false;
     harness.until_ready()?;
-    play(&mut harness, &Script::quiet(2), &mut Straight).map(drop)
+    play(&mut harness, &PlayScript::quiet(2), &mut Straight).map(drop)
 }
 
-fn taken_forever(kit: &Kit) -> Result<(), Failure> {
-    let options = Options {
+fn taken_forever(kit: &Kit) -> Result<(), RuleFailure> {
+    let options = HarnessOptions {
         patience_s: 2,
-        ..Options::default()
+        ..HarnessOptions::default()
     };
     let patience = Duration::from_secs(u64::from(options.patience_s)) + GRACE;
     let mut harness = Harness::open_run(kit, options)?;
@@ -129,7 +129,7 @@ fn taken_forever(kit: &Kit) -> Result<(), Failure> {
     }
     let status = harness.until_ended(expected, Duration::ZERO)?;
     if status.success() {
-        return Err(Failure::new(
+        return Err(RuleFailure::new(
             "an exit status other than 0 when it gives up",
             format!("{status}"),
         ));

@@ -22,19 +22,19 @@ use std::thread::Builder;
 
 use crate::findings::{Findings, Verdicts};
 use crate::kit::{CannotRun, Kit};
-use crate::report::{AnswerTimes, Failure, Outcome, Report, Verdict};
+use crate::report::{AnswerTimes, Report, RuleFailure, RuleOutcome, RuleVerdict};
 use crate::rules::{RULES, Rule};
-use crate::setting::Setting;
+use crate::setting::CheckSetting;
 
 /// A check, with its rules; the first one gets the failure that breaks it off.
 struct Check {
     rules: &'static [&'static str],
-    run: fn(&Kit, &mut Findings) -> Result<(), Failure>,
+    run: fn(&Kit, &mut Findings) -> Result<(), RuleFailure>,
 }
 
 const fn rules(
     rules: &'static [&'static str],
-    run: fn(&Kit, &mut Findings) -> Result<(), Failure>,
+    run: fn(&Kit, &mut Findings) -> Result<(), RuleFailure>,
 ) -> Check {
     Check { rules, run }
 }
@@ -84,7 +84,11 @@ const WORKERS: usize = 4;
 ///
 /// # Errors
 /// [`CannotRun`] if the command cannot be started, or the robot never asks to join.
-pub fn check(command: &Command, setting: &Setting, rules: &[Rule]) -> Result<Report, CannotRun> {
+pub fn check(
+    command: &Command,
+    setting: &CheckSetting,
+    rules: &[Rule],
+) -> Result<Report, CannotRun> {
     let kit = Kit::open(command, setting)?;
     let (mut verdicts, answers) = all(&kit, rules)?;
 
@@ -94,9 +98,9 @@ pub fn check(command: &Command, setting: &Setting, rules: &[Rule]) -> Result<Rep
             continue;
         }
         let verdict = verdicts.remove(rule.name);
-        outcomes.push(Outcome {
+        outcomes.push(RuleOutcome {
             rule,
-            verdict: verdict.unwrap_or_else(|| Verdict::Skipped {
+            verdict: verdict.unwrap_or_else(|| RuleVerdict::Skipped {
                 reason: "no check of it was run".to_owned(),
             }),
         });

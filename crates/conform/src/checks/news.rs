@@ -7,10 +7,10 @@ use protocol::messages::{Clock, Correction, News, Point};
 
 use crate::comparison::demand_same;
 use crate::findings::Findings;
-use crate::harness::{Harness, Options};
+use crate::harness::{Harness, HarnessOptions};
 use crate::kit::Kit;
-use crate::report::Failure;
-use crate::script::{Disturbance, Script, Straight, play, usual, with_robot};
+use crate::report::RuleFailure;
+use crate::script::{Disturbance, PlayScript, Straight, play, usual, with_robot};
 
 /// A report that must not come has come after this time.
 const QUIET: Duration = Duration::from_millis(150);
@@ -18,16 +18,16 @@ const QUIET: Duration = Duration::from_millis(150);
 const LATE_UP_TO: Tick = 14;
 
 /// It waits for the news of exactly this epoch and tick where its flag is set, and for no news where it is not.
-pub(super) fn wait(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
+pub(super) fn wait(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     /// The news of the first ticks come after their clock, and after news of other ticks and epochs.
     struct LateNews;
     impl Disturbance for LateNews {
-        fn before(&mut self, harness: &mut Harness<'_>, tick: Tick) -> Result<(), Failure> {
+        fn before(&mut self, harness: &mut Harness<'_>, tick: Tick) -> Result<(), RuleFailure> {
             harness.withholds_news = tick <= LATE_UP_TO;
             Ok(())
         }
 
-        fn during(&mut self, harness: &mut Harness<'_>, tick: Tick) -> Result<(), Failure> {
+        fn during(&mut self, harness: &mut Harness<'_>, tick: Tick) -> Result<(), RuleFailure> {
             let news = harness.open_news();
             if tick > LATE_UP_TO || news.is_empty() {
                 return Ok(());
@@ -40,7 +40,7 @@ pub(super) fn wait(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
                 (report.epoch, report.tick) == (news.epoch, tick)
             });
             if has_answered {
-                return Err(Failure::new(
+                return Err(RuleFailure::new(
                     format!(
                         "no report for tick {tick}, whose clock has its flag, before the news of tick {tick} are here"
                     ),
@@ -50,8 +50,8 @@ pub(super) fn wait(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
             harness.put_news(&news)
         }
     }
-    let mut harness = with_robot(kit, Options::default())?;
-    let played = play(&mut harness, &Script::usual(kit), &mut LateNews)?;
+    let mut harness = with_robot(kit, HarnessOptions::default())?;
+    let played = play(&mut harness, &PlayScript::usual(kit), &mut LateNews)?;
     demand_same(
         kit,
         "that its news come after the clock",
@@ -63,7 +63,7 @@ pub(super) fn wait(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
 }
 
 /// News of the tick before and of the epoch before, which would move the robot.
-fn put_stale(harness: &Harness<'_>, tick: Tick) -> Result<(), Failure> {
+fn put_stale(harness: &Harness<'_>, tick: Tick) -> Result<(), RuleFailure> {
     let elsewhere = Some(Correction {
         location: Point::new(1.0, 1.0),
         blocked: true,
@@ -83,9 +83,9 @@ fn put_stale(harness: &Harness<'_>, tick: Tick) -> Result<(), Failure> {
 }
 
 /// Flags of other robots do not concern it.
-fn others_flags(kit: &Kit) -> Result<(), Failure> {
-    let mut harness = with_robot(kit, Options::default())?;
-    play(&mut harness, &Script::quiet(2), &mut Straight)?;
+fn others_flags(kit: &Kit) -> Result<(), RuleFailure> {
+    let mut harness = with_robot(kit, HarnessOptions::default())?;
+    play(&mut harness, &PlayScript::quiet(2), &mut Straight)?;
 
     // The barrier's own clock, which has no flag, does not reach the robot.
     harness.is_cut_off = true;
@@ -98,7 +98,7 @@ fn others_flags(kit: &Kit) -> Result<(), Failure> {
     })?;
 
     harness.complete().map(drop).map_err(|failure| {
-        Failure::new(
+        RuleFailure::new(
             "a report for a clock that has the flags of other robots only, without any news",
             failure.came,
         )

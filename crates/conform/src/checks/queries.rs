@@ -10,11 +10,11 @@ use protocol::{Epoch, Tick, decode};
 use super::{computing, waiting, wire};
 use crate::comparison::demand_same;
 use crate::findings::Findings;
-use crate::harness::{Harness, Options};
+use crate::harness::{Harness, HarnessOptions};
 use crate::kit::Kit;
 use crate::patience::{PATIENCE, in_each_attempt};
-use crate::report::Failure;
-use crate::script::{Disturbance, Script, Straight, play, usual, with_robot};
+use crate::report::RuleFailure;
+use crate::script::{Disturbance, PlayScript, Straight, play, usual, with_robot};
 use crate::transcript::Entry;
 
 /// The kit's own limit where it waits until all replies are in.
@@ -42,12 +42,12 @@ struct StateQueries {
 }
 
 /// What a robot shows in every tick: the tick before, and where it stands.
-pub(super) fn by_tick(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> {
+pub(super) fn by_tick(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
     let mut harness = with_robot(
         kit,
-        Options {
+        HarnessOptions {
             is_followed: true,
-            ..Options::default()
+            ..HarnessOptions::default()
         },
     )?;
     let mut queries = StateQueries {
@@ -56,14 +56,14 @@ pub(super) fn by_tick(kit: &Kit, findings: &mut Findings) -> Result<(), Failure>
         location: harness.template.location,
     };
 
-    let played = play(&mut harness, &Script::usual(kit), &mut queries);
+    let played = play(&mut harness, &PlayScript::usual(kit), &mut queries);
     wire::check(&harness, findings);
     findings.0.extend(queries.findings.0);
     if harness.seen.states.is_empty() {
         let came = "in none of the ticks, although there is a subscriber";
         findings.fail(
             "tick.state-first",
-            Failure::new("its state is put for its subscribers", came),
+            RuleFailure::new("its state is put for its subscribers", came),
         );
     }
     played?;
@@ -77,13 +77,13 @@ fn state_of(
     epoch: Epoch,
     tick: Tick,
     expected: &str,
-) -> Result<Result<PublicState, Failure>, Failure> {
+) -> Result<Result<PublicState, RuleFailure>, RuleFailure> {
     let reply = harness.state_in(epoch, tick + 1)?;
     let shown = state(reply, expected).and_then(|now| {
         if (now.epoch, now.tick) == (epoch, tick) {
             return Ok(now);
         }
-        Err(Failure::new(
+        Err(RuleFailure::new(
             expected,
             format!("the state of tick {} of epoch {}", now.tick, now.epoch),
         ))
@@ -98,7 +98,7 @@ fn late_state_of(
     epoch: Epoch,
     tick: Tick,
     expected: &str,
-) -> Result<Result<PublicState, Failure>, Failure> {
+) -> Result<Result<PublicState, RuleFailure>, RuleFailure> {
     let begun = Instant::now();
 
     loop {
@@ -111,22 +111,22 @@ fn late_state_of(
 }
 
 /// What came as an answer, read as a state.
-pub(super) fn state(answer: Option<Reply>, expected: &str) -> Result<PublicState, Failure> {
+pub(super) fn state(answer: Option<Reply>, expected: &str) -> Result<PublicState, RuleFailure> {
     match answer {
-        None => Err(Failure::new(expected, "no answer")),
+        None => Err(RuleFailure::new(expected, "no answer")),
         Some(Reply {
             result: Err(reason),
             ..
-        }) => Err(Failure::new(expected, format!("refused: {reason}"))),
+        }) => Err(RuleFailure::new(expected, format!("refused: {reason}"))),
         Some(Reply {
             result: Ok(bytes), ..
         }) => decode(STATE, "the robot", &bytes)
-            .map_err(|error| Failure::new(expected, error.to_string())),
+            .map_err(|error| RuleFailure::new(expected, error.to_string())),
     }
 }
 
 impl Disturbance for StateQueries {
-    fn after(&mut self, harness: &mut Harness<'_>, entry: &Entry) -> Result<(), Failure> {
+    fn after(&mut self, harness: &mut Harness<'_>, entry: &Entry) -> Result<(), RuleFailure> {
         let epoch = entry.epoch;
         let tick = entry.tick;
         let expected = format!("asked with tick={}, the state of tick {tick}", tick + 1);
@@ -178,7 +178,7 @@ impl StateQueries {
             );
             return self
                 .findings
-                .fail("tick.initial", Failure::new(expected, came));
+                .fail("tick.initial", RuleFailure::new(expected, came));
         }
 
         let why = if entry.news.correction.is_some() {
@@ -188,11 +188,16 @@ impl StateQueries {
         };
         let expected = format!("it stands at {:?}, {why}", self.location);
         self.findings
-            .fail("tick.correction", Failure::new(expected, came));
+            .fail("tick.correction", RuleFailure::new(expected, came));
     }
 
     /// The tick before can still be queried.
-    fn check_before(&self, harness: &Harness<'_>, epoch: Epoch, tick: Tick) -> Result<(), Failure> {
+    fn check_before(
+        &self,
+        harness: &Harness<'_>,
+        epoch: Epoch,
+        tick: Tick,
+    ) -> Result<(), RuleFailure> {
         let Some(before) = &self.before else {
             return Ok(());
         };
@@ -203,14 +208,18 @@ impl StateQueries {
         let came = state(harness.state_in(epoch, tick)?, &expected)?;
 
         if came != *before {
-            return Err(Failure::new(expected, format!("{came:?}")));
+            return Err(RuleFailure::new(expected, format!("{came:?}")));
         }
         Ok(())
     }
 }
 
 /// What is put for subscribers comes before the report, in every tick once the robot knows of a subscriber.
-fn check_followed(harness: &Harness<'_>, entry: &Entry, now: &PublicState) -> Result<(), Failure> {
+fn check_followed(
+    harness: &Harness<'_>,
+    entry: &Entry,
+    now: &PublicState,
+) -> Result<(), RuleFailure> {
     let tick = entry.tick;
     let report = harness
         .seen
@@ -229,9 +238,9 @@ fn check_followed(harness: &Harness<'_>, entry: &Entry, now: &PublicState) -> Re
 
     let expected = format!("the state of tick {tick}, put before the report of tick {tick}");
     match last {
-        Err(error) => Err(Failure::new(expected, error)),
+        Err(error) => Err(RuleFailure::new(expected, error)),
         Ok(last) if last == now => Ok(()),
-        Ok(last) => Err(Failure::new(
+        Ok(last) => Err(RuleFailure::new(
             expected,
             format!("before it, the state of tick {} was put last", last.tick),
         )),
@@ -239,7 +248,7 @@ fn check_followed(harness: &Harness<'_>, entry: &Entry, now: &PublicState) -> Re
 }
 
 /// What it shows is what it reports.
-fn check_state(entry: &Entry, now: &PublicState) -> Result<(), Failure> {
+fn check_state(entry: &Entry, now: &PublicState) -> Result<(), RuleFailure> {
     let report = &entry.report;
     let shown = PublicState {
         epoch: now.epoch,
@@ -256,14 +265,14 @@ fn check_state(entry: &Entry, now: &PublicState) -> Result<(), Failure> {
         return Ok(());
     }
 
-    Err(Failure::new(
+    Err(RuleFailure::new(
         format!("the state shows what is reported: {shown:?}"),
         format!("{now:?}"),
     ))
 }
 
 /// Queried without parameters, it shows its newest state.
-fn check_newest(harness: &Harness<'_>, tick: Tick, now: &PublicState) -> Result<(), Failure> {
+fn check_newest(harness: &Harness<'_>, tick: Tick, now: &PublicState) -> Result<(), RuleFailure> {
     if !tick.is_multiple_of(ROUND) {
         return Ok(());
     }
@@ -271,7 +280,7 @@ fn check_newest(harness: &Harness<'_>, tick: Tick, now: &PublicState) -> Result<
     let expected = format!("asked without parameters after tick {tick}, the state of tick {tick}");
     let came = state(harness.ask(STATE, "")?, &expected)?;
     if came != *now {
-        return Err(Failure::new(expected, format!("{came:?}")));
+        return Err(RuleFailure::new(expected, format!("{came:?}")));
     }
     Ok(())
 }
@@ -282,7 +291,7 @@ fn check_six(
     epoch: Epoch,
     tick: Tick,
     now: &PublicState,
-) -> Result<(), Failure> {
+) -> Result<(), RuleFailure> {
     if !tick.is_multiple_of(ROUND) {
         return Ok(());
     }
@@ -296,19 +305,19 @@ fn check_six(
             Some(Reply {
                 result: Ok(bytes), ..
             }) => decode::<Answer>(what, "the robot", &bytes)
-                .map_err(|error| Failure::new(expected.clone(), error.to_string()))?,
+                .map_err(|error| RuleFailure::new(expected.clone(), error.to_string()))?,
             Some(Reply {
                 result: Err(reason),
                 ..
-            }) => return Err(Failure::new(expected, reason)),
-            None => return Err(Failure::new(expected, "no answer")),
+            }) => return Err(RuleFailure::new(expected, reason)),
+            None => return Err(RuleFailure::new(expected, "no answer")),
         };
         let is_same = now.answer(what).is_some_and(|wanted| {
             (wanted.epoch, wanted.tick) == (came.epoch, came.tick)
                 && same_value(&wanted.value, &came.value)
         });
         if !is_same {
-            return Err(Failure::new(expected, format!("{came:?}")));
+            return Err(RuleFailure::new(expected, format!("{came:?}")));
         }
     }
     Ok(())
@@ -335,7 +344,7 @@ fn demand_refused(harness: &mut Harness<'_>, findings: &mut Findings) {
     findings.settle("query.tick", result);
 }
 
-fn try_refused(harness: &Harness<'_>) -> Result<(), Failure> {
+fn try_refused(harness: &Harness<'_>) -> Result<(), RuleFailure> {
     let now = harness.next_tick() - 1;
     let never = [
         (1, now + 2),
@@ -357,21 +366,21 @@ fn try_refused(harness: &Harness<'_>) -> Result<(), Failure> {
                 result: Err(words), ..
             }) if !words.trim().is_empty() => {}
             Some(Reply { result: Err(_), .. }) => {
-                return Err(Failure::new(expected, "one without words"));
+                return Err(RuleFailure::new(expected, "one without words"));
             }
             Some(Reply {
                 result: Ok(bytes), ..
             }) => {
-                return Err(Failure::new(expected, String::from_utf8_lossy(&bytes)));
+                return Err(RuleFailure::new(expected, String::from_utf8_lossy(&bytes)));
             }
-            None => return Err(Failure::new(expected, "no reply")),
+            None => return Err(RuleFailure::new(expected, "no reply")),
         }
     }
     Ok(())
 }
 
 /// It answers at once, also while it computes, waits for its news, or waits for another robot's answer.
-pub(super) fn at_once(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> {
+pub(super) fn at_once(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
     computing::check(kit)?;
 
     let mut harness = waiting::for_news(kit)?;
@@ -391,7 +400,7 @@ pub(super) fn at_once(kit: &Kit, findings: &mut Findings) -> Result<(), Failure>
 
 /// The robot answers in the open tick. Its wait lasts until the kit ends it, so that no answer is late: it comes or not. A
 /// robot that does not wait gives no occasion to see it.
-fn demand_replies(harness: &mut Harness<'_>, when: &str) -> Result<(), Failure> {
+fn demand_replies(harness: &mut Harness<'_>, when: &str) -> Result<(), RuleFailure> {
     let tick = harness.next_tick() - 1;
     let expected = format!(
         "queried in tick {tick} {when}, the state of tick {} at once",
@@ -405,12 +414,12 @@ fn demand_replies(harness: &mut Harness<'_>, when: &str) -> Result<(), Failure> 
             if begun.elapsed() < DEFERRED {
                 return Ok(());
             }
-            return Err(Failure::new(expected, "a report before the reply"));
+            return Err(RuleFailure::new(expected, "a report before the reply"));
         }
 
         let came = state(reply, &expected)?;
         if came.tick + 1 != tick {
-            return Err(Failure::new(
+            return Err(RuleFailure::new(
                 expected,
                 format!("the state of tick {}", came.tick),
             ));
@@ -425,7 +434,7 @@ fn reply_in(
     harness: &mut Harness<'_>,
     tick: Tick,
     expected: &str,
-) -> Result<Option<Reply>, Failure> {
+) -> Result<Option<Reply>, RuleFailure> {
     for _ in 0..ATTEMPTS {
         let number = harness.begin_query(harness.epoch(), tick)?;
         let reply = harness.until(expected, PATIENCE, |harness| {
@@ -440,9 +449,9 @@ fn reply_in(
 }
 
 /// What it asks others: with tick and epoch, not at tick 0, not those that it cannot reach.
-pub(super) fn asking(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> {
+pub(super) fn asking(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
     let mut harness = waiting::of_queries(kit)?;
-    let played = play(&mut harness, &Script::usual(kit), &mut Straight)?;
+    let played = play(&mut harness, &PlayScript::usual(kit), &mut Straight)?;
     let asked = harness.fake_peers.asked();
     if asked.is_empty() {
         findings.skip("query.asking", "the robot queried no other one");
@@ -458,26 +467,26 @@ pub(super) fn asking(kit: &Kit, findings: &mut Findings) -> Result<(), Failure> 
             query.epoch.as_deref().unwrap_or("nothing"),
         );
         if tick == 0 {
-            return Err(Failure::new("no query at tick 0", came));
+            return Err(RuleFailure::new("no query at tick 0", came));
         }
         let is_stated = query.tick == Some(tick.to_string());
         if !is_stated || query.epoch != Some(epoch.to_string()) {
             let expected = format!("queries of tick {tick} with tick={tick};epoch={epoch}");
-            return Err(Failure::new(expected, came));
+            return Err(RuleFailure::new(expected, came));
         }
         let entry = played.iter().find(|entry| entry.tick == tick);
         if entry.is_some_and(|entry| entry.news.unreachable.contains(&query.of)) {
             let expected = format!("no query of {} in tick {tick}: unreachable", query.of);
-            return Err(Failure::new(expected, came));
+            return Err(RuleFailure::new(expected, came));
         }
     }
     Ok(())
 }
 
 /// Each query has exactly one reply, the query object is released, and the robot has no queryable of another key.
-pub(super) fn once(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
-    let mut harness = with_robot(kit, Options::default())?;
-    play(&mut harness, &Script::quiet(3), &mut Straight)?;
+pub(super) fn once(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
+    let mut harness = with_robot(kit, HarnessOptions::default())?;
+    play(&mut harness, &PlayScript::quiet(3), &mut Straight)?;
     for what in QUERIES.iter().chain([&STATE]) {
         in_each_attempt(|scale| demand_one_reply(&harness, what, ALL_REPLIES * scale))?;
     }
@@ -488,7 +497,7 @@ pub(super) fn once(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
         let replies = kit.bus.get_all(&key, "", ALL_REPLIES)?;
         if !replies.is_empty() {
             let expected = format!("no queryable of {what}: a robot declares its seven keys");
-            return Err(Failure::new(expected, "a reply"));
+            return Err(RuleFailure::new(expected, "a reply"));
         }
     }
     for other in harness.fake_peers.names() {
@@ -496,27 +505,34 @@ pub(super) fn once(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
         let replies = kit.bus.get_all(&key, "tick=4;epoch=1", ALL_REPLIES)?;
         if replies.len() > 1 {
             let expected = format!("no reply of its own to a query of {other}");
-            return Err(Failure::new(expected, format!("{} replies", replies.len())));
+            return Err(RuleFailure::new(
+                expected,
+                format!("{} replies", replies.len()),
+            ));
         }
     }
     Ok(())
 }
 
 /// One reply, and the end of the query with it: a query that is not released takes all the time that the kit has.
-fn demand_one_reply(harness: &Harness<'_>, what: &str, patience: Duration) -> Result<(), Failure> {
+fn demand_one_reply(
+    harness: &Harness<'_>,
+    what: &str,
+    patience: Duration,
+) -> Result<(), RuleFailure> {
     let key = harness.keys.query(&harness.kit.subject(), what);
     let begun = Instant::now();
     let replies = harness.kit.bus.get_all(&key, "tick=4;epoch=1", patience)?;
     let took = begun.elapsed();
 
     if replies.len() != 1 {
-        return Err(Failure::new(
+        return Err(RuleFailure::new(
             format!("one reply to a query of {what}"),
             format!("{} replies", replies.len()),
         ));
     }
     if took >= patience {
-        return Err(Failure::new(
+        return Err(RuleFailure::new(
             format!("it releases a query of {what} when it has replied"),
             "a query that ends only because time is up",
         ));
@@ -525,10 +541,10 @@ fn demand_one_reply(harness: &Harness<'_>, what: &str, patience: Duration) -> Re
 }
 
 /// Queried for what does not exist, it gives no answer and goes on.
-pub(super) fn unknown(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
+pub(super) fn unknown(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     struct Odd;
     impl Disturbance for Odd {
-        fn after(&mut self, harness: &mut Harness<'_>, entry: &Entry) -> Result<(), Failure> {
+        fn after(&mut self, harness: &mut Harness<'_>, entry: &Entry) -> Result<(), RuleFailure> {
             if !entry.tick.is_multiple_of(8) {
                 return Ok(());
             }
@@ -544,14 +560,14 @@ pub(super) fn unknown(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
                 }) = harness.ask(what, parameters)?
                 {
                     let expected = format!("no answer to {what}?{parameters}: refused, or none");
-                    return Err(Failure::new(expected, String::from_utf8_lossy(&bytes)));
+                    return Err(RuleFailure::new(expected, String::from_utf8_lossy(&bytes)));
                 }
             }
             Ok(())
         }
     }
 
-    let mut harness = with_robot(kit, Options::default())?;
-    let asked = play(&mut harness, &Script::usual(kit), &mut Odd)?;
+    let mut harness = with_robot(kit, HarnessOptions::default())?;
+    let asked = play(&mut harness, &PlayScript::usual(kit), &mut Odd)?;
     demand_same(kit, "a query for what does not exist", usual(kit)?, &asked)
 }

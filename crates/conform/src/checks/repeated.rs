@@ -8,12 +8,12 @@ use protocol::{Epoch, Tick};
 
 use crate::comparison::demand_same;
 use crate::findings::Findings;
-use crate::harness::{Harness, Options};
+use crate::harness::{Harness, HarnessOptions};
 use crate::kit::Kit;
 use crate::patience::PATIENCE;
-use crate::report::Failure;
-use crate::script::{Disturbance, Script, play, usual, with_robot};
-use crate::seen::{Answer, Sent};
+use crate::report::RuleFailure;
+use crate::script::{Disturbance, PlayScript, play, usual, with_robot};
+use crate::seen::{Answer, SentCommand};
 use crate::transcript::Entry;
 
 /// One clock in so many comes again, and each whose tick had commands.
@@ -24,23 +24,23 @@ const BEFORE_REPEATING: Duration = Duration::from_millis(50);
 const COMMANDS_PATIENCE: Duration = Duration::from_secs(2);
 
 /// A clock that comes again is answered as before, and a tick is done once.
-pub(super) fn duplicate(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
+pub(super) fn duplicate(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     struct Again;
     impl Disturbance for Again {
-        fn after(&mut self, harness: &mut Harness<'_>, entry: &Entry) -> Result<(), Failure> {
+        fn after(&mut self, harness: &mut Harness<'_>, entry: &Entry) -> Result<(), RuleFailure> {
             if entry.tick.is_multiple_of(EVERY) || !entry.commands.is_empty() {
                 repeat(harness, entry)?;
             }
             Ok(())
         }
     }
-    let mut harness = with_robot(kit, Options::default())?;
-    let repeated = play(&mut harness, &Script::usual(kit), &mut Again)?;
+    let mut harness = with_robot(kit, HarnessOptions::default())?;
+    let repeated = play(&mut harness, &PlayScript::usual(kit), &mut Again)?;
     demand_same(kit, "a clock that comes again", usual(kit)?, &repeated)
 }
 
 /// Repeats the clock of a tick, and waits for its report and its commands.
-fn repeat(harness: &mut Harness<'_>, entry: &Entry) -> Result<(), Failure> {
+fn repeat(harness: &mut Harness<'_>, entry: &Entry) -> Result<(), RuleFailure> {
     // A robot that reports twice by itself breaks another rule: what it still sends is not the repetition.
     harness.pass(BEFORE_REPEATING);
     let since = harness.seen.count;
@@ -73,7 +73,7 @@ fn repeat(harness: &mut Harness<'_>, entry: &Entry) -> Result<(), Failure> {
             "command {} of tick {tick} again, before the report, when the clock of tick {tick} comes again",
             missing(harness, entry, since, report).unwrap_or_default()
         );
-        return Err(Failure::new(expected, "the report without it"));
+        return Err(RuleFailure::new(expected, "the report without it"));
     }
 
     for first in &entry.commands {
@@ -95,7 +95,10 @@ fn answers_of<'s>(harness: &'s Harness<'_>, tick: Tick) -> impl Iterator<Item = 
 }
 
 /// Commands that came since a place among all that came.
-fn commands_since<'s>(harness: &'s Harness<'_>, since: usize) -> impl Iterator<Item = &'s Sent> {
+fn commands_since<'s>(
+    harness: &'s Harness<'_>,
+    since: usize,
+) -> impl Iterator<Item = &'s SentCommand> {
     harness
         .seen
         .commands
@@ -107,23 +110,23 @@ fn commands_since<'s>(harness: &'s Harness<'_>, since: usize) -> impl Iterator<I
 fn missing(harness: &Harness<'_>, entry: &Entry, since: usize, report: usize) -> Option<u32> {
     let came: BTreeSet<Option<u32>> = commands_since(harness, since)
         .filter(|sent| sent.order < report && sent.tick() == Some(entry.tick))
-        .map(Sent::number)
+        .map(SentCommand::number)
         .collect();
 
     entry
         .commands
         .iter()
-        .map(Sent::number)
+        .map(SentCommand::number)
         .find(|number| !came.contains(number))
         .flatten()
 }
 
-fn demand_bytes(what: &str, first: &[u8], again: &[u8]) -> Result<(), Failure> {
+fn demand_bytes(what: &str, first: &[u8], again: &[u8]) -> Result<(), RuleFailure> {
     if first == again {
         return Ok(());
     }
 
-    Err(Failure::new(
+    Err(RuleFailure::new(
         format!("the same {what} again: {}", String::from_utf8_lossy(first)),
         String::from_utf8_lossy(again),
     ))
@@ -136,11 +139,11 @@ fn count_of(harness: &Harness<'_>, (epoch, tick): (Epoch, Tick)) -> usize {
 }
 
 /// Clocks of earlier ticks and epochs come too late to be answered.
-pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
+pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     /// Reports that had come for the late clocks' epochs and ticks before they were put.
     struct Late(Vec<((Epoch, Tick), usize)>);
     impl Disturbance for Late {
-        fn before(&mut self, harness: &mut Harness<'_>, tick: Tick) -> Result<(), Failure> {
+        fn before(&mut self, harness: &mut Harness<'_>, tick: Tick) -> Result<(), RuleFailure> {
             if tick < 6 || !tick.is_multiple_of(EVERY) {
                 return Ok(());
             }
@@ -169,7 +172,7 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
             Ok(())
         }
 
-        fn after(&mut self, harness: &mut Harness<'_>, _: &Entry) -> Result<(), Failure> {
+        fn after(&mut self, harness: &mut Harness<'_>, _: &Entry) -> Result<(), RuleFailure> {
             // In order on one link: an answer to a late clock would have come before that to this one.
             let answered = self
                 .0
@@ -179,13 +182,13 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
                 None => Ok(()),
                 Some(((epoch, tick), _)) => {
                     let came = format!("a report for tick {tick} of epoch {epoch}");
-                    Err(Failure::new("no answer to a clock that is over", came))
+                    Err(RuleFailure::new("no answer to a clock that is over", came))
                 }
             }
         }
     }
-    let mut harness = with_robot(kit, Options::default())?;
-    let played = play(&mut harness, &Script::usual(kit), &mut Late(Vec::new()))?;
+    let mut harness = with_robot(kit, HarnessOptions::default())?;
+    let played = play(&mut harness, &PlayScript::usual(kit), &mut Late(Vec::new()))?;
     demand_same(
         kit,
         "a clock of an earlier tick or epoch",

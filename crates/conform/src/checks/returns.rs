@@ -7,11 +7,11 @@ use protocol::{Generation, Tick};
 
 use crate::comparison::demand_same;
 use crate::findings::Findings;
-use crate::harness::{Harness, Options};
+use crate::harness::{Harness, HarnessOptions};
 use crate::kit::Kit;
 use crate::patience::PATIENCE;
-use crate::report::Failure;
-use crate::script::{Script, Straight, play, step, usual, with_robot};
+use crate::report::RuleFailure;
+use crate::script::{PlayScript, Straight, play, step, usual, with_robot};
 use crate::transcript::Entry;
 
 /// The last tick of the predecessor.
@@ -36,8 +36,8 @@ fn state_of(entry: &Entry) -> PublicState {
 }
 
 /// A harness on which the robot has joined as a second incarnation, whose predecessor was gone after tick `last`.
-fn returned(kit: &Kit, last: Tick) -> Result<Harness<'_>, Failure> {
-    let mut harness = Harness::open_run(kit, Options::default())?;
+fn returned(kit: &Kit, last: Tick) -> Result<Harness<'_>, RuleFailure> {
+    let mut harness = Harness::open_run(kit, HarnessOptions::default())?;
     harness.prepare()?;
     harness.play_predecessor(last)?;
     bequeath(kit, &mut harness)?;
@@ -46,7 +46,7 @@ fn returned(kit: &Kit, last: Tick) -> Result<Harness<'_>, Failure> {
 }
 
 /// Further welcomes are those of a second incarnation. Its predecessor has reported as usual, [`LAST`] being the last tick.
-fn bequeath(kit: &Kit, harness: &mut Harness<'_>) -> Result<(), Failure> {
+fn bequeath(kit: &Kit, harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
     let state =
         |tick| usual(kit).map(|usual| usual.iter().find(|entry| entry.tick == tick).map(state_of));
 
@@ -60,7 +60,7 @@ fn bequeath(kit: &Kit, harness: &mut Harness<'_>) -> Result<(), Failure> {
 }
 
 /// It waits for the news that name it, shows meanwhile what its predecessor reported, and reports as what it is.
-pub(super) fn generation(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
+pub(super) fn generation(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     let mut harness = returned(kit, LAST)?;
     // The last tick was its predecessor's; the next one may go on without it.
     harness.repeat();
@@ -72,7 +72,7 @@ pub(super) fn generation(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     harness.settle(QUIET);
     if let Some(answer) = harness.seen.answers.first() {
         let came = format!("a report for tick {}", answer.reading.report.tick);
-        return Err(Failure::new(
+        return Err(RuleFailure::new(
             "no report before its news name its generation",
             came,
         ));
@@ -89,18 +89,18 @@ pub(super) fn generation(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
         );
         let came = super::queries::state(harness.state_in(1, state.tick + 1)?, &expected)?;
         if came != state {
-            return Err(Failure::new(
+            return Err(RuleFailure::new(
                 expected,
                 format!("the state of tick {}", came.tick),
             ));
         }
     }
 
-    let transcript = play(&mut harness, &Script::quiet(5), &mut Straight)?;
+    let transcript = play(&mut harness, &PlayScript::quiet(5), &mut Straight)?;
     demand_generation(&transcript)
 }
 
-fn demand_generation(transcript: &[Entry]) -> Result<(), Failure> {
+fn demand_generation(transcript: &[Entry]) -> Result<(), RuleFailure> {
     match transcript
         .iter()
         .find(|entry| entry.report.generation != GENERATION)
@@ -108,7 +108,7 @@ fn demand_generation(transcript: &[Entry]) -> Result<(), Failure> {
         None => Ok(()),
         Some(entry) => {
             let came = format!("generation {}", entry.report.generation);
-            Err(Failure::new(
+            Err(RuleFailure::new(
                 format!("reports of generation {GENERATION}"),
                 came,
             ))
@@ -117,9 +117,9 @@ fn demand_generation(transcript: &[Entry]) -> Result<(), Failure> {
 }
 
 /// The clock has gone on without it: it joins again as the process that it is, and then does what a new process does.
-pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
-    let mut harness = with_robot(kit, Options::default())?;
-    let usual = Script::usual(kit);
+pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
+    let mut harness = with_robot(kit, HarnessOptions::default())?;
+    let usual = PlayScript::usual(kit);
     for _ in 0..=LAST {
         step(&mut harness, &usual, &mut Straight)?;
     }
@@ -131,7 +131,7 @@ pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     let expected = "another request to join when its news have its generation as `rejoin`";
     let joining = harness
         .next_join(PATIENCE)
-        .map_err(|failure| Failure::new(expected, failure.came))?;
+        .map_err(|failure| RuleFailure::new(expected, failure.came))?;
     harness.admit(&joining);
     harness.keeps_requests = false;
     let mut instances = Vec::new();
@@ -141,29 +141,33 @@ pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     instances.dedup();
     if instances.len() > 1 {
         let came = format!("{instances:?}");
-        return Err(Failure::new("the same instance in all requests", came));
+        return Err(RuleFailure::new("the same instance in all requests", came));
     }
 
     // Its turn is the next tick, whose news name it.
     let last = harness.next_tick() - 1;
     harness.settle(QUIET);
-    let again = play(&mut harness, &Script::quiet(5), &mut Straight)?;
+    let again = play(&mut harness, &PlayScript::quiet(5), &mut Straight)?;
     demand_generation(&again)?;
-    let anew = play(&mut returned(kit, last)?, &Script::quiet(5), &mut Straight)?;
+    let anew = play(
+        &mut returned(kit, last)?,
+        &PlayScript::quiet(5),
+        &mut Straight,
+    )?;
     demand_same(kit, "to join again instead of a new process", &anew, &again)
 }
 
 /// News that name a later incarnation: this one ends.
-pub(super) fn replaced(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
-    let mut harness = with_robot(kit, Options::default())?;
-    play(&mut harness, &Script::quiet(3), &mut Straight)?;
+pub(super) fn replaced(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
+    let mut harness = with_robot(kit, HarnessOptions::default())?;
+    play(&mut harness, &PlayScript::quiet(3), &mut Straight)?;
     let tick = harness.next_tick();
     harness.play_successor();
     harness.open(&News::default())?;
     let expected = "its process ends, with an exit status other than 0, when its news name a later incarnation";
     let status = harness.until_ended(expected, PATIENCE)?;
     if status.success() {
-        return Err(Failure::new(expected, format!("{status}")));
+        return Err(RuleFailure::new(expected, format!("{status}")));
     }
     harness.until_gone()?;
 
@@ -173,7 +177,7 @@ pub(super) fn replaced(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
         .iter()
         .any(|answer| answer.reading.report.tick == tick);
     if has_answered {
-        return Err(Failure::new(
+        return Err(RuleFailure::new(
             "no report for a tick whose news name a later incarnation",
             format!("one for tick {tick}"),
         ));

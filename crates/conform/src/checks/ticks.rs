@@ -9,12 +9,12 @@ use protocol::name::OPERATOR;
 
 use super::wire;
 use crate::findings::Findings;
-use crate::harness::{Harness, Options};
+use crate::harness::{Harness, HarnessOptions};
 use crate::kit::{CannotRun, Kit};
 use crate::patience::START_PATIENCE;
-use crate::report::{AnswerTimes, Failure};
-use crate::script::{Script, Straight, play, with_robot};
-use crate::seen::Sent;
+use crate::report::{AnswerTimes, RuleFailure};
+use crate::script::{PlayScript, Straight, play, with_robot};
+use crate::seen::SentCommand;
 use crate::transcript::{Entry, Transcript};
 use crate::wire::Joining;
 
@@ -44,7 +44,7 @@ pub(super) fn usual(
     kit: &Kit,
     findings: &mut Findings,
 ) -> Result<(Option<&'static str>, Option<AnswerTimes>), CannotRun> {
-    let mut harness = Harness::open_run(kit, Options::default())
+    let mut harness = Harness::open_run(kit, HarnessOptions::default())
         .map_err(|failure| CannotRun::Robot(failure.came))?;
     let joining = harness.next_join(START_PATIENCE).map_err(cannot_run)?;
     let request = joining.request.clone().map_err(CannotRun::Robot)?;
@@ -55,7 +55,7 @@ pub(super) fn usual(
     harness.keeps_requests = false;
     harness.until_ready().map_err(cannot_run)?;
 
-    let played = play(&mut harness, &Script::usual(kit), &mut Straight);
+    let played = play(&mut harness, &PlayScript::usual(kit), &mut Straight);
     wire::check(&harness, findings);
     let transcript = match played {
         Ok(transcript) => transcript,
@@ -85,21 +85,21 @@ pub(super) fn usual(
     Ok((None, AnswerTimes::of(times)))
 }
 
-fn cannot_run(failure: Failure) -> CannotRun {
-    let Failure { expected, came } = failure;
+fn cannot_run(failure: RuleFailure) -> CannotRun {
+    let RuleFailure { expected, came } = failure;
     CannotRun::Robot(format!("{expected}: {came}"))
 }
 
-fn expect(holds: bool, expected: String, came: String) -> Result<(), Failure> {
+fn expect(holds: bool, expected: String, came: String) -> Result<(), RuleFailure> {
     if holds {
         return Ok(());
     }
 
-    Err(Failure::new(expected, came))
+    Err(RuleFailure::new(expected, came))
 }
 
 /// What a request to join must contain.
-fn check_request(harness: &Harness<'_>, joining: &Joining) -> Result<(), Failure> {
+fn check_request(harness: &Harness<'_>, joining: &Joining) -> Result<(), RuleFailure> {
     let Ok(request) = &joining.request else {
         return Ok(());
     };
@@ -130,9 +130,9 @@ fn check_request(harness: &Harness<'_>, joining: &Joining) -> Result<(), Failure
 }
 
 /// One report for each clock, and no other.
-fn check_answers(harness: &Harness<'_>, transcript: &Transcript) -> Result<(), Failure> {
+fn check_answers(harness: &Harness<'_>, transcript: &Transcript) -> Result<(), RuleFailure> {
     if let Some(unreadable) = harness.seen.unreadable.first() {
-        return Err(Failure::new("reports that can be read", unreadable));
+        return Err(RuleFailure::new("reports that can be read", unreadable));
     }
 
     for (index, answer) in harness.seen.answers.iter().enumerate() {
@@ -148,11 +148,11 @@ fn check_answers(harness: &Harness<'_>, transcript: &Transcript) -> Result<(), F
             .find(|entry| (entry.epoch, entry.tick) == (epoch, tick));
         let Some(entry) = granted.filter(|_| report.generation == 1) else {
             let expected = "reports of generation 1 for ticks that were granted";
-            return Err(Failure::new(expected, came));
+            return Err(RuleFailure::new(expected, came));
         };
         // A clock that was repeated while its report was awaited may have been answered twice.
         if entry.index != index && !harness.repeated.contains(&(epoch, tick)) {
-            return Err(Failure::new(
+            return Err(RuleFailure::new(
                 format!("one report for tick {tick}"),
                 "more than one",
             ));
@@ -162,14 +162,14 @@ fn check_answers(harness: &Harness<'_>, transcript: &Transcript) -> Result<(), F
 }
 
 /// No clock, no report.
-pub(super) fn unasked(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
-    let mut harness = with_robot(kit, Options::default())?;
+pub(super) fn unasked(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
+    let mut harness = with_robot(kit, HarnessOptions::default())?;
     harness.settle(ECHO);
     if let Some(answer) = harness.seen.answers.first() {
         let came = format!("a report for tick {}", answer.reading.report.tick);
-        return Err(Failure::new("no report before the first clock", came));
+        return Err(RuleFailure::new("no report before the first clock", came));
     }
-    let transcript = play(&mut harness, &Script::quiet(2), &mut Straight)?;
+    let transcript = play(&mut harness, &PlayScript::quiet(2), &mut Straight)?;
     harness.settle(ECHO);
     check_answers(&harness, &transcript)
 }
@@ -194,12 +194,12 @@ fn check_commands(harness: &Harness<'_>, transcript: &Transcript, findings: &mut
 }
 
 /// Each command can be read, is of a tick that was granted, and goes to another robot of the roster.
-fn check_stamps(harness: &Harness<'_>, transcript: &Transcript) -> Result<(), Failure> {
+fn check_stamps(harness: &Harness<'_>, transcript: &Transcript) -> Result<(), RuleFailure> {
     let subject = harness.kit.subject();
     for sent in &harness.seen.commands {
         let command = match &sent.command {
             Ok(command) => command,
-            Err(error) => return Err(Failure::new("commands that can be read", error)),
+            Err(error) => return Err(RuleFailure::new("commands that can be read", error)),
         };
 
         let is_granted = transcript
@@ -220,21 +220,21 @@ fn check_stamps(harness: &Harness<'_>, transcript: &Transcript) -> Result<(), Fa
                 "commands of generation 1 and of a tick that was granted, performative achieve, from {subject} to robots \
                  of the roster"
             );
-            return Err(Failure::new(expected, describe(sent)));
+            return Err(RuleFailure::new(expected, describe(sent)));
         }
     }
     Ok(())
 }
 
 /// The commands of a tick are numbered from 1, are as many as the report states, and were put before it.
-fn check_tick(harness: &Harness<'_>, entry: &Entry) -> Result<(), Failure> {
+fn check_tick(harness: &Harness<'_>, entry: &Entry) -> Result<(), RuleFailure> {
     let tick = entry.tick;
     let report = harness
         .seen
         .answers
         .get(entry.index)
         .map_or(usize::MAX, |answer| answer.order);
-    let mut first: BTreeMap<u32, &Sent> = BTreeMap::new();
+    let mut first: BTreeMap<u32, &SentCommand> = BTreeMap::new();
     for sent in &harness.seen.commands {
         let Ok(command) = &sent.command else { continue };
         if (command.epoch, command.tick) != (entry.epoch, tick) {
@@ -243,7 +243,7 @@ fn check_tick(harness: &Harness<'_>, entry: &Entry) -> Result<(), Failure> {
         let known = *first.entry(command.number).or_insert(sent);
         if known.bytes != sent.bytes || known.to != sent.to {
             let expected = format!("one command with number {} in tick {tick}", command.number);
-            return Err(Failure::new(expected, describe(sent)));
+            return Err(RuleFailure::new(expected, describe(sent)));
         }
     }
 
@@ -251,21 +251,21 @@ fn check_tick(harness: &Harness<'_>, entry: &Entry) -> Result<(), Failure> {
     let wanted: BTreeSet<u32> = (1..=stated).collect();
     let numbers: BTreeSet<u32> = first.keys().copied().collect();
     if numbers != wanted {
-        return Err(Failure::new(
+        return Err(RuleFailure::new(
             format!("in tick {tick} the commands 1 to {stated}, since the report states {stated}"),
             format!("commands with the numbers {numbers:?}"),
         ));
     }
     match first.values().find(|sent| sent.order > report) {
         None => Ok(()),
-        Some(sent) => Err(Failure::new(
+        Some(sent) => Err(RuleFailure::new(
             format!("the commands of tick {tick} before its report"),
             format!("after it, {}", describe(sent)),
         )),
     }
 }
 
-fn describe(sent: &Sent) -> String {
+fn describe(sent: &SentCommand) -> String {
     match &sent.command {
         Ok(command) => format!(
             "from {} to {}: number {} of tick {}, epoch {}, generation {}, {}: {:?}",
@@ -288,16 +288,19 @@ fn check_numbers(harness: &Harness<'_>, transcript: &Transcript, findings: &mut 
         let tick = answer.reading.report.tick;
         if let Some(field) = answer.reading.not_numbers.first() {
             let came = format!("{field} is not finite in tick {tick}");
-            findings.fail("number.finite", Failure::new("finite numbers only", came));
+            findings.fail(
+                "number.finite",
+                RuleFailure::new("finite numbers only", came),
+            );
         }
         if let Some(field) = answer.reading.not_integers.first() {
             let came = format!("{field} of the report of tick {tick}");
-            findings.fail("number.integers", Failure::new(WHOLE, came));
+            findings.fail("number.integers", RuleFailure::new(WHOLE, came));
         }
     }
     if let Some(field) = harness.seen.not_integers.first() {
         let came = format!("{field} of a command");
-        findings.fail("number.integers", Failure::new(WHOLE, came));
+        findings.fail("number.integers", RuleFailure::new(WHOLE, came));
     }
 
     for entry in transcript {
@@ -305,7 +308,7 @@ fn check_numbers(harness: &Harness<'_>, transcript: &Transcript, findings: &mut 
         if !is_published_angle(direction_rad) {
             let expected = "direction_rad from -pi to pi, rounded to 1e-6 rad, 0 instead of -0";
             let came = format!("{direction_rad} in tick {}", entry.tick);
-            findings.fail("number.angles", Failure::new(expected, came));
+            findings.fail("number.angles", RuleFailure::new(expected, came));
         }
     }
 }

@@ -5,42 +5,42 @@ use protocol::messages::MAX_TEXT_BYTES;
 
 use crate::comparison::demand_same;
 use crate::findings::Findings;
-use crate::harness::{Harness, Options};
+use crate::harness::{Harness, HarnessOptions};
 use crate::kit::Kit;
-use crate::report::Failure;
-use crate::script::{Disturbance, Script, Straight, play, usual, with_robot};
+use crate::report::RuleFailure;
+use crate::script::{Disturbance, PlayScript, Straight, play, usual, with_robot};
 
 /// Later versions of the contract add fields: everything that the robot receives carries some.
-pub(super) fn unknown_fields(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
+pub(super) fn unknown_fields(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     let mut harness = with_robot(
         kit,
-        Options {
+        HarnessOptions {
             has_extras: true,
-            ..Options::default()
+            ..HarnessOptions::default()
         },
     )?;
-    let played = play(&mut harness, &Script::usual(kit), &mut Straight)?;
+    let played = play(&mut harness, &PlayScript::usual(kit), &mut Straight)?;
     demand_same(kit, "an unknown field", usual(kit)?, &played)
 }
 
 /// JSON does not distinguish 7 from 7.0: everything that the robot receives has whole numbers without a fraction.
-pub(super) fn integers(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
+pub(super) fn integers(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     let mut harness = with_robot(
         kit,
-        Options {
+        HarnessOptions {
             writes_integers: true,
-            ..Options::default()
+            ..HarnessOptions::default()
         },
     )?;
-    let played = play(&mut harness, &Script::usual(kit), &mut Straight)?;
+    let played = play(&mut harness, &PlayScript::usual(kit), &mut Straight)?;
     demand_same(kit, "that 7.0 is written as 7", usual(kit)?, &played)
 }
 
 /// Messages that cannot be understood change nothing, and are reported.
-pub(super) fn malformed(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
+pub(super) fn malformed(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     struct Rubbish;
     impl Disturbance for Rubbish {
-        fn before(&mut self, harness: &mut Harness<'_>, tick: Tick) -> Result<(), Failure> {
+        fn before(&mut self, harness: &mut Harness<'_>, tick: Tick) -> Result<(), RuleFailure> {
             if tick % 4 != 1 {
                 return Ok(());
             }
@@ -54,9 +54,9 @@ pub(super) fn malformed(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
         }
     }
 
-    let mut harness = with_robot(kit, Options::default())?;
+    let mut harness = with_robot(kit, HarnessOptions::default())?;
     let before = harness.process.error_bytes();
-    let played = play(&mut harness, &Script::usual(kit), &mut Rubbish)?;
+    let played = play(&mut harness, &PlayScript::usual(kit), &mut Rubbish)?;
     demand_same(
         kit,
         "a message that cannot be understood",
@@ -65,7 +65,7 @@ pub(super) fn malformed(kit: &Kit, _: &mut Findings) -> Result<(), Failure> {
     )?;
 
     if harness.process.error_bytes() == before {
-        return Err(Failure::new(
+        return Err(RuleFailure::new(
             "messages that cannot be understood are reported on its standard error",
             "nothing",
         ));

@@ -5,11 +5,11 @@ use std::time::Duration;
 use protocol::Tick;
 use protocol::messages::{Correction, News};
 
-use crate::harness::{Harness, Options};
+use crate::harness::{Harness, HarnessOptions};
 use crate::kit::Kit;
 use crate::patience::PATIENCE;
-use crate::report::Failure;
-use crate::script::{Script, Straight, play, with_robot};
+use crate::report::RuleFailure;
+use crate::script::{PlayScript, Straight, play, with_robot};
 
 /// After this time, a robot that received a clock is in its tick.
 const UNDER_WAY: Duration = Duration::from_millis(50);
@@ -17,20 +17,20 @@ const UNDER_WAY: Duration = Duration::from_millis(50);
 const TICKS: Tick = 24;
 
 /// A harness on which the other robots put no states, so that a robot that wants to know them must query.
-pub(super) fn of_queries(kit: &Kit) -> Result<Harness<'_>, Failure> {
+pub(super) fn of_queries(kit: &Kit) -> Result<Harness<'_>, RuleFailure> {
     with_robot(
         kit,
-        Options {
+        HarnessOptions {
             puts_states: false,
-            ..Options::default()
+            ..HarnessOptions::default()
         },
     )
 }
 
 /// A robot that waits for its news: the clock of the open tick has its flag, and its news are withheld.
-pub(super) fn for_news(kit: &Kit) -> Result<Harness<'_>, Failure> {
-    let mut harness = with_robot(kit, Options::default())?;
-    play(&mut harness, &Script::quiet(3), &mut Straight)?;
+pub(super) fn for_news(kit: &Kit) -> Result<Harness<'_>, RuleFailure> {
+    let mut harness = with_robot(kit, HarnessOptions::default())?;
+    play(&mut harness, &PlayScript::quiet(3), &mut Straight)?;
 
     harness.withholds_news = true;
     harness.open(&News {
@@ -46,7 +46,7 @@ pub(super) fn for_news(kit: &Kit) -> Result<Harness<'_>, Failure> {
 
 /// A robot that waits for an answer that the others hold back, if it queries others at all. With it, whether it does: the
 /// last tick is then open.
-pub(super) fn for_another(kit: &Kit) -> Result<(Harness<'_>, bool), Failure> {
+pub(super) fn for_another(kit: &Kit) -> Result<(Harness<'_>, bool), RuleFailure> {
     let mut harness = of_queries(kit)?;
     harness.fake_peers.hold();
     for _ in 0..TICKS {

@@ -2,12 +2,12 @@
 
 use crate::findings::Findings;
 use crate::harness::Harness;
-use crate::report::Failure;
+use crate::report::RuleFailure;
 
 /// All that came on a harness so far was put as ticks need it.
 pub(super) fn check(harness: &Harness<'_>, findings: &mut Findings) {
     if let Some(wrong) = harness.seen.wrong_qos.first() {
         let expected = "put with congestion control block, not express, with the default priority";
-        findings.fail("wire.qos", Failure::new(expected, wrong));
+        findings.fail("wire.qos", RuleFailure::new(expected, wrong));
     }
 }

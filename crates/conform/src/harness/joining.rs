@@ -9,7 +9,7 @@ use protocol::{Epoch, RobotName, Tick};
 use super::{Harness, barrier, patient};
 use crate::fake_peers::FakePeers;
 use crate::patience::{PATIENCE, START_PATIENCE};
-use crate::report::Failure;
+use crate::report::RuleFailure;
 use crate::wire::Joining;
 
 /// The instance of robots that the kit plays.
@@ -17,7 +17,7 @@ const OWN_INSTANCE: &str = "conformance kit";
 
 impl Harness<'_> {
     /// Sets the other robots up and begins the first epoch, so that the robot can be admitted.
-    pub(crate) fn prepare(&mut self) -> Result<(), Failure> {
+    pub(crate) fn prepare(&mut self) -> Result<(), RuleFailure> {
         let kit = self.kit;
         let subject = kit.subject();
         self.template = kit.template(&self.run);
@@ -68,7 +68,7 @@ impl Harness<'_> {
     }
 
     /// The predecessor of the robot's process, played by the kit, takes part up to this tick and is gone.
-    pub(crate) fn play_predecessor(&mut self, last: Tick) -> Result<(), Failure> {
+    pub(crate) fn play_predecessor(&mut self, last: Tick) -> Result<(), RuleFailure> {
         let subject = self.kit.subject();
         self.play(&subject);
         for tick in 0..=last {
@@ -94,20 +94,20 @@ impl Harness<'_> {
     }
 
     /// The next request to join.
-    pub(crate) fn next_join(&mut self, patience: Duration) -> Result<Joining, Failure> {
+    pub(crate) fn next_join(&mut self, patience: Duration) -> Result<Joining, RuleFailure> {
         self.until("a request to join", patience, |harness| {
             harness.joins.pop_front()
         })
     }
 
     /// Admits the robot, and waits until its token is declared. From now on its requests are answered as they come.
-    pub(crate) fn join(&mut self) -> Result<(), Failure> {
+    pub(crate) fn join(&mut self) -> Result<(), RuleFailure> {
         self.prepare()?;
         self.admit_first()
     }
 
     /// The same where the other robots are set up.
-    pub(crate) fn admit_first(&mut self) -> Result<(), Failure> {
+    pub(crate) fn admit_first(&mut self) -> Result<(), RuleFailure> {
         let joining = self.next_join(START_PATIENCE)?;
         self.admit(&joining);
         self.keeps_requests = false;
@@ -177,7 +177,7 @@ impl Harness<'_> {
     }
 
     /// Waits until the robot's token is declared.
-    pub(crate) fn until_ready(&mut self) -> Result<(), Failure> {
+    pub(crate) fn until_ready(&mut self) -> Result<(), RuleFailure> {
         self.until(
             "its liveliness token after the welcome",
             PATIENCE,

@@ -20,10 +20,10 @@ use crate::body::Body;
 use crate::fake_peers::FakePeers;
 use crate::kit::Kit;
 use crate::patience::{Limit, PATIENCE};
-use crate::process::Process;
-use crate::report::Failure;
-use crate::seen::{Seen, Sent};
-use crate::wire::{Event, Joining, Wire};
+use crate::process::RobotProcess;
+use crate::report::RuleFailure;
+use crate::seen::{Seen, SentCommand};
+use crate::wire::{Joining, Wire, WireEvent};
 
 /// How often a wait looks whether the process still runs.
 const LOOK_AGAIN: Duration = Duration::from_millis(20);
@@ -35,9 +35,9 @@ const RESTLESS: Duration = Duration::from_secs(1);
 const TOKEN_PATIENCE: Duration = Duration::from_secs(120);
 
 /// A complete tick.
-pub(crate) struct Done {
+pub(crate) struct CompleteTick {
     pub(crate) report: Report,
-    pub(crate) commands: Vec<Sent>,
+    pub(crate) commands: Vec<SentCommand>,
     /// The place of its report in [`Seen::answers`].
     pub(crate) index: usize,
     /// From the clock to the report, wall clock.
@@ -45,7 +45,7 @@ pub(crate) struct Done {
 }
 
 /// How a harness differs from the usual one.
-pub(crate) struct Options {
+pub(crate) struct HarnessOptions {
     /// How long the robot is to try to join, seconds.
     pub(crate) patience_s: u32,
     /// How long the robot is to wait for a simulator that is gone, seconds.
@@ -60,7 +60,7 @@ pub(crate) struct Options {
     pub(crate) puts_states: bool,
 }
 
-impl Default for Options {
+impl Default for HarnessOptions {
     fn default() -> Self {
         Self {
             patience_s: 20,
@@ -80,7 +80,7 @@ pub(crate) struct Harness<'k> {
     pub(crate) keys: Keys,
     pub(crate) fake_peers: FakePeers,
     pub(crate) seen: Seen,
-    pub(crate) process: Process,
+    pub(crate) process: RobotProcess,
     pub(crate) body: Body,
     /// Clocks that were put more than once.
     pub(crate) repeated: BTreeSet<(Epoch, Tick)>,
@@ -93,7 +93,7 @@ pub(crate) struct Harness<'k> {
     /// News are not put.
     pub(crate) withholds_news: bool,
     wire: Wire,
-    barrier: Barrier<usize, Sent>,
+    barrier: Barrier<usize, SentCommand>,
     timers: BTreeMap<Timer, Instant>,
     epoch: Epoch,
     next: Tick,
@@ -102,13 +102,13 @@ pub(crate) struct Harness<'k> {
     news: News,
     granted: Option<(Epoch, Tick)>,
     begun: Instant,
-    outcome: Option<Outcome<usize, Sent>>,
-    options: Options,
+    outcome: Option<Outcome<usize, SentCommand>>,
+    options: HarnessOptions,
     joins: VecDeque<Joining>,
 }
 
 /// The barrier for these robots: it waits, whatever happens.
-fn barrier(roster: impl IntoIterator<Item = RobotName>) -> Barrier<usize, Sent> {
+fn barrier(roster: impl IntoIterator<Item = RobotName>) -> Barrier<usize, SentCommand> {
     let timing = Timing {
         token: TOKEN_PATIENCE,
         ..Timing::default()
@@ -127,7 +127,7 @@ fn patient() -> Lateness {
 
 impl<'k> Harness<'k> {
     /// Opens a run and starts the robot's program on it.
-    pub(crate) fn open_run(kit: &'k Kit, options: Options) -> Result<Self, Failure> {
+    pub(crate) fn open_run(kit: &'k Kit, options: HarnessOptions) -> Result<Self, RuleFailure> {
         let run = kit.next_run();
         let keys = Keys::new(&run);
         let wire = Wire::open(&kit.bus, &keys)?;
@@ -137,8 +137,8 @@ impl<'k> Harness<'k> {
             ("CARS_PATIENCE_S", options.patience_s.to_string()),
             ("CARS_GONE_PATIENCE_S", options.gone_patience_s.to_string()),
         ];
-        let process = Process::start(&kit.command, &environment)
-            .map_err(|error| Failure::new("the command can be started", error.to_string()))?;
+        let process = RobotProcess::start(&kit.command, &environment)
+            .map_err(|error| RuleFailure::new("the command can be started", error.to_string()))?;
 
         Ok(Self {
             kit,
@@ -192,8 +192,8 @@ impl<'k> Harness<'k> {
 
         let order = self.seen.next_order();
         match event {
-            Event::Join(query) => self.on_join(Joining::new(query)),
-            Event::Report {
+            WireEvent::Join(query) => self.on_join(Joining::new(query)),
+            WireEvent::Report {
                 key,
                 bytes,
                 at,
@@ -202,20 +202,20 @@ impl<'k> Harness<'k> {
                 self.seen.note_qos("a report", qos);
                 self.on_report(&key, bytes, at, order);
             }
-            Event::State { bytes, qos } => {
+            WireEvent::State { bytes, qos } => {
                 self.seen.note_qos("a state", qos);
                 self.seen.file_state(&bytes, order);
             }
-            Event::Command { key, bytes, qos } => {
+            WireEvent::Command { key, bytes, qos } => {
                 self.seen.note_qos("a command", qos);
                 self.on_command(&key, bytes, order);
             }
-            Event::Waiting { key, bytes, qos } => {
+            WireEvent::Waiting { key, bytes, qos } => {
                 self.seen.note_qos("waiting", qos);
                 self.on_waiting(&key, &bytes);
             }
-            Event::Token { robot, is_present } => self.on_token(&robot, is_present),
-            Event::Reply(number, reply) => {
+            WireEvent::Token { robot, is_present } => self.on_token(&robot, is_present),
+            WireEvent::Reply(number, reply) => {
                 self.seen.replies.insert(number, (order, reply));
             }
         }
@@ -300,7 +300,7 @@ impl<'k> Harness<'k> {
     /// Lets the barrier act, and carries out its outputs.
     fn drive(
         &mut self,
-        act: impl FnOnce(&mut Barrier<usize, Sent>, &mut Vec<Output<usize, Sent>>),
+        act: impl FnOnce(&mut Barrier<usize, SentCommand>, &mut Vec<Output<usize, SentCommand>>),
     ) {
         let mut out = Vec::new();
         act(&mut self.barrier, &mut out);
@@ -353,7 +353,7 @@ impl<'k> Harness<'k> {
         &self,
         news: &[(RobotName, IncarnationNotice)],
         clock: &Clock,
-    ) -> Result<(), Failure> {
+    ) -> Result<(), RuleFailure> {
         if self.options.puts_states {
             self.fake_peers.put_states(&self.kit.bus, &self.keys)?;
         }
@@ -381,7 +381,7 @@ impl<'k> Harness<'k> {
         expected: &str,
         patience: Duration,
         mut found: impl FnMut(&mut Self) -> Option<T>,
-    ) -> Result<T, Failure> {
+    ) -> Result<T, RuleFailure> {
         let mut limit = Limit::new(patience);
         let mut last_words = None;
         loop {
@@ -397,7 +397,7 @@ impl<'k> Harness<'k> {
             }
             let has_ended = last_words.is_some_and(|since| since.elapsed() > LAST_WORDS);
             if has_ended || limit.is_over(&self.process) {
-                return Err(Failure::new(
+                return Err(RuleFailure::new(
                     expected,
                     format!("it never came; {}", self.process.fate()),
                 ));
@@ -437,7 +437,7 @@ impl<'k> Harness<'k> {
         &mut self,
         expected: &str,
         patience: Duration,
-    ) -> Result<ExitStatus, Failure> {
+    ) -> Result<ExitStatus, RuleFailure> {
         let mut limit = Limit::new(patience);
         loop {
             if let Some(status) = self.process.ended() {
@@ -445,18 +445,18 @@ impl<'k> Harness<'k> {
             }
 
             if limit.is_over(&self.process) {
-                return Err(Failure::new(expected, self.process.fate()));
+                return Err(RuleFailure::new(expected, self.process.fate()));
             }
             self.pump(LOOK_AGAIN);
         }
     }
 
     /// Waits until the robot's token is undeclared.
-    pub(crate) fn until_gone(&mut self) -> Result<(), Failure> {
+    pub(crate) fn until_gone(&mut self) -> Result<(), RuleFailure> {
         let mut limit = Limit::new(PATIENCE);
         while self.is_present() {
             if limit.is_over(&self.process) {
-                return Err(Failure::new(
+                return Err(RuleFailure::new(
                     "its liveliness token is undeclared",
                     "it is still declared",
                 ));

@@ -7,11 +7,11 @@ use lockstep::Lateness;
 use protocol::Tick;
 use protocol::messages::{Clock, End, News, OnLate, Report};
 
-use super::{Done, Harness, patient};
+use super::{CompleteTick, Harness, patient};
 use crate::flushing;
 use crate::patience::PATIENCE;
-use crate::report::Failure;
-use crate::seen::Sent;
+use crate::report::RuleFailure;
+use crate::seen::SentCommand;
 
 /// A robot that has put its report so often without all commands that it states does not put them at all.
 const INCOMPLETE: usize = 3;
@@ -31,22 +31,22 @@ impl Harness<'_> {
     }
 
     /// Puts a clock.
-    pub(crate) fn put_clock(&self, clock: &Clock) -> Result<(), Failure> {
+    pub(crate) fn put_clock(&self, clock: &Clock) -> Result<(), RuleFailure> {
         self.put_as_clock(&self.fake_peers.dress(clock))
     }
 
     /// Puts something else on the key of clocks.
-    pub(crate) fn put_as_clock(&self, bytes: &[u8]) -> Result<(), Failure> {
+    pub(crate) fn put_as_clock(&self, bytes: &[u8]) -> Result<(), RuleFailure> {
         self.wire.put_clock(bytes.to_vec())
     }
 
     /// Puts news for the robot.
-    pub(crate) fn put_news(&self, news: &News) -> Result<(), Failure> {
+    pub(crate) fn put_news(&self, news: &News) -> Result<(), RuleFailure> {
         self.put_as_news(&self.fake_peers.dress(news))
     }
 
     /// Puts something else on the key of its news.
-    pub(crate) fn put_as_news(&self, bytes: &[u8]) -> Result<(), Failure> {
+    pub(crate) fn put_as_news(&self, bytes: &[u8]) -> Result<(), RuleFailure> {
         self.wire.put_news(&self.kit.subject(), bytes.to_vec())
     }
 
@@ -65,7 +65,7 @@ impl Harness<'_> {
     }
 
     /// Grants the next tick with these news.
-    pub(crate) fn open(&mut self, news: &News) -> Result<(), Failure> {
+    pub(crate) fn open(&mut self, news: &News) -> Result<(), RuleFailure> {
         self.until("all robots are connected", PATIENCE, |harness| {
             harness.is_gathered.then_some(())
         })?;
@@ -85,7 +85,7 @@ impl Harness<'_> {
     }
 
     /// Waits until the open tick is complete.
-    pub(crate) fn complete(&mut self) -> Result<Done, Failure> {
+    pub(crate) fn complete(&mut self) -> Result<CompleteTick, RuleFailure> {
         let tick = self.next.saturating_sub(1);
         let expected = format!("a report for tick {tick} of epoch {}", self.epoch);
         let came = self.until(&expected, PATIENCE, |harness| {
@@ -112,10 +112,10 @@ impl Harness<'_> {
             Some((index, commands, answer))
         });
         let Some((index, commands, answer)) = came else {
-            return Err(Failure::new(expected, "the clock went on without one"));
+            return Err(RuleFailure::new(expected, "the clock went on without one"));
         };
 
-        Ok(Done {
+        Ok(CompleteTick {
             report: answer.reading.report.clone(),
             commands: commands.into_iter().map(|put| put.command).collect(),
             index,
@@ -131,7 +131,7 @@ impl Harness<'_> {
     }
 
     /// Why the open tick will never be complete, if that is known.
-    fn hopeless(&self, tick: Tick) -> Option<Failure> {
+    fn hopeless(&self, tick: Tick) -> Option<RuleFailure> {
         let (generation, _) = self.barrier.presence(&self.kit.subject());
         let reports = self
             .seen
@@ -142,14 +142,14 @@ impl Harness<'_> {
             .filter(|report| report.tick == tick)
             .find(|report| report.generation != generation && report.epoch == self.epoch);
         if let Some(report) = wrong {
-            return Some(Failure::new(
+            return Some(RuleFailure::new(
                 format!("a report of generation {generation} for tick {tick}"),
                 format!("one of generation {}", report.generation),
             ));
         }
 
         let stated = self.incomplete()?;
-        Some(Failure::new(
+        Some(RuleFailure::new(
             format!("{stated} commands, put before the report of tick {tick} that states so many"),
             self.commands_of(tick),
         ))
@@ -180,14 +180,14 @@ impl Harness<'_> {
             .commands
             .iter()
             .filter(|sent| sent.tick() == Some(tick))
-            .filter_map(Sent::number)
+            .filter_map(SentCommand::number)
             .collect();
 
         format!("commands with the numbers {numbers:?}")
     }
 
     /// Grants the next tick while the robot is cut off, and goes on without it: it is lost.
-    pub(crate) fn miss(&mut self) -> Result<(), Failure> {
+    pub(crate) fn miss(&mut self) -> Result<(), RuleFailure> {
         let impatient = Lateness {
             on_late: OnLate::Continue,
             ..patient()
@@ -205,13 +205,13 @@ impl Harness<'_> {
     }
 
     /// Puts the clock that ends the run.
-    pub(crate) fn put_end(&mut self, end: End) -> Result<(), Failure> {
+    pub(crate) fn put_end(&mut self, end: End) -> Result<(), RuleFailure> {
         let clock = self.barrier.end(end);
         self.put_clock(&clock)
     }
 
     /// Undeclares the simulator's liveliness token, or declares it again. Returns when that is done.
-    pub(crate) fn show_simulator(&mut self, is_present: bool) -> Result<Instant, Failure> {
+    pub(crate) fn show_simulator(&mut self, is_present: bool) -> Result<Instant, RuleFailure> {
         self.wire.show_simulator(is_present)?;
         Ok(Instant::now())
     }

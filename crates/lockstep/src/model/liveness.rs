@@ -6,12 +6,12 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use protocol::messages::OnLate;
 use stateright::Model;
 
-use super::star::{Star, State, Step};
+use super::star::{ModelState, ModelStep, Star};
 
 /// A state from which something that must come is out of reach.
 pub(super) struct Stuck {
     pub(super) what: &'static str,
-    pub(super) steps: Vec<Step>,
+    pub(super) steps: Vec<ModelStep>,
 }
 
 /// All states, as far as the search backwards needs them.
@@ -19,7 +19,7 @@ pub(super) struct Stuck {
 struct Graph {
     numbers: BTreeMap<u64, u32>,
     /// How each state was reached first.
-    reached: Vec<Option<(u32, Step)>>,
+    reached: Vec<Option<(u32, ModelStep)>>,
     /// From where each state is reached by a fair step.
     before: Vec<Vec<u32>>,
     /// Where the run is over.
@@ -31,7 +31,7 @@ struct Graph {
 }
 
 impl Graph {
-    fn number(&mut self, state: &State) -> (u32, bool) {
+    fn number(&mut self, state: &ModelState) -> (u32, bool) {
         let mut hasher = DefaultHasher::new();
         state.hash(&mut hasher);
         let next = self.reached.len() as u32;
@@ -40,7 +40,7 @@ impl Graph {
         (number, number == next)
     }
 
-    fn add(&mut self, star: &Star, state: &State, reached: Option<(u32, Step)>) {
+    fn add(&mut self, star: &Star, state: &ModelState, reached: Option<(u32, ModelStep)>) {
         let number = self.reached.len() as u32;
         self.reached.push(reached);
         self.before.push(Vec::new());
@@ -77,7 +77,7 @@ impl Graph {
         (0..can_reach.len()).find(|number| is_meant(*number) && !can_reach[*number])
     }
 
-    fn steps_to(&self, number: usize) -> Vec<Step> {
+    fn steps_to(&self, number: usize) -> Vec<ModelStep> {
         let mut steps = Vec::new();
         let mut at = number;
         while let Some((from, step)) = &self.reached[at] {

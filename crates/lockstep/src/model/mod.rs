@@ -35,13 +35,13 @@ use stateright::{Checker, HasDiscoveries, Model};
 
 use mutants::Mutant;
 use simulation::Ordered;
-use star::{Budget, Star};
+use star::{ModelBudget, Star};
 
 fn name(name: &str) -> RobotName {
     RobotName::new(name).unwrap_or_else(|error| unreachable!("{error}"))
 }
 
-const NOTHING: Budget = Budget {
+const NOTHING: ModelBudget = ModelBudget {
     losses: 0,
     duplicates: 0,
     cuts: 0,
@@ -57,7 +57,7 @@ const NOTHING: Budget = Budget {
 
 /// What goes wrong together; all of it at once would be too much to explore.
 #[derive(Debug, Clone, Copy)]
-enum World {
+enum ModelFaults {
     Calm,
     Losses,
     Echoes,
@@ -83,33 +83,33 @@ enum World {
     Aborts,
 }
 
-const WORLDS: [World; 23] = [
-    World::Calm,
-    World::Losses,
-    World::Echoes,
-    World::Crash,
-    World::Cuts,
-    World::Successor,
-    World::Rival,
-    World::Stray,
-    World::Init,
-    World::InitTwice,
-    World::InitWhileCut,
-    World::InitWithSuccessor,
-    World::GoesOn,
-    World::GoesOnSlowly,
-    World::GoesOnWithoutB,
-    World::GoesOnWhileCut,
-    World::GoesOnAfterInit,
-    World::Hang,
-    World::ShortHang,
-    World::HangOfSuccessor,
-    World::HangWhileLinkDies,
-    World::ScenarioCrash,
-    World::Aborts,
+const WORLDS: [ModelFaults; 23] = [
+    ModelFaults::Calm,
+    ModelFaults::Losses,
+    ModelFaults::Echoes,
+    ModelFaults::Crash,
+    ModelFaults::Cuts,
+    ModelFaults::Successor,
+    ModelFaults::Rival,
+    ModelFaults::Stray,
+    ModelFaults::Init,
+    ModelFaults::InitTwice,
+    ModelFaults::InitWhileCut,
+    ModelFaults::InitWithSuccessor,
+    ModelFaults::GoesOn,
+    ModelFaults::GoesOnSlowly,
+    ModelFaults::GoesOnWithoutB,
+    ModelFaults::GoesOnWhileCut,
+    ModelFaults::GoesOnAfterInit,
+    ModelFaults::Hang,
+    ModelFaults::ShortHang,
+    ModelFaults::HangOfSuccessor,
+    ModelFaults::HangWhileLinkDies,
+    ModelFaults::ScenarioCrash,
+    ModelFaults::Aborts,
 ];
 
-impl World {
+impl ModelFaults {
     /// Whether it has more than 25,000 states. `.ci/mutants` leaves these out.
     fn is_large(self) -> bool {
         matches!(
@@ -161,34 +161,34 @@ impl World {
                 last_tick: 3,
                 ..waits
             },
-            Self::Losses => waits.with(Budget {
+            Self::Losses => waits.with(ModelBudget {
                 losses: 2,
                 ..NOTHING
             }),
-            Self::Echoes => waits.with(Budget {
+            Self::Echoes => waits.with(ModelBudget {
                 losses: 1,
                 duplicates: 1,
                 early: 1,
                 ..NOTHING
             }),
-            Self::Crash => waits.with(Budget {
+            Self::Crash => waits.with(ModelBudget {
                 crashes: 1,
                 losses: 1,
                 ..NOTHING
             }),
-            Self::Cuts => waits.with(Budget {
+            Self::Cuts => waits.with(ModelBudget {
                 cuts: 1,
                 blips: 1,
                 ..NOTHING
             }),
-            Self::Successor => waits.with(Budget {
+            Self::Successor => waits.with(ModelBudget {
                 cuts: 1,
                 successors: 1,
                 ..NOTHING
             }),
             Self::Rival => Star {
                 last_tick: 1,
-                ..waits.with(Budget {
+                ..waits.with(ModelBudget {
                     rivals: 1,
                     ..NOTHING
                 })
@@ -196,7 +196,7 @@ impl World {
             Self::Stray => Star {
                 is_slow: true,
                 last_tick: 1,
-                ..waits.with(Budget {
+                ..waits.with(ModelBudget {
                     strays: 2,
                     inits: 1,
                     ..NOTHING
@@ -205,7 +205,7 @@ impl World {
             Self::Init => Star {
                 is_slow: true,
                 last_tick: 1,
-                ..waits.with(Budget {
+                ..waits.with(ModelBudget {
                     inits: 1,
                     duplicates: 1,
                     ..NOTHING
@@ -215,7 +215,7 @@ impl World {
                 last_tick: 0,
                 victim: Some("B"),
                 is_gathered: true,
-                ..waits.with(Budget {
+                ..waits.with(ModelBudget {
                     inits: 2,
                     cuts: 1,
                     duplicates: 2,
@@ -224,7 +224,7 @@ impl World {
             },
             Self::InitWhileCut => Star {
                 last_tick: 1,
-                ..waits.with(Budget {
+                ..waits.with(ModelBudget {
                     inits: 2,
                     cuts: 1,
                     ..NOTHING
@@ -234,14 +234,14 @@ impl World {
                 last_tick: 1,
                 victim: Some("A"),
                 is_gathered: true,
-                ..waits.with(Budget {
+                ..waits.with(ModelBudget {
                     inits: 1,
                     cuts: 1,
                     successors: 1,
                     ..NOTHING
                 })
             },
-            Self::GoesOn => goes_on.with(Budget {
+            Self::GoesOn => goes_on.with(ModelBudget {
                 early: 1,
                 losses: 1,
                 ..NOTHING
@@ -249,7 +249,7 @@ impl World {
             Self::GoesOnSlowly => Star {
                 is_slow: true,
                 lose_after: 3,
-                ..goes_on.with(Budget {
+                ..goes_on.with(ModelBudget {
                     early: 2,
                     duplicates: 1,
                     ..NOTHING
@@ -257,15 +257,15 @@ impl World {
             },
             Self::GoesOnWithoutB => Star {
                 waits_for: Some("A"),
-                ..goes_on.with(Budget {
+                ..goes_on.with(ModelBudget {
                     early: 1,
                     ..NOTHING
                 })
             },
-            Self::GoesOnWhileCut => goes_on.with(Budget { cuts: 2, ..NOTHING }),
+            Self::GoesOnWhileCut => goes_on.with(ModelBudget { cuts: 2, ..NOTHING }),
             Self::GoesOnAfterInit => Star {
                 last_tick: 2,
-                ..goes_on.with(Budget {
+                ..goes_on.with(ModelBudget {
                     inits: 1,
                     cuts: 1,
                     ..NOTHING
@@ -274,7 +274,7 @@ impl World {
             Self::Hang => Star {
                 last_tick: 4,
                 scenario: Some(hang),
-                ..goes_on.with(Budget { cuts: 1, ..NOTHING })
+                ..goes_on.with(ModelBudget { cuts: 1, ..NOTHING })
             },
             Self::ShortHang => Star {
                 is_slow: true,
@@ -288,7 +288,7 @@ impl World {
                 victim: Some("B"),
                 is_gathered: true,
                 scenario: Some(Ordered { until: 2, ..hang }),
-                ..goes_on.with(Budget {
+                ..goes_on.with(ModelBudget {
                     cuts: 1,
                     successors: 1,
                     ..NOTHING
@@ -298,7 +298,7 @@ impl World {
                 last_tick: 4,
                 lose_after: 3,
                 scenario: Some(hang),
-                ..goes_on.with(Budget {
+                ..goes_on.with(ModelBudget {
                     lapses: 1,
                     ..NOTHING
                 })
@@ -309,14 +309,14 @@ impl World {
                     kind: FaultKind::Crash,
                     ..hang
                 }),
-                ..goes_on.with(Budget {
+                ..goes_on.with(ModelBudget {
                     early: 1,
                     ..NOTHING
                 })
             },
             Self::Aborts => Star {
                 on_late: OnLate::Abort,
-                ..waits.with(Budget {
+                ..waits.with(ModelBudget {
                     early: 1,
                     losses: 1,
                     ..NOTHING
@@ -379,7 +379,7 @@ fn every_rule_holds_in_every_large_world_whose_clock_does_not_wait() {
 }
 
 /// Explores all worlds of a kind.
-fn every_rule_holds_where(is_meant: fn(World) -> bool) {
+fn every_rule_holds_where(is_meant: fn(ModelFaults) -> bool) {
     for world in WORLDS {
         if !is_meant(world) {
             continue;
@@ -404,77 +404,121 @@ fn every_rule_holds_where(is_meant: fn(World) -> bool) {
 }
 
 /// What may be done wrong, a world in which that shows, and what goes wrong there.
-const SHOWN: [(Mutant, World, &str); 38] = [
-    (Mutant::CompletesEarly, World::Calm, "WrongReport"),
-    (Mutant::CountsOtherEpochs, World::Init, "WrongReport"),
-    (Mutant::CountsOtherTicks, World::Echoes, "WrongReport"),
+const SHOWN: [(Mutant, ModelFaults, &str); 38] = [
+    (Mutant::CompletesEarly, ModelFaults::Calm, "WrongReport"),
+    (Mutant::CountsOtherEpochs, ModelFaults::Init, "WrongReport"),
+    (Mutant::CountsOtherTicks, ModelFaults::Echoes, "WrongReport"),
     (
         Mutant::CountsOtherIncarnations,
-        World::Successor,
+        ModelFaults::Successor,
         "WrongReport",
     ),
     (
         Mutant::CountsIncompleteReports,
-        World::Losses,
+        ModelFaults::Losses,
         "WrongCommands",
     ),
     (
         Mutant::CountsLateReports,
-        World::GoesOnWithoutB,
+        ModelFaults::GoesOnWithoutB,
         "VerdictChanged",
     ),
-    (Mutant::KeepsPredecessor, World::Crash, "Wrong"),
-    (Mutant::RepeatsNoClock, World::Losses, END),
-    (Mutant::RepeatsNoNews, World::Losses, END),
-    (Mutant::FlagsNoNews, World::Losses, "WrongNews"),
-    (Mutant::MissesReturn, World::Crash, END),
-    (Mutant::NamesNoNewcomer, World::GoesOn, END),
-    (Mutant::NamesReplacementOnce, World::Successor, FULL_END),
+    (Mutant::KeepsPredecessor, ModelFaults::Crash, "Wrong"),
+    (Mutant::RepeatsNoClock, ModelFaults::Losses, END),
+    (Mutant::RepeatsNoNews, ModelFaults::Losses, END),
+    (Mutant::FlagsNoNews, ModelFaults::Losses, "WrongNews"),
+    (Mutant::MissesReturn, ModelFaults::Crash, END),
+    (Mutant::NamesNoNewcomer, ModelFaults::GoesOn, END),
+    (
+        Mutant::NamesReplacementOnce,
+        ModelFaults::Successor,
+        FULL_END,
+    ),
     (
         Mutant::CountsNoIncarnations,
-        World::Successor,
+        ModelFaults::Successor,
         "SameIncarnation",
     ),
     (
         Mutant::CountsNoIncarnations,
-        World::GoesOnWhileCut,
+        ModelFaults::GoesOnWhileCut,
         "ReplacedConnected",
     ),
-    (Mutant::GivesTakenName, World::Rival, "ReplacedConnected"),
-    (Mutant::ReservesNoPlace, World::Rival, "ReplacedConnected"),
-    (Mutant::WaitsForAbsent, World::ScenarioCrash, END),
+    (
+        Mutant::GivesTakenName,
+        ModelFaults::Rival,
+        "ReplacedConnected",
+    ),
+    (
+        Mutant::ReservesNoPlace,
+        ModelFaults::Rival,
+        "ReplacedConnected",
+    ),
+    (Mutant::WaitsForAbsent, ModelFaults::ScenarioCrash, END),
     (
         Mutant::LosesHung,
-        World::HangWhileLinkDies,
+        ModelFaults::HangWhileLinkDies,
         "LostByAccident",
     ),
-    (Mutant::TakesHangForCrash, World::ShortHang, "OldState"),
-    (Mutant::AwaitsNoRejoining, World::ShortHang, "NoVerdict"),
-    (Mutant::AsksNoneToRejoin, World::GoesOnWhileCut, FULL_END),
-    (Mutant::IgnoresFlags, World::Losses, "WrongNews"),
-    (Mutant::MixesNewsUp, World::GoesOn, "WrongNews"),
-    (Mutant::RunsAgain, World::Echoes, "RanBackwards"),
-    (Mutant::RepeatsNoAnswer, World::Losses, END),
-    (Mutant::RepeatsNoCommands, World::Losses, END),
-    (Mutant::RunsEarlierClock, World::InitTwice, "RanBackwards"),
-    (Mutant::RunsEarlierClock, World::Echoes, "RanBackwards"),
-    (Mutant::IgnoresNewEpoch, World::Init, END),
-    (Mutant::IgnoresRequest, World::GoesOnWhileCut, FULL_END),
+    (
+        Mutant::TakesHangForCrash,
+        ModelFaults::ShortHang,
+        "OldState",
+    ),
+    (
+        Mutant::AwaitsNoRejoining,
+        ModelFaults::ShortHang,
+        "NoVerdict",
+    ),
+    (
+        Mutant::AsksNoneToRejoin,
+        ModelFaults::GoesOnWhileCut,
+        FULL_END,
+    ),
+    (Mutant::IgnoresFlags, ModelFaults::Losses, "WrongNews"),
+    (Mutant::MixesNewsUp, ModelFaults::GoesOn, "WrongNews"),
+    (Mutant::RunsAgain, ModelFaults::Echoes, "RanBackwards"),
+    (Mutant::RepeatsNoAnswer, ModelFaults::Losses, END),
+    (Mutant::RepeatsNoCommands, ModelFaults::Losses, END),
+    (
+        Mutant::RunsEarlierClock,
+        ModelFaults::InitTwice,
+        "RanBackwards",
+    ),
+    (
+        Mutant::RunsEarlierClock,
+        ModelFaults::Echoes,
+        "RanBackwards",
+    ),
+    (Mutant::IgnoresNewEpoch, ModelFaults::Init, END),
+    (
+        Mutant::IgnoresRequest,
+        ModelFaults::GoesOnWhileCut,
+        FULL_END,
+    ),
     (
         Mutant::ExpectsNoWelcome,
-        World::ShortHang,
+        ModelFaults::ShortHang,
         "ReplacedConnected",
     ),
     (
         Mutant::GoesOnAsSuccessor,
-        World::GoesOnWhileCut,
+        ModelFaults::GoesOnWhileCut,
         "BeganEarly",
     ),
-    (Mutant::StartsOverInOwnEpoch, World::Stray, "RanBackwards"),
-    (Mutant::BeginsUnnamed, World::Crash, "BeganEarly"),
-    (Mutant::OutlivesSuccessor, World::Successor, FULL_END),
-    (Mutant::InsistsOnName, World::InitWithSuccessor, FULL_END),
-    (Mutant::DeclaresTokenEarly, World::Crash, END),
+    (
+        Mutant::StartsOverInOwnEpoch,
+        ModelFaults::Stray,
+        "RanBackwards",
+    ),
+    (Mutant::BeginsUnnamed, ModelFaults::Crash, "BeganEarly"),
+    (Mutant::OutlivesSuccessor, ModelFaults::Successor, FULL_END),
+    (
+        Mutant::InsistsOnName,
+        ModelFaults::InitWithSuccessor,
+        FULL_END,
+    ),
+    (Mutant::DeclaresTokenEarly, ModelFaults::Crash, END),
 ];
 
 const END: &str = "the end is out of reach";

@@ -365,7 +365,7 @@ type Actions = Vec<Action<News, (), Order, Report>>;
 
 /// A participant that may be wrong.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(super) struct Robot {
+pub(super) struct MaybeWrongRobot {
     participant: Participant<News, (), Order, Report>,
     mutant: Option<Mutant>,
     /// The tick that was run last, and news of ticks that were not run, for mutants that need it.
@@ -373,7 +373,7 @@ pub(super) struct Robot {
     news: BTreeMap<(Epoch, Tick), News>,
 }
 
-impl Robot {
+impl MaybeWrongRobot {
     pub(super) fn new(timeouts: Timeouts, mutant: Option<Mutant>, out: &mut Actions) -> Self {
         if mutant == Some(Mutant::DeclaresTokenEarly) {
             out.push(Action::DeclareToken);

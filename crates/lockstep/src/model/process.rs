@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use protocol::messages::Clock;
 use protocol::{Epoch, Generation, RobotName, Tick};
 
-use super::mutants::{Mutant, Robot};
+use super::mutants::{MaybeWrongRobot, Mutant};
 use super::simulation::{self, News, Order, Report, Simulation, Violation};
 use crate::{
     Action, Admission, Begin, IncarnationNotice, Leave, Refused, RobotTimer, Sent, Stamp, Timeouts,
@@ -34,9 +34,9 @@ type Actions = Vec<Action<News, (), Order, Report>>;
 
 /// A process of a robot.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(super) struct Process {
+pub(super) struct ModelProcess {
     pub(super) name: RobotName,
-    pub(super) robot: Robot,
+    pub(super) robot: MaybeWrongRobot,
     pub(super) up: VecDeque<Up>,
     pub(super) down: VecDeque<Down>,
     pub(super) is_alive: bool,
@@ -74,7 +74,7 @@ pub(super) struct Around<'a> {
     pub(super) mutant: Option<Mutant>,
 }
 
-impl Process {
+impl ModelProcess {
     /// A process that asks to join.
     pub(super) fn start(name: RobotName, around: Around) -> (Self, Option<Violation>) {
         let timeouts = Timeouts {
@@ -82,7 +82,7 @@ impl Process {
             gone: std::time::Duration::MAX,
         };
         let mut out = Vec::new();
-        let robot = Robot::new(timeouts, around.mutant, &mut out);
+        let robot = MaybeWrongRobot::new(timeouts, around.mutant, &mut out);
         let mut process = Self {
             name,
             robot,
@@ -112,7 +112,7 @@ impl Process {
     pub(super) fn feed(
         &mut self,
         around: Around,
-        input: impl FnOnce(&mut Robot, &mut Actions),
+        input: impl FnOnce(&mut MaybeWrongRobot, &mut Actions),
     ) -> Option<Violation> {
         let mut out = Vec::new();
         input(&mut self.robot, &mut out);

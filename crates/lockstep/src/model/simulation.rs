@@ -111,7 +111,7 @@ pub(super) struct Ordered {
 
 /// A robot as the simulation knows it.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
-pub(super) struct Part {
+pub(super) struct ModelRobot {
     /// The incarnation that takes part, or took part last.
     pub(super) generation: Generation,
     pub(super) takes_part: bool,
@@ -135,7 +135,7 @@ pub(super) struct Simulation {
     pub(super) is_late: bool,
     /// What arrives in the open tick.
     pub(super) news: BTreeMap<RobotName, Vec<Order>>,
-    pub(super) parts: BTreeMap<RobotName, Part>,
+    pub(super) parts: BTreeMap<RobotName, ModelRobot>,
 }
 
 impl Simulation {
@@ -150,7 +150,7 @@ impl Simulation {
             news: BTreeMap::new(),
             parts: roster
                 .iter()
-                .map(|name| (name.clone(), Part::default()))
+                .map(|name| (name.clone(), ModelRobot::default()))
                 .collect(),
         }
     }
@@ -229,7 +229,7 @@ impl Simulation {
     fn judge(
         &self,
         name: &RobotName,
-        part: &Part,
+        part: &ModelRobot,
         report: &Report,
         sent: &[Sent<Order>],
     ) -> Option<Violation> {

@@ -7,14 +7,14 @@ use protocol::messages::{Clock, End, FaultKind, OnLate};
 use protocol::{Epoch, RobotName, Tick};
 use stateright::{Model, Property};
 
-use super::mutants::{Mutant, Robot, Simulator};
-use super::process::{Around, Down, Process, Up};
+use super::mutants::{MaybeWrongRobot, Mutant, Simulator};
+use super::process::{Around, Down, ModelProcess, Up};
 use super::simulation::{News, Order, Ordered, Report, Simulation, Violation};
 use crate::{IncarnationNotice, Lateness, Membership, Outcome, Output, RobotTimer, Timer};
 
 /// How often each thing may still happen.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
-pub(super) struct Budget {
+pub(super) struct ModelBudget {
     /// Single messages lost, which TCP never does.
     pub(super) losses: u8,
     /// Messages that come again, after all others on their link.
@@ -54,20 +54,20 @@ pub(super) struct Star {
     pub(super) waits_for: Option<&'static str>,
     /// Whether the exploration begins when tick 0 is granted.
     pub(super) is_gathered: bool,
-    pub(super) budget: Budget,
+    pub(super) budget: ModelBudget,
     pub(super) mutant: Option<Mutant>,
 }
 
 /// One state of everything.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(super) struct State {
+pub(super) struct ModelState {
     pub(super) barrier: Simulator,
     pub(super) simulation: Simulation,
     /// By the order in which they were started; `None` if nothing of them remains.
-    pub(super) processes: Vec<Option<Process>>,
+    pub(super) processes: Vec<Option<ModelProcess>>,
     /// Robots for which [`Timer::Token`] is set.
     reserved: BTreeSet<RobotName>,
-    left: Budget,
+    left: ModelBudget,
     pub(super) violation: Option<Violation>,
 }
 
@@ -88,7 +88,7 @@ pub(super) enum Way {
 
 /// What may happen. A process is meant by its number in the order in which they were started.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Step {
+pub(super) enum ModelStep {
     Deliver(usize, Way),
     Lose(usize, Way),
     Duplicate(usize, Way),
@@ -115,7 +115,7 @@ pub(super) enum Step {
     Stray(usize),
 }
 
-impl Step {
+impl ModelStep {
     /// Whether it happens sooner or later when nothing goes wrong any more.
     pub(super) fn is_fair(&self) -> bool {
         matches!(
@@ -133,15 +133,15 @@ impl Step {
     }
 }
 
-impl State {
-    fn process(&mut self, number: usize) -> &mut Process {
+impl ModelState {
+    fn process(&mut self, number: usize) -> &mut ModelProcess {
         let process = self.processes[number].as_mut();
 
         process.unwrap_or_else(|| unreachable!("a step of a process that is gone"))
     }
 
     /// Processes that may still do something, with their numbers.
-    pub(super) fn living(&self) -> impl Iterator<Item = (usize, &Process)> {
+    pub(super) fn living(&self) -> impl Iterator<Item = (usize, &ModelProcess)> {
         self.processes
             .iter()
             .enumerate()
@@ -197,7 +197,7 @@ impl State {
 
 impl Star {
     /// The same within another budget.
-    pub(super) fn with(self, budget: Budget) -> Self {
+    pub(super) fn with(self, budget: ModelBudget) -> Self {
         Self { budget, ..self }
     }
 
@@ -216,11 +216,11 @@ impl Star {
 
     fn feed(
         &self,
-        state: &mut State,
+        state: &mut ModelState,
         number: usize,
-        input: impl FnOnce(&mut Process, Around) -> Option<Violation>,
+        input: impl FnOnce(&mut ModelProcess, Around) -> Option<Violation>,
     ) {
-        let State {
+        let ModelState {
             simulation,
             processes,
             ..
@@ -240,7 +240,7 @@ impl Star {
     /// Feeds the barrier, and carries out what it wants done.
     fn feed_barrier(
         &self,
-        state: &mut State,
+        state: &mut ModelState,
         input: impl FnOnce(&mut Simulator, &mut Vec<Output<Report, Order>>),
     ) {
         let mut out = Vec::new();
@@ -265,7 +265,7 @@ impl Star {
         Self::observe(state);
     }
 
-    fn carry_out(&self, state: &mut State, out: Vec<Output<Report, Order>>) {
+    fn carry_out(&self, state: &mut ModelState, out: Vec<Output<Report, Order>>) {
         for output in out {
             match output {
                 Output::Gathered => state.simulation.next = Some(0),
@@ -298,7 +298,7 @@ impl Star {
     }
 
     /// Where nothing but a hang happens, the scenario alone decides when its robot is lost.
-    fn lost_by_accident(&self, state: &State, membership: &[Membership]) -> Option<Violation> {
+    fn lost_by_accident(&self, state: &ModelState, membership: &[Membership]) -> Option<Violation> {
         let fault = self.scenario?;
         let tick = fault.from + Tick::from(self.lose_after) - 1;
         let is_due = state.simulation.tick == tick && tick < fault.until;
@@ -322,7 +322,7 @@ impl Star {
     }
 
     /// The news each to its robot, then the clock to all, as [`Output::Grant`] wants it.
-    fn put(state: &mut State, news: Vec<(RobotName, IncarnationNotice)>, clock: Clock) {
+    fn put(state: &mut ModelState, news: Vec<(RobotName, IncarnationNotice)>, clock: Clock) {
         let simulation = &mut state.simulation;
         for (name, notice) in news {
             let content = News {
@@ -356,7 +356,7 @@ impl Star {
     }
 
     /// A tick is complete: the end, or the faults before the next one.
-    fn go_on(&self, state: &mut State) {
+    fn go_on(&self, state: &mut ModelState) {
         let Some(next) = state.simulation.next else {
             return;
         };
@@ -390,7 +390,7 @@ impl Star {
     }
 
     /// Whether the robots are as the scenario wants them before this tick.
-    fn is_carried_out(&self, state: &State, tick: Tick) -> bool {
+    fn is_carried_out(&self, state: &ModelState, tick: Tick) -> bool {
         let name = super::name("B");
 
         match self.scenario {
@@ -406,7 +406,7 @@ impl Star {
         self.victim.is_none_or(|victim| victim == robot.as_str())
     }
 
-    fn end(state: &mut State, end: End) {
+    fn end(state: &mut ModelState, end: End) {
         state.barrier.end(end);
         state.simulation.is_over = true;
         state.simulation.is_full |= end == End::Aborted;
@@ -414,7 +414,7 @@ impl Star {
     }
 
     /// What must hold after everything that happens at the simulator.
-    fn observe(state: &mut State) {
+    fn observe(state: &mut ModelState) {
         if !state.barrier.is_open() {
             return;
         }
@@ -431,7 +431,7 @@ impl Star {
     }
 
     /// A message arrived at the simulator.
-    fn receive(&self, state: &mut State, number: usize, message: Up) {
+    fn receive(&self, state: &mut ModelState, number: usize, message: Up) {
         let name = state.process(number).name.clone();
         match message {
             Up::Join => {
@@ -459,7 +459,7 @@ impl Star {
     }
 
     /// A token is declared or undeclared at the router. Tokens of one name are one to the simulator.
-    fn show(&self, state: &mut State, number: usize, is_declared: bool) {
+    fn show(&self, state: &mut ModelState, number: usize, is_declared: bool) {
         let name = state.process(number).name.clone();
         let was_known = Self::is_known(state, &name);
         let process = state.process(number);
@@ -475,35 +475,41 @@ impl Star {
         }
     }
 
-    fn is_known(state: &State, name: &RobotName) -> bool {
+    fn is_known(state: &ModelState, name: &RobotName) -> bool {
         let mut processes = state.processes.iter().flatten();
 
         processes.any(|process| process.name == *name && process.is_known)
     }
 
-    fn start(&self, state: &mut State, name: RobotName) {
+    fn start(&self, state: &mut ModelState, name: RobotName) {
         let around = Around {
             simulation: &state.simulation,
             is_slow: self.is_slow,
             mutant: self.mutant,
         };
-        let (process, violation) = Process::start(name, around);
+        let (process, violation) = ModelProcess::start(name, around);
 
         state.processes.push(Some(process));
         state.note(violation);
     }
 
-    fn steps_of(&self, state: &State, number: usize, process: &Process, steps: &mut Vec<Step>) {
+    fn steps_of(
+        &self,
+        state: &ModelState,
+        number: usize,
+        process: &ModelProcess,
+        steps: &mut Vec<ModelStep>,
+    ) {
         let left = &state.left;
 
         if let Some(message) = process.up.front() {
-            steps.push(Step::Deliver(number, Way::Up));
+            steps.push(ModelStep::Deliver(number, Way::Up));
             let is_token = matches!(message, Up::Token(_));
             if left.losses > 0 && !is_token {
-                steps.push(Step::Lose(number, Way::Up));
+                steps.push(ModelStep::Lose(number, Way::Up));
             }
             if left.duplicates > 0 && !is_token && *message != Up::Join {
-                steps.push(Step::Duplicate(number, Way::Up));
+                steps.push(ModelStep::Duplicate(number, Way::Up));
             }
         }
 
@@ -513,73 +519,73 @@ impl Star {
 
         if process.is_connected && self.may_strike(&process.name) {
             if left.cuts > 0 {
-                steps.push(Step::Cut(number));
+                steps.push(ModelStep::Cut(number));
             }
             if left.blips > 0 && !(process.up.is_empty() && process.down.is_empty()) {
-                steps.push(Step::Blip(number));
+                steps.push(ModelStep::Blip(number));
             }
         }
         if left.strays > 0 && process.is_connected {
-            steps.push(Step::Stray(number));
+            steps.push(ModelStep::Stray(number));
         }
         if process.is_unnoticed {
-            steps.push(Step::Notice(number));
+            steps.push(ModelStep::Notice(number));
         }
 
         if process.is_stopped {
             if left.lapses > 0 && process.is_connected {
-                steps.push(Step::Lapse(number));
+                steps.push(ModelStep::Lapse(number));
             }
             return;
         }
 
         if !process.is_connected {
-            steps.push(Step::Heal(number));
+            steps.push(ModelStep::Heal(number));
         }
         if let Some(message) = process.down.front() {
-            steps.push(Step::Deliver(number, Way::Down));
+            steps.push(ModelStep::Deliver(number, Way::Down));
             if left.losses > 0 {
-                steps.push(Step::Lose(number, Way::Down));
+                steps.push(ModelStep::Lose(number, Way::Down));
             }
             if left.duplicates > 0 && !matches!(message, Down::Answer(_)) {
-                steps.push(Step::Duplicate(number, Way::Down));
+                steps.push(ModelStep::Duplicate(number, Way::Down));
             }
         }
 
         if process.running.is_some() {
-            steps.push(Step::Done(number));
+            steps.push(ModelStep::Done(number));
         }
         if process.is_unanswered() {
-            steps.push(Step::Unanswered(number));
+            steps.push(ModelStep::Unanswered(number));
         }
         if process.asks_again && process.is_connected {
-            steps.push(Step::AskAgain(number));
+            steps.push(ModelStep::AskAgain(number));
         }
         if left.crashes > 0 && self.may_strike(&process.name) {
-            steps.push(Step::Crash(number));
+            steps.push(ModelStep::Crash(number));
         }
     }
 
-    fn steps_of_simulator(&self, state: &State, steps: &mut Vec<Step>) {
+    fn steps_of_simulator(&self, state: &ModelState, steps: &mut Vec<ModelStep>) {
         let left = &state.left;
         let may_fire = state.is_quiet() || left.early > 0;
 
         if state.barrier.is_open() && may_fire {
-            steps.push(Step::Fire(Timer::Repeat));
+            steps.push(ModelStep::Fire(Timer::Repeat));
             if self.on_late != OnLate::Wait {
-                steps.push(Step::Fire(Timer::Deadline));
+                steps.push(ModelStep::Fire(Timer::Deadline));
             }
         }
         if state.simulation.next.is_some() && may_fire {
-            steps.push(Step::RepeatBetween);
+            steps.push(ModelStep::RepeatBetween);
         }
         if may_fire {
             let timers = state.reserved.iter().cloned().map(Timer::Token);
-            steps.extend(timers.map(Step::Fire));
+            steps.extend(timers.map(ModelStep::Fire));
         }
 
         if left.inits > 0 {
-            steps.push(Step::Init);
+            steps.push(ModelStep::Init);
         }
 
         let tick = state.simulation.next.unwrap_or(state.simulation.tick);
@@ -592,26 +598,26 @@ impl Star {
             };
             let is_stopped = self.has_fault(tick) && name.as_str() == "B";
             if may_start && !is_stopped {
-                steps.push(Step::Start(name.clone()));
+                steps.push(ModelStep::Start(name.clone()));
             }
         }
     }
 
-    fn take(&self, state: &mut State, step: Step) {
+    fn take(&self, state: &mut ModelState, step: ModelStep) {
         match step {
-            Step::Deliver(number, Way::Up) => {
+            ModelStep::Deliver(number, Way::Up) => {
                 if let Some(message) = state.process(number).up.pop_front() {
                     self.receive(state, number, message);
                 }
             }
-            Step::Deliver(number, Way::Down) => {
+            ModelStep::Deliver(number, Way::Down) => {
                 if let Some(message) = state.process(number).down.pop_front() {
                     self.feed(state, number, |process, around| {
                         process.receive(message, around)
                     });
                 }
             }
-            Step::Lose(number, way) => {
+            ModelStep::Lose(number, way) => {
                 state.left.losses -= 1;
                 let process = state.process(number);
                 match way {
@@ -619,7 +625,7 @@ impl Star {
                     Way::Down => drop(process.down.pop_front()),
                 }
             }
-            Step::Duplicate(number, way) => {
+            ModelStep::Duplicate(number, way) => {
                 state.left.duplicates -= 1;
                 let process = state.process(number);
                 match way {
@@ -627,8 +633,8 @@ impl Star {
                     Way::Down => process.down.push_back(process.down[0].clone()),
                 }
             }
-            Step::Done(number) => self.feed(state, number, Process::finish),
-            Step::AskAgain(number) => {
+            ModelStep::Done(number) => self.feed(state, number, ModelProcess::finish),
+            ModelStep::AskAgain(number) => {
                 state.process(number).asks_again = false;
                 self.feed(state, number, |process, around| {
                     process.feed(around, |robot, out| {
@@ -636,38 +642,38 @@ impl Star {
                     })
                 });
             }
-            Step::Unanswered(number) => {
+            ModelStep::Unanswered(number) => {
                 state.process(number).is_asking = false;
                 self.feed(state, number, |process, around| {
-                    process.feed(around, Robot::unanswered)
+                    process.feed(around, MaybeWrongRobot::unanswered)
                 });
             }
-            Step::Cut(number) => {
+            ModelStep::Cut(number) => {
                 state.left.cuts -= 1;
                 let process = state.process(number);
                 process.clear_link();
                 process.is_connected = false;
                 self.show(state, number, false);
             }
-            Step::Blip(number) => {
+            ModelStep::Blip(number) => {
                 state.left.blips -= 1;
                 let process = state.process(number);
                 process.clear_link();
                 process.heal();
             }
-            Step::Lapse(number) => {
+            ModelStep::Lapse(number) => {
                 state.left.lapses -= 1;
                 let process = state.process(number);
                 process.clear_link();
                 process.is_connected = false;
                 process.is_unnoticed = process.is_known;
             }
-            Step::Notice(number) => {
+            ModelStep::Notice(number) => {
                 state.process(number).is_unnoticed = false;
                 self.show(state, number, false);
             }
-            Step::Heal(number) => state.process(number).heal(),
-            Step::Stray(number) => {
+            ModelStep::Heal(number) => state.process(number).heal(),
+            ModelStep::Stray(number) => {
                 state.left.strays -= 1;
                 let clock = Clock {
                     epoch: state.simulation.epoch + 1,
@@ -675,7 +681,7 @@ impl Star {
                 };
                 state.process(number).down.push_back(Down::Clock(clock));
             }
-            Step::Crash(number) => {
+            ModelStep::Crash(number) => {
                 state.left.crashes -= 1;
                 state.process(number).end();
             }
@@ -683,7 +689,7 @@ impl Star {
         }
 
         for process in &mut state.processes {
-            if process.as_ref().is_some_and(Process::is_gone) {
+            if process.as_ref().is_some_and(ModelProcess::is_gone) {
                 *process = None;
             }
         }
@@ -692,9 +698,9 @@ impl Star {
         }
     }
 
-    fn take_at_simulator(&self, state: &mut State, step: Step) {
+    fn take_at_simulator(&self, state: &mut ModelState, step: ModelStep) {
         match step {
-            Step::Start(name) => {
+            ModelStep::Start(name) => {
                 match state.kin(&name) {
                     Kin::None => {}
                     Kin::CutOff => state.left.successors -= 1,
@@ -703,7 +709,7 @@ impl Star {
 
                 self.start(state, name);
             }
-            Step::Fire(timer) => {
+            ModelStep::Fire(timer) => {
                 if !state.is_quiet() {
                     state.left.early -= 1;
                 }
@@ -714,13 +720,13 @@ impl Star {
 
                 self.feed_barrier(state, |barrier, out| barrier.timer(&timer, out));
             }
-            Step::RepeatBetween => {
+            ModelStep::RepeatBetween => {
                 if !state.is_quiet() {
                     state.left.early -= 1;
                 }
                 self.feed_barrier(state, Simulator::repeat);
             }
-            Step::Init => {
+            ModelStep::Init => {
                 state.left.inits -= 1;
                 state.simulation.begin_epoch();
                 let epoch: Epoch = state.simulation.epoch;
@@ -738,12 +744,12 @@ impl Star {
 }
 
 impl Model for Star {
-    type State = State;
-    type Action = Step;
+    type State = ModelState;
+    type Action = ModelStep;
 
-    fn init_states(&self) -> Vec<State> {
+    fn init_states(&self) -> Vec<ModelState> {
         let roster = [super::name("A"), super::name("B")];
-        let mut state = State {
+        let mut state = ModelState {
             barrier: Simulator::new(roster.clone(), self.lateness(), self.mutant),
             simulation: Simulation::new(&roster),
             processes: Vec::new(),
@@ -763,14 +769,14 @@ impl Model for Star {
             self.actions(&state, &mut steps);
             let delivery = steps
                 .drain(..)
-                .find(|step| matches!(step, Step::Deliver(..)));
+                .find(|step| matches!(step, ModelStep::Deliver(..)));
             let Some(delivery) = delivery else { break };
             self.take(&mut state, delivery);
         }
         vec![state]
     }
 
-    fn actions(&self, state: &State, steps: &mut Vec<Step>) {
+    fn actions(&self, state: &ModelState, steps: &mut Vec<ModelStep>) {
         if state.simulation.is_over || state.violation.is_some() {
             return;
         }
@@ -782,7 +788,7 @@ impl Model for Star {
         self.steps_of_simulator(state, steps);
     }
 
-    fn next_state(&self, state: &State, step: Step) -> Option<State> {
+    fn next_state(&self, state: &ModelState, step: ModelStep) -> Option<ModelState> {
         let mut next = state.clone();
         self.take(&mut next, step);
 
@@ -791,8 +797,8 @@ impl Model for Star {
 
     fn properties(&self) -> Vec<Property<Self>> {
         vec![
-            Property::always(SAFE, |_, state: &State| state.violation.is_none()),
-            Property::sometimes(ENDS, |_, state: &State| state.simulation.is_over),
+            Property::always(SAFE, |_, state: &ModelState| state.violation.is_none()),
+            Property::sometimes(ENDS, |_, state: &ModelState| state.simulation.is_over),
         ]
     }
 }

@@ -6,7 +6,7 @@ use protocol::Tick;
 use protocol::event::Cause;
 
 use crate::diagram::items::{Command, CommandEnd, Items, QueriesLost};
-use crate::diagram::picture::{OUTSIDE_PX, Picture, Place};
+use crate::diagram::picture::{LabelPosition, OUTSIDE_PX, Picture};
 use crate::diagram::words;
 use crate::labels::{Area, shortened};
 use crate::shapes::Point;
@@ -41,7 +41,7 @@ struct Route {
 }
 
 /// A label that is placed after all lines are known.
-pub(crate) struct Wanted<'a> {
+pub(crate) struct PendingLabel<'a> {
     command: &'a Command,
     /// The line beside which the text is put.
     beside: [Point; 2],
@@ -49,7 +49,7 @@ pub(crate) struct Wanted<'a> {
 }
 
 /// Draws the commands, in the order in which they were sent. Returns the labels that are to be placed.
-pub(crate) fn draw_commands<'a>(picture: &mut Picture, items: &'a Items) -> Vec<Wanted<'a>> {
+pub(crate) fn draw_commands<'a>(picture: &mut Picture, items: &'a Items) -> Vec<PendingLabel<'a>> {
     let mut commands: Vec<&Command> = items.commands.iter().collect();
     commands.sort_by_key(|command| (command.sent, &command.from, command.seq));
 
@@ -65,7 +65,7 @@ fn draw_command<'a>(
     picture: &mut Picture,
     command: &'a Command,
     waits: &mut Waits,
-) -> Option<Wanted<'a>> {
+) -> Option<PendingLabel<'a>> {
     let route = route(picture, command, waits)?;
     let is_lost = command.is_lost();
     let is_over = command.ends.len() == command.copies() || is_lost;
@@ -104,7 +104,7 @@ fn draw_command<'a>(
         [first, .., last] => [first, last],
         _ => [*route.wait.first()?, *route.wait.last()?],
     };
-    Some(Wanted {
+    Some(PendingLabel {
         command,
         beside,
         breaks: route.breaks,
@@ -306,13 +306,13 @@ fn add_ends(route: &mut Route, command: &Command, turn: Point, end: Point, down:
 }
 
 /// Places the texts of commands, and why they were lost.
-pub(crate) fn place_labels(picture: &mut Picture, wanted: &[Wanted<'_>]) {
+pub(crate) fn place_labels(picture: &mut Picture, wanted: &[PendingLabel<'_>]) {
     for label in wanted {
         place_label(picture, label);
     }
 }
 
-fn place_label(picture: &mut Picture, wanted: &Wanted<'_>) {
+fn place_label(picture: &mut Picture, wanted: &PendingLabel<'_>) {
     let tick = wanted.command.sent;
     let text = shortened(&wanted.command.text, LABEL_LETTERS);
     let performative = wanted.command.performative.name();
@@ -326,21 +326,21 @@ fn place_label(picture: &mut Picture, wanted: &Wanted<'_>) {
     for ((x, y), because) in &wanted.breaks {
         let mut places = Vec::new();
         for middle in [*y, *y + 12.0, *y - 12.0] {
-            places.push(Place::After(x + 8.0, middle));
-            places.push(Place::Before(x - 8.0, middle));
+            places.push(LabelPosition::After(x + 8.0, middle));
+            places.push(LabelPosition::Before(x - 8.0, middle));
         }
         picture.label("reason", tick, words::cause(*because), &places);
     }
 }
 
 /// Places for a label beside a line.
-fn beside([from, to]: [Point; 2]) -> Vec<Place> {
+fn beside([from, to]: [Point; 2]) -> Vec<LabelPosition> {
     let mut places = Vec::new();
     for distance in [6.0, 14.0] {
         for share in [0.5, 0.35, 0.65, 0.22, 0.78] {
             let (x, y) = at_share(from, to, share);
-            places.push(Place::After(x + distance, y));
-            places.push(Place::Before(x - distance, y));
+            places.push(LabelPosition::After(x + distance, y));
+            places.push(LabelPosition::Before(x - distance, y));
         }
     }
     places

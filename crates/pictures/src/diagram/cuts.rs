@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use protocol::Tick;
 
 use crate::diagram::items::{Cut, Items, Period};
-use crate::diagram::picture::{Picture, Place};
+use crate::diagram::picture::{LabelPosition, Picture};
 use crate::labels::width_px;
 use crate::shapes::LABEL_PX;
 
@@ -64,7 +64,8 @@ fn draw_area(picture: &mut Picture, above: usize, period: Period, cuts: &[&Cut])
         _ => format!("{} links cut", cuts.len()),
     };
     if width_px(&text, LABEL_PX) + 8.0 <= width {
-        let places = [top + 8.0, bottom - 8.0].map(|middle| Place::After(left + 4.0, middle));
+        let places =
+            [top + 8.0, bottom - 8.0].map(|middle| LabelPosition::After(left + 4.0, middle));
         picture.label("reason", period.begin, text, &places);
     }
 }

@@ -56,7 +56,7 @@ struct Label {
 
 /// A place for a label: its left or its right end, and its middle.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Place {
+pub(crate) enum LabelPosition {
     After(f64, f64),
     Before(f64, f64),
 }
@@ -156,7 +156,7 @@ impl Picture {
         class: &'static str,
         tick: Tick,
         text: impl Into<String>,
-        places: &[Place],
+        places: &[LabelPosition],
     ) {
         self.label_with_prefix(class, tick, "", text.into(), places);
     }
@@ -168,7 +168,7 @@ impl Picture {
         tick: Tick,
         prefix: &'static str,
         text: String,
-        places: &[Place],
+        places: &[LabelPosition],
     ) -> bool {
         let mut width = width_px(&text, LABEL_PX);
         if !prefix.is_empty() {
@@ -177,8 +177,8 @@ impl Picture {
         let mut candidates = Vec::new();
         for place in places {
             candidates.push(match *place {
-                Place::After(left, middle) => Area::after(left, middle, width),
-                Place::Before(right, middle) => Area::before(right, middle, width),
+                LabelPosition::After(left, middle) => Area::after(left, middle, width),
+                LabelPosition::Before(right, middle) => Area::before(right, middle, width),
             });
         }
 

@@ -5,7 +5,7 @@ use protocol::{RobotName, Tick};
 use crate::diagram::changes;
 use crate::diagram::items::{Band, BandKind, Items};
 use crate::diagram::lanes::{BEHAVIOR_PX, EMOTION_PX, STRIP_PX};
-use crate::diagram::picture::{Picture, Place};
+use crate::diagram::picture::{LabelPosition, Picture};
 use crate::diagram::words::fault_name;
 use crate::labels::{shortened, width_px};
 use crate::palette::state_class;
@@ -137,7 +137,10 @@ fn draw_joined(picture: &mut Picture, items: &Items) {
             Some(generation) => format!("back ({generation})"),
             None => "joins".to_owned(),
         };
-        let places = [Place::After(x + 6.0, base), Place::Before(x - 6.0, base)];
+        let places = [
+            LabelPosition::After(x + 6.0, base),
+            LabelPosition::Before(x - 6.0, base),
+        ];
         picture.label("mark", joined.tick, text, &places);
     }
 }
@@ -195,9 +198,9 @@ fn mark(picture: &mut Picture, robot: &RobotName, left: f64, tick: Tick, text: &
 
     let mut places = Vec::new();
     for middle in [lane.top - 8.0, lane.top - 21.0] {
-        places.push(Place::After(left, middle));
-        places.push(Place::After(left + 34.0, middle));
-        places.push(Place::Before(left - 4.0, middle));
+        places.push(LabelPosition::After(left, middle));
+        places.push(LabelPosition::After(left + 34.0, middle));
+        places.push(LabelPosition::Before(left - 4.0, middle));
     }
     picture.label("mark", tick, text, &places);
 }

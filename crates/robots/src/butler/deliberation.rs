@@ -56,7 +56,7 @@ impl Default for Deliberation {
 /// What he can do while he is FRUSTRATED.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub(super) enum Plan {
+pub(super) enum FrustratedPlan {
     /// To meet the refiller.
     Intercept,
     /// To serve what is left, wherever that leads him.
@@ -65,7 +65,7 @@ pub(super) enum Plan {
     WaitAtStart,
 }
 
-impl Plan {
+impl FrustratedPlan {
     /// The name under which it is published.
     pub(super) fn name(self) -> &'static str {
         match self {
@@ -99,14 +99,14 @@ pub(super) struct Mind {
     /// Whether the refiller was near or came nearer in the last tick.
     was_encouraged: bool,
     plan: Option<ActivePlan>,
-    memory: Memory<StandardEmotion, Plan>,
+    memory: Memory<StandardEmotion, FrustratedPlan>,
 }
 
 /// A plan that he follows.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ActivePlan {
-    plan: Plan,
+    plan: FrustratedPlan,
     /// His emotion when he chose it.
     emotion: StandardEmotion,
     /// Time for which he has followed it.
@@ -147,7 +147,7 @@ impl Mind {
     }
 
     /// The plan that he follows, if any.
-    pub(super) fn plan(&self) -> Option<Plan> {
+    pub(super) fn plan(&self) -> Option<FrustratedPlan> {
         self.plan.map(|planned| planned.plan)
     }
 }
@@ -231,7 +231,8 @@ impl Deliberator {
         let is_frustrated = feeling.emotion == StandardEmotion::Frustrated;
         if let Some(planned) = &mut mind.plan {
             planned.lasted_s += dt_s;
-            let is_possible = planned.plan != Plan::Intercept || prospects.intercept_s.is_some();
+            let is_possible =
+                planned.plan != FrustratedPlan::Intercept || prospects.intercept_s.is_some();
             if is_frustrated && is_possible && planned.lasted_s < self.parameters.plan_s {
                 return;
             }
@@ -248,7 +249,7 @@ impl Deliberator {
 
     fn choose(
         &self,
-        memory: &Memory<StandardEmotion, Plan>,
+        memory: &Memory<StandardEmotion, FrustratedPlan>,
         abandoned: u32,
         feeling: Feeling<StandardEmotion>,
         prospects: &Prospects,
@@ -264,14 +265,14 @@ impl Deliberator {
                 self.outcome(1.0 - probability, in_vain),
             ];
             let tendency = Some(ActionTendency::ChangeCurrentStrategy);
-            candidates.push(candidate(Plan::Intercept, tendency, outcomes));
+            candidates.push(candidate(FrustratedPlan::Intercept, tendency, outcomes));
         }
 
         let taken = prospects.rate_per_s * self.parameters.plan_s;
         let treats = (prospects.treats - taken).max(0.0);
         let serving = [
-            (Plan::ServeOn, prospects.serve_on_s),
-            (Plan::WaitAtStart, prospects.wait_at_start_s),
+            (FrustratedPlan::ServeOn, prospects.serve_on_s),
+            (FrustratedPlan::WaitAtStart, prospects.wait_at_start_s),
         ];
         for (plan, arrival_s) in serving {
             let felt = self.anticipated(treats, arrival_s, prospects);
@@ -318,7 +319,10 @@ impl Deliberator {
     /// A plan takes the place of the action tendency of FRUSTRATED. HOPEFUL inclines him to approach.
     pub(super) fn urge(&self, emotion: StandardEmotion, mind: &Mind, need: bool) -> Urge {
         match (emotion, mind.plan()) {
-            (StandardEmotion::Frustrated, Some(Plan::ServeOn | Plan::WaitAtStart)) => Urge::Hurry,
+            (
+                StandardEmotion::Frustrated,
+                Some(FrustratedPlan::ServeOn | FrustratedPlan::WaitAtStart),
+            ) => Urge::Hurry,
             (StandardEmotion::Hopeful, _) if need => Urge::Intercept,
             _ => Urge::of(emotion),
         }
@@ -326,10 +330,10 @@ impl Deliberator {
 }
 
 fn candidate(
-    plan: Plan,
+    plan: FrustratedPlan,
     tendency: Option<ActionTendency>,
     outcomes: Vec<Outcome>,
-) -> Candidate<Plan> {
+) -> Candidate<FrustratedPlan> {
     match Candidate::new(plan, tendency, outcomes) {
         Ok(candidate) => candidate,
         Err(error) => unreachable!("the probabilities of {plan:?} add up to 1: {error}"),

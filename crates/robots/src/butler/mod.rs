@@ -31,8 +31,8 @@ use crate::frame::{self, publish};
 use crate::panel;
 use crate::policy::{Policy, Urge};
 use crate::published::text;
-use deliberation::{Deliberator, Plan, Prospects};
-use state::State;
+use deliberation::{Deliberator, FrustratedPlan, Prospects};
+use state::ButlerMemory;
 
 const JOKES: &[&str] = &[
     "I would tell you one about the canapes, but somebody took it.",
@@ -47,14 +47,14 @@ pub struct Butler {
     emotion: Emotion<DynamicGenerator<Measures, Behavior, StandardEmotion>>,
     bsg: BehaviorGenerator<Behavior, Context, Act>,
     deliberator: Deliberator,
-    state: State,
+    state: ButlerMemory,
 }
 
 /// Everything that changes in Butler: restored from it, he continues identically.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Saved {
-    state: State,
+    state: ButlerMemory,
     emotion: EmotionState<StandardEmotion>,
     behavior: BehaviorState<Behavior>,
 }
@@ -163,7 +163,7 @@ impl Butler {
     pub fn new(parameters: Parameters) -> Result<Self, String> {
         parameters.check()?;
 
-        let state = State::new(&parameters).map_err(|error| error.to_string())?;
+        let state = ButlerMemory::new(&parameters).map_err(|error| error.to_string())?;
         let dynamics = Dynamics::standard(&parameters.dynamics, parameters.caution)
             .map_err(|error| error.to_string())?;
         let deliberator = Deliberator::new(
@@ -587,7 +587,7 @@ impl Butler {
     /// The motion that his behavior wants.
     fn drive(&mut self, cars: &mut Cars<'_>) -> Action {
         match self.behavior() {
-            Behavior::Serve if self.state.mind.plan() == Some(Plan::WaitAtStart) => {
+            Behavior::Serve if self.state.mind.plan() == Some(FrustratedPlan::WaitAtStart) => {
                 self.go_to_start(cars, self.parameters.v_serve_mps)
             }
             Behavior::Serve => self.wander(cars, self.parameters.v_serve_mps),

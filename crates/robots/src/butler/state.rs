@@ -22,7 +22,7 @@ use crate::published::{count, flag, location, number, saturated, text};
 /// Butler's memory.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct State {
+pub(super) struct ButlerMemory {
     pub(super) start: Point,
     /// The location of the refiller's table, from an earlier incarnation.
     pub(super) table: Option<Point>,
@@ -72,7 +72,7 @@ pub(super) struct State {
     pub(super) valences: VecDeque<f64>,
 }
 
-impl State {
+impl ButlerMemory {
     pub(super) fn new(parameters: &Parameters) -> Result<Self, ParameterError> {
         Ok(Self {
             start: Point::default(),

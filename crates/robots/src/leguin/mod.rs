@@ -27,7 +27,7 @@ use crate::frame::{self, publish};
 use crate::panel;
 use crate::policy::Policy;
 use crate::published::{flag, text};
-use state::State;
+use state::LeguinMemory;
 
 const JOKES: &[&str] = &[
     "Waiting is easy. I have it in my state table.",
@@ -42,14 +42,14 @@ pub struct Leguin {
     emotion: Emotion<RuleGenerator<Measures, Behavior, StandardEmotion>>,
     bsg: BehaviorGenerator<Behavior, Context, Act>,
     haste: SensoryMotor,
-    state: State,
+    state: LeguinMemory,
 }
 
 /// Everything that changes in Leguin: restored from it, she continues identically.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Saved {
-    state: State,
+    state: LeguinMemory,
     feeling: Feeling<StandardEmotion>,
     behavior: BehaviorState<Behavior>,
 }
@@ -154,7 +154,7 @@ impl Leguin {
             emotion: Emotion::new(parameters.affect, parameters.script.clone(), esg),
             bsg: BehaviorGenerator::new(TABLE, Behavior::Wait),
             haste,
-            state: State::new(&parameters),
+            state: LeguinMemory::new(&parameters),
             parameters,
         })
     }

@@ -17,7 +17,7 @@ use crate::published::{count, flag, location, text};
 /// Leguin's memory.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct State {
+pub(super) struct LeguinMemory {
     /// Where she stands.
     pub(super) at: Point,
     /// Her place at the table.
@@ -44,7 +44,7 @@ pub(super) struct State {
     pub(super) jokes: Jokes,
 }
 
-impl State {
+impl LeguinMemory {
     pub(super) fn new(parameters: &Parameters) -> Self {
         Self {
             at: Point::default(),
