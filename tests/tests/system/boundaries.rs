@@ -245,7 +245,7 @@ fn each_program_contains_its_own_crates_and_no_others() {
         &["world", "simulator", "scenario", "record", "lab", "launch"][..],
     );
     let console = (
-        &["diagram", "bus"][..],
+        &["pictures", "bus"][..],
         &["world", "simulator", "robots", "affect", "lab", "launch"][..],
     );
     let simulator = (

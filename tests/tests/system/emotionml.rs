@@ -160,7 +160,7 @@ fn assert_terms_are_known(document: &Document) {
 }
 
 #[test]
-fn documents_are_valid_and_have_what_the_record_has() {
+fn t24_documents_are_valid_and_have_what_the_record_has() {
     let lab = Lab::new();
     let akr = "robot.Butler.params.dynamics.state_set=akr4";
     for (run, changes) in [
