@@ -1055,8 +1055,9 @@ fn a_run_that_ended_before_tick_0_is_whole() {
         .spawn()
         .unwrap();
     let folder = lab.out().join("early");
-    eventually("the record", || {
-        folder.join("run.mcap").exists().then_some(())
+    // It is written after the signal's handler is there.
+    eventually("the endpoint", || {
+        folder.join("endpoint").exists().then_some(())
     });
     let pid = nix::unistd::Pid::from_raw(i32::try_from(simulator.id()).unwrap());
     nix::sys::signal::kill(pid, nix::sys::signal::Signal::SIGTERM).unwrap();
