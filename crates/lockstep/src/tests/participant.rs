@@ -422,6 +422,10 @@ fn a_clock_of_the_epoch_before_is_not_run_as_one_of_the_next() {
 
     assert_eq!(out, []);
     assert!(!robot.is_interrupted());
+    robot.clock(clock(1, 2), &mut out);
+    assert_eq!(out, []);
+    robot.clock(clock(2, 0), &mut out);
+    assert_eq!(out, [run(2, 0, Begin::Init)]);
 }
 
 #[test]

@@ -1,6 +1,11 @@
-//! States of robots, and queries for them.
+//! States of robots, queries for them, and messages of the contract.
 
-use crate::{NoState, StateQuery, States};
+use std::collections::BTreeMap;
+
+use protocol::messages::{CommandText, News, Performative};
+
+use super::{joined, name};
+use crate::{Answer, Bulletin, IncarnationNotice, NoState, Sent, StateQuery, States};
 
 #[test]
 fn the_last_two_states_are_kept() {
@@ -57,4 +62,52 @@ fn a_query_is_read_from_its_parameters() {
     assert_eq!(read(None, None), Ok(StateQuery::default()));
     let wrong = Err("parameter epoch: not a whole number".to_owned());
     assert_eq!(read(None, Some("-1")), wrong);
+}
+
+#[test]
+fn commands_are_numbered_in_their_order() {
+    let sent = |to: &str, command: &str| Sent {
+        to: name(to),
+        command: CommandText {
+            performative: Performative::default(),
+            command: command.to_owned(),
+        },
+    };
+    let commands = vec![sent("B", "first"), sent("C", "second")];
+    let answer = Answer {
+        epoch: 1,
+        tick: 7,
+        generation: 2,
+        commands: commands.clone(),
+        state: (),
+        report: (),
+    };
+
+    let put: Vec<_> = answer.commands_from(1).collect();
+
+    let stamps = put
+        .iter()
+        .map(|(_, put)| (put.epoch, put.tick, put.generation, put.number));
+    assert!(stamps.eq([(1, 7, 2, 1), (1, 7, 2, 2)]));
+    let arrived = put.into_iter().map(|(to, put)| Sent::new(to.clone(), put));
+    assert!(arrived.eq(commands));
+}
+
+#[test]
+fn news_name_incarnations() {
+    let news = News {
+        joined: Some(2),
+        rejoin: Some(1),
+        ..News::default()
+    };
+    let notice = IncarnationNotice {
+        rejoin: Some(1),
+        ..joined(2)
+    };
+    assert_eq!(IncarnationNotice::from(&news), notice);
+
+    let bulletin = BTreeMap::from([(name("A"), "news")]);
+    assert_eq!(bulletin.robots(), [name("A")].into());
+    assert_eq!(bulletin.compose(&name("A"), joined(1)), "news");
+    assert_eq!(bulletin.compose(&name("B"), joined(1)), "");
 }
