@@ -26,19 +26,6 @@ pub(super) fn frame(simulation: &Simulation, status: &Status) -> WorldFrame {
     }
 
     WorldFrame {
-        run: status.run.clone(),
-        epoch: status.epoch,
-        tick: status.tick,
-        time_s: status.time_s,
-        duration_s: status.duration_s,
-        tick_s: scenario.tick_s,
-        seed: status.seed,
-        replay_of: None,
-        speed: status.speed,
-        phase: status.phase,
-        awaiting: status.awaiting.clone(),
-        field_m: scenario.field_m,
-        body_m: scenario.body_m,
         robots,
         // In whole millimeters, as in the recording: a tick looks the same live and recorded.
         guests: world
@@ -51,10 +38,36 @@ pub(super) fn frame(simulation: &Simulation, status: &Status) -> WorldFrame {
             .iter()
             .map(|obstacle| [obstacle.x, obstacle.y])
             .collect(),
-        flights: Vec::new(),
         cuts: simulation.cuts(),
         faults: simulation.held_processes(&late),
         expectations: simulation.standings(),
+        ..empty_frame(status, scenario.field_m, scenario.body_m)
+    }
+}
+
+/// A frame of how things stand, with nothing on the field.
+pub(super) fn empty_frame(status: &Status, field_m: [f64; 2], body_m: f64) -> WorldFrame {
+    WorldFrame {
+        run: status.run.clone(),
+        epoch: status.epoch,
+        tick: status.tick,
+        time_s: status.time_s,
+        duration_s: status.duration_s,
+        tick_s: status.tick_s,
+        seed: status.seed,
+        replay_of: status.replay_of.clone(),
+        speed: status.speed,
+        phase: status.phase,
+        awaiting: status.awaiting.clone(),
+        field_m,
+        body_m,
+        robots: Vec::new(),
+        guests: Vec::new(),
+        obstacles: Vec::new(),
+        flights: Vec::new(),
+        cuts: Vec::new(),
+        faults: Vec::new(),
+        expectations: Vec::new(),
     }
 }
 

@@ -7,6 +7,8 @@ use protocol::messages::{LogRecord, Panel, PublicState, RobotFrame, Status, Worl
 use protocol::{Event, RobotName, Tick};
 use recording::{Header, LastReports, PlacedRobot, RecordedTick, Recording, RecordingError, Ticks};
 
+use super::frame::empty_frame;
+
 /// A recording, and the tick of it that is shown.
 pub(super) struct Player {
     ticks: Ticks,
@@ -142,26 +144,12 @@ impl Player {
         }
 
         WorldFrame {
-            run: status.run.clone(),
-            epoch: status.epoch,
-            tick: status.tick,
-            time_s: status.time_s,
-            duration_s: status.duration_s,
-            tick_s: header.tick_s,
-            seed: status.seed,
-            replay_of: status.replay_of.clone(),
-            speed: status.speed,
-            phase: status.phase,
-            awaiting: status.awaiting.clone(),
-            field_m: header.field_m,
-            body_m: header.body_m,
             robots: self.shown.robots.clone(),
             guests,
             obstacles: header.obstacles.clone(),
-            flights: Vec::new(),
             cuts: frame.cuts.clone(),
-            faults: Vec::new(),
             expectations: frame.standings(self.events()),
+            ..empty_frame(status, header.field_m, header.body_m)
         }
     }
 }
