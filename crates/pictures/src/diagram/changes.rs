@@ -6,9 +6,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use protocol::Tick;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
+use timeline::Change;
 use toml::Table;
-
-use crate::diagram::items::Change;
 
 /// Most letters of a label; the title has everything.
 const MAX_LETTERS: usize = 48;

@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 
 use protocol::Tick;
 use protocol::event::Cause;
+use timeline::{Command, CommandEnd, QueriesLost};
 
-use crate::diagram::items::{Command, CommandEnd, Items, QueriesLost};
+use crate::diagram::items::Items;
 use crate::diagram::picture::{LabelPosition, OUTSIDE_PX, Picture};
 use crate::diagram::words;
 use crate::labels::{Area, shortened};

@@ -3,8 +3,9 @@
 use std::collections::BTreeSet;
 
 use protocol::Tick;
+use timeline::{Cut, Period};
 
-use crate::diagram::items::{Cut, Items, Period};
+use crate::diagram::items::Items;
 use crate::diagram::picture::{LabelPosition, Picture};
 use crate::labels::width_px;
 use crate::shapes::LABEL_PX;

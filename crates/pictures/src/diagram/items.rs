@@ -3,10 +3,8 @@
 use protocol::Tick;
 use protocol::messages::Awaited;
 
-use timeline::Span;
-pub(crate) use timeline::{
-    Absence, Change, Command, CommandEnd, Cut, Fault, Joined, Kind as BandKind, Missed, Period,
-    QueriesLost, Stay as Band,
+use timeline::{
+    Absence, Change, Command, Cut, Fault, Joined, Missed, Period, QueriesLost, Span, Stay,
 };
 
 /// A tick for which the clock was held.
@@ -19,7 +17,7 @@ pub(crate) struct HeldUp {
 /// Everything in a window.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Items {
-    pub(crate) bands: Vec<Band>,
+    pub(crate) bands: Vec<Stay>,
     pub(crate) commands: Vec<Command>,
     pub(crate) cuts: Vec<Cut>,
     pub(crate) faults: Vec<Fault>,

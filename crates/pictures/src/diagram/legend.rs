@@ -1,8 +1,9 @@
 //! Draws the legend: signs and colors that the window has.
 
 use std::collections::BTreeSet;
+use timeline::{Command, Kind};
 
-use crate::diagram::items::{BandKind, Command, Items};
+use crate::diagram::items::Items;
 use crate::diagram::picture::{CAPTION_PX, Picture, Window};
 use crate::labels::{in_rows, shortened, width_px};
 use crate::markup::Markup;
@@ -95,12 +96,12 @@ pub(crate) fn draw_legend(picture: &mut Picture, items: &Items) -> f64 {
             (signs[index].1)(svg, x, y - 3.5);
         },
     );
-    let y = draw_colors(picture, items, BandKind::Emotion, "emotion", y);
-    draw_colors(picture, items, BandKind::Behavior, "behavior", y) - 4.0
+    let y = draw_colors(picture, items, Kind::Emotion, "emotion", y);
+    draw_colors(picture, items, Kind::Behavior, "behavior", y) - 4.0
 }
 
 /// Draws the colors of the states of a kind; returns where the next entries are.
-fn draw_colors(picture: &mut Picture, items: &Items, kind: BandKind, caption: &str, y: f64) -> f64 {
+fn draw_colors(picture: &mut Picture, items: &Items, kind: Kind, caption: &str, y: f64) -> f64 {
     let mut found = BTreeSet::new();
     for band in &items.bands {
         if band.kind == kind && picture.window.clip(band.period).is_some() {

@@ -1,8 +1,8 @@
 //! A picture that is being drawn: where ticks and robots are, and labels that are placed at the end.
 
 use protocol::{RobotName, Tick};
+use timeline::Period;
 
-use crate::diagram::items::Period;
 use crate::diagram::lanes::{Lane, Lanes};
 use crate::diagram::words::Titles;
 use crate::labels::{Area, Labels, width_px};

@@ -1,9 +1,10 @@
 //! Draws what the robots do: bands of emotions and behaviors, and what becomes of their processes.
 
 use protocol::{RobotName, Tick};
+use timeline::{Kind, Stay};
 
 use crate::diagram::changes;
-use crate::diagram::items::{Band, BandKind, Items};
+use crate::diagram::items::Items;
 use crate::diagram::lanes::{BEHAVIOR_PX, EMOTION_PX, STRIP_PX};
 use crate::diagram::picture::{LabelPosition, Picture};
 use crate::diagram::words::fault_name;
@@ -21,14 +22,14 @@ pub(crate) fn draw_bands(picture: &mut Picture, items: &Items) {
     }
 }
 
-fn draw_band(picture: &mut Picture, band: &Band) {
+fn draw_band(picture: &mut Picture, band: &Stay) {
     let Some((lane, left, width)) = picture.on_lane(&band.robot, band.period) else {
         return;
     };
     let emotion_top = lane.top + STRIP_PX;
     let (class, top, height, font, font_px) = match band.kind {
-        BandKind::Emotion => ("emotion", emotion_top, EMOTION_PX, "", LABEL_PX),
-        BandKind::Behavior => {
+        Kind::Emotion => ("emotion", emotion_top, EMOTION_PX, "", LABEL_PX),
+        Kind::Behavior => {
             let top = emotion_top + EMOTION_PX;
             ("behavior", top, BEHAVIOR_PX, "small ", SMALL_PX)
         }

@@ -4,11 +4,11 @@ use protocol::Tick;
 use protocol::event::Cause;
 use protocol::messages::FaultKind;
 use protocol::time::time_s;
-
-use crate::diagram::items::{
-    Absence, Band, BandKind, Change, Command, Cut, Fault, HeldUp, Joined, Missed, Period,
-    QueriesLost,
+use timeline::{
+    Absence, Change, Command, Cut, Fault, Joined, Kind, Missed, Period, QueriesLost, Stay,
 };
+
+use crate::diagram::items::HeldUp;
 use crate::labels::shortened;
 
 /// Most letters of a text from a robot in a title.
@@ -67,10 +67,10 @@ impl Titles {
         }
     }
 
-    pub(crate) fn band(self, band: &Band) -> String {
+    pub(crate) fn band(self, band: &Stay) -> String {
         let kind = match band.kind {
-            BandKind::Emotion => "emotion",
-            BandKind::Behavior => "behavior",
+            Kind::Emotion => "emotion",
+            Kind::Behavior => "behavior",
         };
         let name = shortened(&band.name, TITLE_LETTERS);
         let period = self.period(band.period);
