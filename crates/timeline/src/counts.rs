@@ -159,6 +159,17 @@ impl StateCounts {
 }
 
 impl LinkCounts {
+    /// Adds the counts of another link or run.
+    pub fn add(&mut self, other: &Self) {
+        self.sent += other.sent;
+        self.delivered += other.delivered;
+        self.delayed += other.delayed;
+        self.duplicated += other.duplicated;
+        for (cause, count) in &other.dropped {
+            *self.dropped.entry(*cause).or_default() += count;
+        }
+    }
+
     /// Copies of commands that were lost.
     #[must_use]
     pub fn lost(&self) -> u64 {

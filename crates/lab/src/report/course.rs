@@ -5,7 +5,7 @@ use protocol::{RobotName, Tick};
 use record::EpochFiles;
 use timeline::Kind;
 
-use super::facts::{RobotFacts, RunFacts, States};
+use super::facts::{RobotFacts, RunFacts};
 use crate::diagram::{Options, Window, draw};
 use crate::moment::Moment;
 
@@ -27,7 +27,7 @@ const LINE_PX: f64 = 620.0;
 pub(super) fn run_panel(facts: &RunFacts, kind: Kind) -> Option<Panel> {
     let row = |(name, robot): (&RobotName, &RobotFacts)| BandRow {
         label: name.to_string(),
-        bands: states_of(robot, kind).bands.clone(),
+        bands: robot.bands(kind).clone(),
     };
     let rows: Vec<BandRow> = facts.robots.iter().map(row).collect();
     let has_states = rows.iter().any(|row| !row.bands.is_empty());
@@ -50,14 +50,6 @@ pub(super) fn states_in_words(kind: Kind) -> &'static str {
     match kind {
         Kind::Emotion => "Emotions",
         Kind::Behavior => "Behaviors",
-    }
-}
-
-/// The states of one kind.
-pub(super) fn states_of(robot: &RobotFacts, kind: Kind) -> &States {
-    match kind {
-        Kind::Emotion => &robot.emotions,
-        Kind::Behavior => &robot.behaviors,
     }
 }
 

@@ -9,9 +9,9 @@ use protocol::messages::{End, Verdict};
 use protocol::time::time_s;
 use protocol::{Event, RobotName, Tick};
 use record::EpochFiles;
-use record::{Entry, Record};
+use record::Record;
 use recording::{Recording, RecordingError};
-use timeline::{Counts, Kind, LinkCounts, Period, Span, StateCounts, Stay, Timeline};
+use timeline::{Counts, Kind, LinkCounts, Period, RobotCounts, Span, Stay, Timeline};
 
 /// Parts of the floor along its longer side.
 const PARTS: f64 = 50.0;
@@ -38,7 +38,7 @@ pub(super) struct RunFacts {
     /// The robots.
     pub(super) robots: BTreeMap<RobotName, RobotFacts>,
     /// Commands by sender and target.
-    pub(super) links: BTreeMap<(RobotName, RobotName), LinkFacts>,
+    pub(super) links: BTreeMap<(RobotName, RobotName), LinkCounts>,
     /// Faults, absences, cuts and changes, in the order of their beginnings.
     pub(super) disturbances: Vec<Disturbance>,
     /// The verdicts about expectations, in the order in which they were decided.
@@ -49,46 +49,14 @@ pub(super) struct RunFacts {
     pub(super) notes: Vec<String>,
 }
 
-/// What is folded while events are read.
-#[derive(Debug, Default)]
-struct Folded {
-    timeline: Timeline,
-    counts: Counts,
-}
-
 /// The facts about a robot.
 #[derive(Debug, Default)]
 pub(super) struct RobotFacts {
-    pub(super) emotions: States,
-    pub(super) behaviors: States,
-    /// Moves that were refused.
-    pub(super) blocked: u64,
-    /// Ticks that it missed.
-    pub(super) missed: u64,
-    /// How often it took part again.
-    pub(super) returns: u64,
-}
-
-/// The states of one kind that a robot was in.
-#[derive(Debug, Default)]
-pub(super) struct States {
-    /// The states in their order.
-    pub(super) bands: Vec<Band>,
-    /// How often each state was entered, the first one included.
-    pub(super) entered: BTreeMap<String, u64>,
-    /// How often one state followed another.
-    pub(super) transitions: BTreeMap<(String, String), u64>,
-}
-
-/// The facts about commands from one robot to another.
-#[derive(Debug, Default, Clone, Copy)]
-pub(super) struct LinkFacts {
-    pub(super) sent: u64,
-    /// A doubled command arrives twice.
-    pub(super) delivered: u64,
-    pub(super) dropped: u64,
-    pub(super) delayed: u64,
-    pub(super) duplicated: u64,
+    /// Its emotions over time.
+    emotions: Vec<Band>,
+    /// Its behaviors over time.
+    behaviors: Vec<Band>,
+    pub(super) counts: RobotCounts,
 }
 
 /// The verdict about an expectation.
@@ -119,11 +87,20 @@ impl RunFacts {
     pub(super) fn read(files: &EpochFiles) -> Result<Self, FileError> {
         let mut facts = Self::default();
         let mut record = Record::of_events(&files.events)?;
-        let mut folded = Folded::default();
+        let mut timeline = Timeline::default();
+        let mut counts = Counts::default();
         let mut is_empty = true;
         while let Some(entry) = record.next_entry()? {
             is_empty = false;
-            facts.add(&entry, &mut folded);
+            facts.last_tick = entry.tick;
+            for event in &entry.events {
+                counts.add(event);
+                facts.add_event(entry.tick, event);
+            }
+            for span in timeline.tick(entry.tick, &entry.events) {
+                counts.add_span(&span, entry.tick);
+                facts.add_span(span);
+            }
         }
         if is_empty {
             let path = files.events.display();
@@ -131,7 +108,12 @@ impl RunFacts {
                 .with_help("a run that has just begun has nothing to report yet"));
         }
 
-        facts.finish(folded);
+        for span in timeline.in_progress() {
+            counts.add_span(&span, facts.last_tick);
+            facts.add_span(span);
+        }
+        facts.disturbances.sort_by_key(|one| one.begin);
+        facts.set_counts(&timeline, counts);
         if facts.end.is_none() {
             facts.notes.push(format!(
                 "The record has no end: the run is in progress, or its simulator was killed. Numbers go up to tick {}.",
@@ -145,30 +127,6 @@ impl RunFacts {
     /// Simulated time of the last complete tick, seconds.
     pub(super) fn time_s(&self) -> f64 {
         time_s(self.last_tick, self.tick_s)
-    }
-
-    /// The sum over all links.
-    pub(super) fn commands(&self) -> LinkFacts {
-        let mut sum = LinkFacts::default();
-        for link in self.links.values() {
-            sum.sent += link.sent;
-            sum.delivered += link.delivered;
-            sum.dropped += link.dropped;
-            sum.delayed += link.delayed;
-            sum.duplicated += link.duplicated;
-        }
-        sum
-    }
-
-    fn add(&mut self, entry: &Entry, folded: &mut Folded) {
-        self.last_tick = entry.tick;
-        for event in &entry.events {
-            folded.counts.add(event);
-            self.add_event(entry.tick, event);
-        }
-        for span in folded.timeline.tick(entry.tick, &entry.events) {
-            self.add_span(span);
-        }
     }
 
     /// Adds what is of the run as a whole.
@@ -253,28 +211,19 @@ impl RunFacts {
             end_s: (begin + ticks) as f64 * self.tick_s,
         };
         let robot = self.robots.entry(stay.robot).or_default();
-        robot.states(stay.kind).bands.push(band);
+        let bands = match stay.kind {
+            Kind::Emotion => &mut robot.emotions,
+            Kind::Behavior => &mut robot.behaviors,
+        };
+        bands.push(band);
     }
 
-    fn finish(&mut self, folded: Folded) {
-        for span in folded.timeline.in_progress() {
-            self.add_span(span);
-        }
-        self.disturbances.sort_by_key(|one| one.begin);
-
-        let mut counts = folded.counts;
-        for name in folded.timeline.robots() {
-            let counts = counts.robots.remove(name).unwrap_or_default();
+    fn set_counts(&mut self, timeline: &Timeline, mut counts: Counts) {
+        for name in timeline.robots() {
             let robot = self.robots.entry(name.clone()).or_default();
-            robot.blocked = counts.blocked;
-            robot.missed = counts.missed;
-            robot.returns = counts.returns;
-            robot.emotions.set_counts(counts.emotions);
-            robot.behaviors.set_counts(counts.behaviors);
+            robot.counts = counts.robots.remove(name).unwrap_or_default();
         }
-        for (link, counts) in counts.links {
-            self.links.insert(link, LinkFacts::from(counts));
-        }
+        self.links = counts.links;
     }
 
     /// Adds what only a recording has. Without one, or with a damaged one, a note says what is missing.
@@ -328,39 +277,12 @@ impl RunFacts {
     }
 }
 
-impl States {
-    /// Time in each state, seconds, by name.
-    pub(super) fn times_s(&self) -> BTreeMap<String, f64> {
-        let mut times = BTreeMap::new();
-        for band in &self.bands {
-            *times.entry(band.name.clone()).or_insert(0.0) += band.end_s - band.begin_s;
-        }
-        times
-    }
-
-    fn set_counts(&mut self, counts: StateCounts) {
-        self.entered = counts.entered;
-        self.transitions = counts.transitions;
-    }
-}
-
 impl RobotFacts {
-    fn states(&mut self, kind: Kind) -> &mut States {
+    /// Its states of a kind over time.
+    pub(super) fn bands(&self, kind: Kind) -> &Vec<Band> {
         match kind {
-            Kind::Emotion => &mut self.emotions,
-            Kind::Behavior => &mut self.behaviors,
-        }
-    }
-}
-
-impl From<LinkCounts> for LinkFacts {
-    fn from(counts: LinkCounts) -> Self {
-        Self {
-            sent: counts.sent,
-            delivered: counts.delivered,
-            dropped: counts.lost(),
-            delayed: counts.delayed,
-            duplicated: counts.duplicated,
+            Kind::Emotion => &self.emotions,
+            Kind::Behavior => &self.behaviors,
         }
     }
 }

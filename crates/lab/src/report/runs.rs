@@ -9,11 +9,9 @@ use protocol::messages::{End, Variable};
 use protocol::time::{self, tick_seconds, time_s};
 use protocol::{RobotName, Tick};
 use record::{EpochFiles, RunFolder, Summary};
-use timeline::Kind;
+use timeline::{Kind, LinkCounts};
 
-use super::course::{
-    READ_DIAGRAM, diagram_lines, run_panel, state_panel, states_in_words, states_of,
-};
+use super::course::{READ_DIAGRAM, diagram_lines, run_panel, state_panel, states_in_words};
 use super::facts::RunFacts;
 use super::floor::occupancy;
 use super::limits::panels;
@@ -179,23 +177,19 @@ fn robots_table(run: &ReportedRun) -> Table {
     let mut table =
         Table::new("Robot | sent | arrived | lost | moves refused | ticks missed | returns");
     for (name, robot) in &run.facts.robots {
-        let mut sent = 0;
-        let mut delivered = 0;
-        let mut dropped = 0;
-        for ((from, to), link) in &run.facts.links {
-            if from == name {
-                sent += link.sent;
-            }
-            if to == name {
-                delivered += link.delivered;
-                dropped += link.dropped;
-            }
-        }
-
+        let counts = &robot.counts;
         let mut row = vec![name.as_str().into()];
-        let of_robot = [robot.blocked, robot.missed, robot.returns];
-        row.extend([sent, delivered, dropped].map(Cell::Count));
-        row.extend(of_robot.map(Cell::Count));
+        row.extend(
+            [
+                counts.sent.values().sum(),
+                counts.received,
+                counts.dropped,
+                counts.blocked,
+                counts.missed,
+                counts.returns,
+            ]
+            .map(Cell::Count),
+        );
         table.row(row);
     }
     table
@@ -206,8 +200,15 @@ fn runs_table(runs: &[ReportedRun]) -> Table {
         Table::new("Run | seed | end | time, s | sent | arrived | lost | moves refused | digest");
     for run in runs {
         let facts = &run.facts;
-        let commands = facts.commands();
-        let blocked: u64 = facts.robots.values().map(|robot| robot.blocked).sum();
+        let mut commands = LinkCounts::default();
+        for link in facts.links.values() {
+            commands.add(link);
+        }
+        let blocked: u64 = facts
+            .robots
+            .values()
+            .map(|robot| robot.counts.blocked)
+            .sum();
         table.row([
             run.name.as_str().into(),
             facts.seed.into(),
@@ -215,7 +216,7 @@ fn runs_table(runs: &[ReportedRun]) -> Table {
             time_cell(facts.last_tick, facts.tick_s),
             commands.sent.into(),
             commands.delivered.into(),
-            commands.dropped.into(),
+            commands.lost().into(),
             blocked.into(),
             Cell::Code(facts.digest.chars().take(12).collect()),
         ]);
@@ -308,7 +309,7 @@ fn state_panels(runs: &[ReportedRun], kind: Kind) -> (Vec<Panel>, String) {
             if let Some(robot) = run.facts.robots.get(name) {
                 rows.push(BandRow {
                     label: format!("{}, seed {}", run.name, run.facts.seed),
-                    bands: states_of(robot, kind).bands.clone(),
+                    bands: robot.bands(kind).clone(),
                 });
             }
         }
@@ -338,9 +339,9 @@ fn states_table(runs: &[ReportedRun], kind: Kind) -> Table {
             };
             // A share is one of the whole run, as in `runs.csv`: a robot that takes no part is in no state.
             total_s += run.facts.time_s();
-            let states = states_of(robot, kind);
-            for (name, time_s) in states.times_s() {
-                times.entry(name).or_default().0 += time_s;
+            let states = robot.counts.states(kind);
+            for (name, ticks) in &states.ticks {
+                times.entry(name.clone()).or_default().0 += time_s(*ticks, run.facts.tick_s);
             }
 
             // A state that was entered in the last tick has lasted for no time.
@@ -349,12 +350,12 @@ fn states_table(runs: &[ReportedRun], kind: Kind) -> Table {
             }
         }
 
-        for (of, (time_s, entered)) in times {
+        for (of, (stayed_s, entered)) in times {
             table.row([
                 name.as_str().into(),
                 of.into(),
-                Cell::Number(time_s, 1),
-                Cell::Number(100.0 * time_s / total_s, 1),
+                Cell::Number(stayed_s, 1),
+                Cell::Number(100.0 * stayed_s / total_s, 1),
                 entered.into(),
             ]);
         }
@@ -467,24 +468,21 @@ fn time_cell(tick: Tick, tick_s: f64) -> Cell {
 }
 
 fn links_table(runs: &[ReportedRun]) -> Table {
-    let mut links = BTreeMap::new();
-    for (link, facts) in runs.iter().flat_map(|run| &run.facts.links) {
-        let sum: &mut [u64; 5] = links.entry(link).or_default();
-        let counts = [
-            facts.sent,
-            facts.delivered,
-            facts.dropped,
-            facts.delayed,
-            facts.duplicated,
-        ];
-        for (sum, count) in sum.iter_mut().zip(counts) {
-            *sum += count;
-        }
+    let mut links: BTreeMap<_, LinkCounts> = BTreeMap::new();
+    for (link, counts) in runs.iter().flat_map(|run| &run.facts.links) {
+        links.entry(link).or_default().add(counts);
     }
 
     let mut table = Table::new("Link | sent | arrived | lost | held back | doubled");
     for ((from, to), counts) in links {
         let mut row = vec![format!("{from} → {to}").into()];
+        let counts = [
+            counts.sent,
+            counts.delivered,
+            counts.lost(),
+            counts.delayed,
+            counts.duplicated,
+        ];
         row.extend(counts.map(Cell::Count));
         table.row(row);
     }

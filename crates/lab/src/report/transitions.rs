@@ -6,7 +6,6 @@ use pictures::{Cell, Figure, Matrix, MatrixCell, MatrixLabel, Panel, Table, stat
 use protocol::RobotName;
 use timeline::Kind;
 
-use super::course::states_of;
 use super::facts::RunFacts;
 use super::limits::panels;
 use super::words::counted;
@@ -25,7 +24,7 @@ pub(super) fn transitions(runs: &[&RunFacts]) -> Vec<Figure> {
 fn figure(runs: &[&RunFacts], kind: Kind, what: &str) -> Option<Figure> {
     let mut counts: BTreeMap<&RobotName, Counts> = BTreeMap::new();
     for (name, robot) in runs.iter().flat_map(|run| &run.robots) {
-        for (transition, count) in &states_of(robot, kind).transitions {
+        for (transition, count) in &robot.counts.states(kind).transitions {
             let of_robot = counts.entry(name).or_default();
             *of_robot.entry(transition.clone()).or_insert(0) += count;
         }
