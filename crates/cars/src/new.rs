@@ -290,7 +290,6 @@ impl Template<'_> {
             .replace("@ROBOT_CRATE@", &quoted("crates/robot"))
             .replace("@TCP_CRATE@", &quoted("vendor/zenoh-link-tcp"))
             .replace("@TLS_CRATE@", &quoted("vendor/zenoh-link-tls"))
-            .replace("@STABBY_CRATE@", &quoted("vendor/stabby"))
             .replace("@CARS@", &self.cars.display().to_string())
             .replace("@NAME@", self.name)
     }

@@ -17,7 +17,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("pictures", &["protocol", "timeline"]),
     ("statistics", &["protocol"]),
     ("observe", &["config", "protocol", "timeline"]),
-    ("bus", &["protocol"]),
+    ("bus", &["protocol", "workspace-hack"]),
     ("recording", &["protocol"]),
     (
         "export",
@@ -147,7 +147,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "system-tests",
         ],
     ),
-    ("stabby", &[]),
+    ("workspace-hack", &[]),
     ("zenoh-link-tcp", &[]),
     ("zenoh-link-tls", &["zenoh-link-tcp"]),
     (

@@ -1,9 +1,10 @@
-//! Advisories that `deny.toml` ignores, for as long as their reasons hold. All else in it is `cargo deny check`'s.
+//! What the project is built from: advisories that `deny.toml` ignores, for as long as their reasons hold (all else in it is `cargo deny
+//! check`'s), features, and the packages in `vendor`.
 
-use std::collections::BTreeSet;
+use std::{collections::BTreeSet, path::Path, process::Command};
 
 use serde_json::Value;
-use system_tests::{cargo, root};
+use system_tests::{cargo, root, tools::skip};
 
 /// A file of the project, which is in TOML.
 fn toml(name: &str) -> toml::Table {
@@ -66,4 +67,129 @@ fn compression_is_not_compiled_in() {
         !features.contains(&"transport_compression".into()),
         "{features:?}"
     );
+}
+
+/// The lines of `cargo tree` with these arguments: packages with their versions and features.
+fn tree(arguments: &[&str]) -> BTreeSet<String> {
+    let output = cargo()
+        .current_dir(root())
+        .args([
+            "tree",
+            "--offline",
+            "--locked",
+            "--prefix=none",
+            "-f={p} {f}",
+        ])
+        .args(arguments)
+        .output()
+        .unwrap();
+
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{errors}");
+    let text = String::from_utf8(output.stdout).unwrap();
+    // What was listed before is marked.
+    let lines = text
+        .lines()
+        .map(|line| line.trim_end_matches(" (*)").trim());
+    lines.map(str::to_owned).collect()
+}
+
+/// Programs and SDK are built with what the workspace was built with: zenoh is compiled once (`crates/workspace-hack`).
+#[test]
+fn zenoh_is_built_with_the_same_features_everywhere() {
+    let package = |line: &str| line.split(' ').take(2).collect::<Vec<_>>().join(" ");
+    let zenoh: BTreeSet<String> = tree(&["-p=zenoh", "-e=normal,build"])
+        .iter()
+        .map(|line| package(line))
+        .collect();
+    assert!(zenoh.len() > 100, "{zenoh:?}");
+
+    let workspace = tree(&["--workspace", "-e=normal,build,dev"]);
+    for program in ["cars", "console", "robots", "simulator", "robot"] {
+        for line in tree(&["-p", program, "-e=normal,build"]) {
+            assert!(
+                !zenoh.contains(&package(&line)) || workspace.contains(&line),
+                "`cargo build -p {program}` compiles zenoh again: {line}"
+            );
+        }
+    }
+}
+
+/// The folder of a published package, which cargo downloads unless it is there; `None` if it cannot.
+fn published(name: &str, version: &str) -> Option<std::path::PathBuf> {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("src")).unwrap();
+    std::fs::write(folder.path().join("src/lib.rs"), "").unwrap();
+    // With the versions of the project, which are there.
+    std::fs::copy(root().join("Cargo.lock"), folder.path().join("Cargo.lock")).unwrap();
+    let manifest = format!(
+        "[package]\nname = \"published\"\nedition = \"2024\"\n[workspace]\n[dependencies]\n{name} = \"={version}\"\n"
+    );
+    std::fs::write(folder.path().join("Cargo.toml"), manifest).unwrap();
+
+    let output = cargo()
+        .current_dir(folder.path())
+        .args(["metadata", "--format-version=1"])
+        .args(["--filter-platform", "x86_64-unknown-linux-gnu"])
+        .output()
+        .unwrap();
+    let metadata: Value = serde_json::from_slice(&output.stdout).ok()?;
+    let packages = metadata["packages"].as_array().unwrap();
+    let package = packages.iter().find(|package| package["name"] == name);
+    let manifest = package.unwrap()["manifest_path"].as_str().unwrap();
+    Some(Path::new(manifest).parent().unwrap().to_owned())
+}
+
+/// The names and contents of the files of a package that are compiled.
+fn sources(package: &Path) -> Vec<(String, String)> {
+    let mut files = vec!["Cargo.toml".to_owned()];
+    for file in std::fs::read_dir(package.join("src")).unwrap() {
+        let name = file.unwrap().file_name().into_string().unwrap();
+        files.push(format!("src/{name}"));
+    }
+    files.sort();
+
+    let read = |name: &String| std::fs::read_to_string(package.join(name)).unwrap();
+    let texts: Vec<String> = files.iter().map(read).collect();
+    files.into_iter().zip(texts).collect()
+}
+
+/// A package in `vendor` is the published one with the changes of its `changes.patch`, and comes with its license.
+#[test]
+fn vendored_packages_are_the_published_ones_and_their_patches() {
+    for folder in std::fs::read_dir(root().join("vendor")).unwrap() {
+        let folder = folder.unwrap().path();
+        let manifest: toml::Table = std::fs::read_to_string(folder.join("Cargo.toml"))
+            .unwrap()
+            .parse()
+            .unwrap();
+        let name = manifest["package"]["name"].as_str().unwrap();
+        let version = manifest["package"]["version"].as_str().unwrap();
+        let license = std::fs::read_to_string(folder.join("LICENSE")).unwrap();
+        assert!(license.contains("Apache License"), "{name}");
+
+        let Some(published) = published(name, version) else {
+            skip(
+                "vendored_packages_are_the_published_ones_and_their_patches",
+                "cargo cannot download the published packages; connect to the network",
+            );
+            return;
+        };
+        let patched = tempfile::tempdir().unwrap();
+        std::fs::create_dir(patched.path().join("src")).unwrap();
+        for (file, text) in sources(&published) {
+            std::fs::write(patched.path().join(file), text).unwrap();
+        }
+        let output = Command::new("git")
+            .current_dir(patched.path())
+            .arg("apply")
+            .arg(folder.join("changes.patch"))
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{name}: {output:?}");
+        assert!(
+            sources(patched.path()) == sources(&folder),
+            "vendor/{name} is not the published package with its patch"
+        );
+    }
 }

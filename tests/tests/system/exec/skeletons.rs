@@ -272,7 +272,7 @@ fn has_the_packages_of_the_project(robot: &Path) {
     );
 
     let metadata: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    for name in ["zenoh-link-tcp", "zenoh-link-tls", "stabby"] {
+    for name in ["zenoh-link-tcp", "zenoh-link-tls"] {
         let found: Vec<&str> = metadata["packages"]
             .as_array()
             .unwrap()

@@ -1,0 +1,1 @@
+//! Nothing: its `Cargo.toml` names features of dependencies, and `bus` depends on it.
