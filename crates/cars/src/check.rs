@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use config::{Changes, Source};
-use lab::experiment::{Experiment, Plan, Request, Robots};
+use experiments::{Experiment, Plan, Request, Robots};
 use lab::inspect::inspect;
 use lab::run::Local;
 use launch::{LaunchFile, default_run_name, scenario_file};

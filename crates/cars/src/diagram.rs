@@ -4,11 +4,11 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use lab::diagram::{Options, Window, draw};
 use lab::folder::{find, recorded_epoch, recorded_epochs};
 use lab::moment::Moment;
 use protocol::Epoch;
 use record::names::LATEST;
+use reports::diagram::{Options, Window, draw};
 
 use crate::output;
 

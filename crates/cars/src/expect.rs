@@ -7,12 +7,13 @@ use clap::Args;
 use config::{Changes, Source};
 use lab::folder::{find, recorded_epoch};
 use lab::judge::judge;
-use lab::table::verdicts;
 use protocol::Epoch;
 use protocol::messages::Verdict;
 use record::names::LATEST;
 use scenario::Scenario;
 use scenario::expectations;
+
+use crate::table::verdicts;
 
 /// `cars expect`.
 #[derive(Debug, Args)]

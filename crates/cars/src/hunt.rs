@@ -9,12 +9,12 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use config::units::Time;
 use config::{Changes, Override};
-use indicatif::{ProgressBar, ProgressStyle};
-use lab::hunt::{
+use experiments::hunt::{
     Budget, Coverage, Fate, Feature, Finding, Kind, Link, Options, Progress, Report, Subject,
     hunt as go,
 };
-use lab::shell;
+use experiments::shell;
+use indicatif::{ProgressBar, ProgressStyle};
 use miette::IntoDiagnostic;
 use protocol::random::MAX_SEED;
 use terminal::OutputError;

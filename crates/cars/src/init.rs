@@ -7,7 +7,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use config::{FileError, shipped};
-use lab::shell;
+use experiments::shell;
 use miette::miette;
 use terminal::OutputError;
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use config::{FileError, Source};
-use lab::experiment::is_experiment_file;
+use experiments::is_experiment_file;
 use launch::is_launch_file;
 
 /// The folder of parameters of robots, beside the scenarios that name them.

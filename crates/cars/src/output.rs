@@ -4,9 +4,10 @@ use std::fs::File;
 use std::io::{BufWriter, ErrorKind, Stdout, Write};
 use std::path::Path;
 
+use experiments::is_of_experiment;
 use export::draft::{Draft, unwritable};
-use lab::is_part_of_record;
 use miette::miette;
+use record::RunFolder;
 
 /// Paths of the standard output.
 const STANDARD: [&str; 3] = ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"];
@@ -109,6 +110,22 @@ pub(crate) fn check_no_record(path: &Path) -> miette::Result<()> {
         ));
     }
     Ok(())
+}
+
+/// Whether a path is that of a part of the record of a run or an experiment: as it is given, with its folder's links resolved, or with
+/// all links resolved.
+fn is_part_of_record(path: &Path) -> bool {
+    let absolute = std::path::absolute(path).ok();
+    // The folder of the absolute path is never the empty path.
+    let folder = absolute.as_deref().and_then(Path::parent);
+    let in_folder = folder
+        .and_then(|folder| folder.canonicalize().ok())
+        .zip(path.file_name())
+        .map(|(folder, name)| folder.join(name));
+    let resolved = path.canonicalize().ok();
+
+    let mut places = [absolute, in_folder, resolved].into_iter().flatten();
+    places.any(|place| RunFolder::is_of_run(&place) || is_of_experiment(&place))
 }
 
 /// The error of an output that cannot be written.

@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use lab::experiment::PLAN;
+use experiments::PLAN;
 use lab::folder::find;
-use lab::report::{of_experiment, of_runs};
 use miette::miette;
 use record::RunFolder;
 use record::names::LATEST;
+use reports::{of_experiment, of_runs};
 
 use crate::output;
 

@@ -6,9 +6,9 @@ use std::process::{Command, Stdio};
 
 use clap::{Args, ValueEnum};
 use config::units::Time;
+use experiments::Plan;
+use experiments::submit::{Kubernetes, Parallel, Slurm, Tasks};
 use export::draft::unwritable;
-use lab::experiment::Plan;
-use lab::experiment::submit::{Kubernetes, Parallel, Slurm, Tasks};
 use miette::{IntoDiagnostic, WrapErr, miette};
 use record::folder::check_no_links;
 

@@ -9,14 +9,14 @@ use recording::PlacedRobot;
 
 /// What robots reported last, and where they stand.
 #[derive(Default)]
-pub(crate) struct LastStates {
+pub struct LastStates {
     reports: BTreeMap<RobotName, Report>,
     locations: BTreeMap<RobotName, Point>,
 }
 
 impl LastStates {
     /// Takes the reports of a tick, and where its robots stand, into account.
-    pub(crate) fn note(&mut self, reports: BTreeMap<RobotName, Report>, robots: Vec<PlacedRobot>) {
+    pub fn note(&mut self, reports: BTreeMap<RobotName, Report>, robots: Vec<PlacedRobot>) {
         self.reports.extend(reports);
         for robot in robots {
             self.locations.insert(robot.name, robot.location);
@@ -24,7 +24,7 @@ impl LastStates {
     }
 
     /// The state of a robot; `None` before its first report.
-    pub(crate) fn of(&self, robot: &RobotName) -> Option<RobotState<'_>> {
+    pub fn of(&self, robot: &RobotName) -> Option<RobotState<'_>> {
         let report = self.reports.get(robot)?;
         Some(RobotState {
             location: *self.locations.get(robot)?,

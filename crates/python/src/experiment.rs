@@ -6,8 +6,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use config::units::Time;
-use lab::experiment::engine::{self, Options, Queue};
-use lab::experiment::{Experiment, Plan, Provenance, Request, Results, Robots, Store};
+use experiments::engine::{self, Options, Queue};
+use experiments::{Experiment, Plan, Provenance, Request, Results, Robots, Store};
 use miette::miette;
 use protocol::random::MAX_SEED;
 use pyo3::prelude::*;

@@ -1,5 +1,6 @@
 //! The Python module `cars._cars`: what the package `cars` in `sdk/python` calls. It translates between Python and the
-//! libraries: robots of Python for the crate `robot`, and runs and experiments of the crate `lab` for Python. Rules are theirs.
+//! libraries: robots of Python for the crate `robot`, and for Python what the crates `lab`, `experiments` and `reports` do with
+//! runs. Rules are theirs.
 
 mod cars;
 mod error;

@@ -2,14 +2,14 @@
 
 use std::path::PathBuf;
 
-use lab::diagram::{Options, Window, draw};
-use lab::experiment::PLAN;
+use experiments::PLAN;
 use lab::folder::{recorded_epoch, recorded_epochs};
 use lab::moment::Moment;
-use lab::report::{of_experiment, of_runs};
 use pictures::Page;
 use pyo3::prelude::*;
 use record::RunFolder;
+use reports::diagram::{Options, Window, draw};
+use reports::{of_experiment, of_runs};
 
 use crate::error::{plain, reported};
 

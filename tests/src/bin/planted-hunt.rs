@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::AtomicBool;
 
-use lab::hunt::{Budget, Kind, Options, Subject, hunt};
+use experiments::hunt::{Budget, Kind, Options, Subject, hunt};
 use scenario::Changes;
 
 fn main() -> Result<ExitCode, Box<dyn std::error::Error>> {

@@ -1,7 +1,7 @@
 //! A population of runs, and samples of it.
 
-use lab::experiment::engine::{self, Options, Queue};
-use lab::experiment::{Experiment, Measured, Plan, Request, Results, Robots, Store};
+use experiments::engine::{self, Options, Queue};
+use experiments::{Experiment, Measured, Plan, Request, Results, Robots, Store};
 use protocol::random::{self, Stream};
 use statistics::TimeTo;
 use system_tests::root;

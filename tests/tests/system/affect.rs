@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use lab::experiment::{Arm, Experiment};
+use experiments::{Arm, Experiment};
 use protocol::Event;
 use serde_json::Value;
 use system_tests::hall::scenario;

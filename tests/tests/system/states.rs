@@ -4,7 +4,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use lab::hunt::{Case, Subject, Trial};
+use experiments::hunt::{Case, Subject, Trial};
 use nix::sys::signal::Signal;
 use roxmltree::{Document, ParsingOptions};
 use serde_json::Value;

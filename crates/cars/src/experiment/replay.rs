@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use lab::experiment::{Plan, Robots, Store, write_launch};
+use experiments::{Plan, Robots, Store, write_launch};
 use lab::folder::read_summary;
 use lab::scratch::Scratch;
 use launch::RunOptions;

@@ -1,6 +1,6 @@
 //! Results as tables and as JSON.
 
-use lab::experiment::{
+use experiments::{
     Cell, Contrast, Difference, Estimated, Experiment, Measure, Results, SHOWN_P, least_p_holm,
 };
 use miette::IntoDiagnostic;

@@ -373,7 +373,7 @@ fn no_flipped_bit_of_a_plan_plays_anything_else() {
     short.run(&folder, &["--plan-only", "--seeds", "2"]);
     let plan = folder.join("plan.json");
     let good = fs::read(&plan).unwrap();
-    let before = lab::experiment::Plan::load(&folder).unwrap();
+    let before = experiments::Plan::load(&folder).unwrap();
     let mut chance = random::stream(14, "bits");
     for _ in 0..300 {
         let place = (random::unit(&mut chance) * good.len() as f64) as usize;
@@ -381,7 +381,7 @@ fn no_flipped_bit_of_a_plan_plays_anything_else() {
         let mut damaged = good.clone();
         damaged[place] ^= 1 << bit;
         fs::write(&plan, &damaged).unwrap();
-        if let Ok(plan) = lab::experiment::Plan::load(&folder) {
+        if let Ok(plan) = experiments::Plan::load(&folder) {
             for number in 0..before.units() {
                 assert_eq!(plan.unit(number).key, before.unit(number).key, "{place}");
             }

@@ -17,8 +17,8 @@ use super::floor::occupancy;
 use super::limits::panels;
 use super::transitions::transitions;
 use super::words::counted;
-use crate::folder::{read_summary, recorded_epoch};
-use crate::shell;
+use experiments::shell;
+use lab::folder::{read_summary, recorded_epoch};
 
 /// Most runs of a report.
 pub const MAX_RUNS: usize = 64;

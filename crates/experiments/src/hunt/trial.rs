@@ -16,7 +16,7 @@ use timeline::{Command, Counts, Kind, Span, Timeline};
 use super::case::Case;
 use super::coverage::{Fate, Feature};
 use super::fault::Link;
-use crate::run::{Local, check_faults, make_robots_with};
+use lab::run::{Local, check_faults, make_robots_with};
 
 /// What is expected of every run beside the expectations of its scenario.
 pub const RUNS: &str = "the run goes to its end";

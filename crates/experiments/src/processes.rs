@@ -16,10 +16,10 @@ use toml::{Table, Value};
 
 use super::follow::{Ended, Follow};
 use super::plan::LaunchText;
-use crate::folder::read_summary;
-use crate::scratch::Scratch;
-use crate::states::LastStates;
 use export::draft::unwritable;
+use lab::folder::read_summary;
+use lab::scratch::Scratch;
+use lab::states::LastStates;
 
 /// Name of the run of a unit, and of its folder.
 const RUN: &str = "unit";

@@ -7,7 +7,7 @@ use pictures::Text;
 use statistics::{Estimate, Interval};
 
 use super::study::{Study, is_shown, label};
-use crate::experiment::{Contrast, Difference, SHOWN_P, least_p_holm};
+use experiments::{Contrast, Difference, SHOWN_P, least_p_holm};
 
 /// Most comparisons that a sentence names.
 const MAX_NAMED: usize = 8;

@@ -618,7 +618,7 @@ fn robots_that_the_scenario_does_not_have_are_shown() {
 
 /// The blocks of TOML in the page about experiment files.
 fn blocks_of_the_page() -> Vec<&'static str> {
-    let page = include_str!("../../../../../docs/experiment-files.md");
+    let page = include_str!("../../../../docs/experiment-files.md");
     let blocks = page.split("```toml\n").skip(1);
     blocks
         .filter_map(|block| block.split("```").next())

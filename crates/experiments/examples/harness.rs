@@ -1,15 +1,15 @@
 //! What an experiment costs beside its simulation: runs of the hall with all that an experiment does for each of them, and the
 //! same runs in a bare loop, in turn. Processor time is compared, so that other programs at work matter little.
 //!
-//!     cargo run --release -p lab --example harness -- [ROUNDS]
+//!     cargo run --release -p experiments --example harness -- [ROUNDS]
 
 #![expect(clippy::print_stdout, reason = "a measurement prints its figures")]
 
 use std::path::Path;
 
 use config::Changes;
-use lab::experiment::engine::{self, Options, Queue};
-use lab::experiment::{Experiment, Plan, Request, Robots, Store};
+use experiments::engine::{self, Options, Queue};
+use experiments::{Experiment, Plan, Request, Robots, Store};
 use lab::run::Local;
 use miette::{IntoDiagnostic, miette};
 use protocol::RunName;

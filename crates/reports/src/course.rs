@@ -7,7 +7,7 @@ use timeline::Kind;
 
 use super::facts::{RobotFacts, RunFacts};
 use crate::diagram::{Options, Window, draw};
-use crate::moment::Moment;
+use lab::moment::Moment;
 
 /// How a space-time diagram is read.
 pub(super) const READ_DIAGRAM: &str = "to be read line by line: robots are lanes, with emotion above behavior; a slanted line is a \

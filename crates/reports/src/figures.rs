@@ -14,7 +14,7 @@ use super::limits::panels;
 use super::quantity::{Of, Quantity, difference, widened};
 use super::study::{CellPlace, Study, axis, label, lines};
 use super::words::{capitalized, counted};
-use crate::experiment::{Contrast, Difference, Estimated};
+use experiments::{Contrast, Difference, Estimated};
 
 /// Most rows of a table.
 const MAX_ROWS: usize = 500;
@@ -447,7 +447,7 @@ pub(super) fn verdicts(study: &Study<'_>) -> Option<Figure> {
         [only] => only,
         _ => "condition",
     };
-    let column = |condition: &crate::experiment::Condition| match &condition.levels[..] {
+    let column = |condition: &experiments::Condition| match &condition.levels[..] {
         [(_, level)] => MatrixLabel::from(level.as_str()),
         _ => study.heading(condition).as_str().into(),
     };

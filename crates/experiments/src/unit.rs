@@ -15,7 +15,7 @@ use super::follow::{Ended, Follow};
 use super::plan::{Plan, Robots, Unit};
 use super::processes::{self, Launcher};
 use super::script::Script;
-use crate::run::{Local, check_faults, make_robots, play};
+use lab::run::{Local, check_faults, make_robots, play};
 
 /// The run of a unit, of which nothing is recorded.
 const RUN: &str = "experiment";

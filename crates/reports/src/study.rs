@@ -8,9 +8,7 @@ use pictures::{Estimate, Panel};
 use statistics::TimeTo;
 
 use super::limits::panels;
-use crate::experiment::{
-    Arm, Cell, Condition, Contrast, Estimated, Outcome, Results, SHOWN_P, Shown,
-};
+use experiments::{Arm, Cell, Condition, Contrast, Estimated, Outcome, Results, SHOWN_P, Shown};
 
 /// Most arms that are shown.
 const MAX_ARMS: usize = 24;

@@ -7,7 +7,7 @@ use pictures::{Estimate, IntervalRow, Intervals, Panel, Trend, TrendLine, round_
 
 use super::study::{CellPlace, Line, Study, axis, drawn, is_shown, label};
 use super::words::capitalized;
-use crate::experiment::{Contrast, Difference};
+use experiments::{Contrast, Difference};
 
 /// Of what a difference is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -18,10 +18,10 @@ use super::quantity::Of;
 use super::study::{Study, label};
 use super::transitions::transitions;
 use super::words::{capitalized, counted, utc};
-use crate::experiment::{Example, Outcome, Provenance, Results, Robots, Shown};
-use crate::folder::recorded_epoch;
-use crate::run::execute;
-use crate::shell;
+use experiments::shell;
+use experiments::{Example, Outcome, Provenance, Results, Robots, Shown};
+use lab::folder::recorded_epoch;
+use lab::run::execute;
 
 /// Units that are named one by one where there are more of them.
 const MAX_NAMED: usize = 10;

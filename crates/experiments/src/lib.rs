@@ -1,6 +1,8 @@
-//! Experiments: one scenario in several arms under several conditions over many seeds. An experiment is a file
+//! Work with many runs. An experiment is one scenario in several arms under several conditions over many seeds: a file
 //! ([`Experiment::load`]), of which some ship with the project. It is planned ([`Plan`]) into units, which are played on one
-//! machine or on many ([`engine`]) and kept in a folder ([`Store`]), whose results are read from there ([`Results`]).
+//! machine or on many ([`engine`], [`submit`]) and kept in a folder ([`Store`]), whose results are read from there
+//! ([`Results`]). A hunt ([`mod@hunt`]) draws faults until an expectation fails. Commands that can be typed are written by
+//! [`shell`].
 
 mod case;
 mod condition;
@@ -9,6 +11,7 @@ pub mod engine;
 mod estimate;
 mod file;
 mod follow;
+pub mod hunt;
 mod outcome;
 mod plan;
 mod presentation;
@@ -17,6 +20,7 @@ mod provenance;
 mod results;
 mod script;
 mod setting;
+pub mod shell;
 mod store;
 pub mod submit;
 mod unheard;

@@ -14,7 +14,7 @@ use timeline::Timeline;
 
 pub use pictures::diagram::Options;
 
-use crate::moment::Moment;
+use lab::moment::Moment;
 
 /// The part of a run that is drawn, both ends included.
 #[derive(Debug, Clone, Copy, Default)]
