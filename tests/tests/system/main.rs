@@ -33,6 +33,7 @@ mod forks;
 mod hunt;
 mod killed;
 mod links;
+mod names;
 mod nemesis;
 mod output;
 mod page;

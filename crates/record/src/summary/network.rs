@@ -77,7 +77,25 @@ impl NetworkSummary {
                 }
             }
             Event::Tick { .. } => self.count_staleness(tick_s, unreachable),
-            _ => {}
+            Event::Init { .. }
+            | Event::Joined { .. }
+            | Event::Lost { .. }
+            | Event::Missed { .. }
+            | Event::DoneLate { .. }
+            | Event::Fault { .. }
+            | Event::Emotion { .. }
+            | Event::Behavior { .. }
+            | Event::Blocked { .. }
+            | Event::Say { .. }
+            | Event::Warned { .. }
+            | Event::CommandSent { .. }
+            | Event::CommandDelayed { .. }
+            | Event::CommandDuplicated { .. }
+            | Event::CommandDropped { .. }
+            | Event::QueryLost { .. }
+            | Event::Changed { .. }
+            | Event::Judged { .. }
+            | Event::End { .. } => {}
         }
     }
 

@@ -1,0 +1,104 @@
+//! Names of types: a reader who has met a name knows it everywhere.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    path::{Path, PathBuf},
+};
+
+use system_tests::root;
+
+/// Types of several crates with one name: they are the same idea, on the two sides of a border that no dependency crosses.
+const SHARED: [(&str, &str); 5] = [
+    ("Blocker", "what the environment finds, and the event of it"),
+    ("Cars", "what a robot sees in a tick, in Rust and in Python"),
+    ("Point", "a place on the field, in messages and in the environment"),
+    ("Range", "a triangular distribution, in messages and in scenarios"),
+    ("Stream", "a stream of random numbers, in Rust and in Python"),
+];
+
+/// The Rust files of a folder, without tests and without the skeletons of `cars new`.
+fn sources(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_str().unwrap();
+        if path.is_dir() && !["tests", "new"].contains(&name) {
+            found.extend(sources(&path));
+        } else if name.ends_with(".rs") && name != "tests.rs" {
+            found.push(path);
+        }
+    }
+    found
+}
+
+/// The name of the type or trait that a line declares. Associated types, which are declared by their traits, are none.
+fn declared(line: &str) -> Option<&str> {
+    let mut words = line.split_whitespace().peekable();
+    while words.peek()?.starts_with("pub") {
+        let restricted = words.next()?;
+        if restricted == "pub(in" {
+            words.next();
+        }
+    }
+    let keyword = words.next()?;
+    if !["struct", "enum", "trait", "type"].contains(&keyword) {
+        return None;
+    }
+    if keyword == "type" && line.starts_with(' ') {
+        return None;
+    }
+
+    let name = words.next()?;
+    let end = name.find(|c: char| !c.is_alphanumeric() && c != '_');
+    Some(&name[..end.unwrap_or(name.len())])
+}
+
+/// For each name the crates and files that declare a type with it.
+fn declarations() -> BTreeMap<String, BTreeMap<String, Vec<PathBuf>>> {
+    let mut found: BTreeMap<String, BTreeMap<String, Vec<PathBuf>>> = BTreeMap::new();
+    for folder in std::fs::read_dir(root().join("crates")).unwrap() {
+        let folder = folder.unwrap();
+        let package = folder.file_name().into_string().unwrap();
+        for file in sources(&folder.path().join("src")) {
+            let text = std::fs::read_to_string(&file).unwrap();
+            let product = text.split("#[cfg(test)]").next().unwrap();
+            for name in product.lines().filter_map(declared) {
+                let packages = found.entry(name.to_owned()).or_default();
+                packages
+                    .entry(package.clone())
+                    .or_default()
+                    .push(file.clone());
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn declarations_are_found() {
+    assert_eq!(declared("pub struct Point {"), Some("Point"));
+    assert_eq!(declared("    pub(in crate::a) enum Kind<T> {"), Some("Kind"));
+    assert_eq!(declared("pub(crate) type Pixel = (f64, f64);"), Some("Pixel"));
+    assert_eq!(declared("    type Output = Self;"), None);
+    assert_eq!(declared("// struct"), None);
+    assert_eq!(declared("let structure = 1;"), None);
+    assert!(declarations().len() > 500);
+}
+
+#[test]
+fn a_name_is_one_type_in_a_crate() {
+    for (name, packages) in declarations() {
+        for files in packages.values() {
+            assert_eq!(files.len(), 1, "{name} stands for several types: {files:?}");
+        }
+    }
+}
+
+#[test]
+fn a_name_is_one_idea_in_all_crates() {
+    let declarations = declarations();
+    let several = declarations.iter().filter(|(_, packages)| packages.len() > 1);
+    let several: BTreeSet<&str> = several.map(|(name, _)| name.as_str()).collect();
+    let shared: BTreeSet<&str> = SHARED.iter().map(|(name, _)| *name).collect();
+    assert_eq!(several, shared, "name one of them otherwise");
+}
