@@ -87,6 +87,8 @@ impl<R, C> Barrier<R, C> {
             member.end_epoch();
         }
 
+        // Names and tokens outlive an epoch. Where all robots are connected already, no further token
+        // comes, so the barrier looks for itself.
         out.push(Output::SetTimer(Timer::Announce, self.timing.announce));
         self.check_all_joined(out);
     }
@@ -115,6 +117,8 @@ impl<R, C> Barrier<R, C> {
         self.tick = tick;
         self.news = news;
 
+        // Successors are taken in before anyone is excluded: one that replaces a lost robot is waited
+        // for in this very tick.
         for (name, member) in &mut self.members {
             let attendance = self.attendance.as_ref();
             let recorded = attendance.map(|recorded| recorded.joined.contains(name));
@@ -171,6 +175,7 @@ impl<R, C> Barrier<R, C> {
             out.push(Output::SetTimer(timer, self.timing.token));
         }
 
+        // The flag is that of the place in the roster, which is the same for every incarnation.
         Ok(Admission {
             epoch: self.epoch,
             generation: member.generation(),
@@ -186,6 +191,7 @@ impl<R, C> Barrier<R, C> {
             return;
         };
 
+        // Noted in every phase: ticks and epochs that begin later ask for it.
         member.has_token = is_present;
         let is_awaited = is_open && member.is_awaited();
         if is_present {
@@ -211,6 +217,7 @@ impl<R, C> Barrier<R, C> {
         if self.phase == BarrierPhase::Gathering {
             self.check_all_joined(out);
         }
+        // People were told for whom the clock waits, and that may have changed.
         if self.is_announced {
             out.push(Output::Held);
         }
@@ -226,6 +233,7 @@ impl<R, C> Barrier<R, C> {
         out: &mut Vec<Output<R, C>>,
     ) {
         let is_allowed = (1..=self.max_commands).contains(&number);
+
         match self.received(from, stamp, is_allowed) {
             Ok(received) => {
                 // The first one counts; a repetition has the same content. So repeating is idempotent, and a message
@@ -248,6 +256,8 @@ impl<R, C> Barrier<R, C> {
         report: R,
         out: &mut Vec<Output<R, C>>,
     ) {
+        // It would be refused as stale below. In the log these are two things: the robot is right and
+        // answers in vain, or the message is late.
         let is_lost = self.is_member(from, |member| {
             member.is_lost() && member.generation() == stamp.generation
         });
@@ -258,6 +268,8 @@ impl<R, C> Barrier<R, C> {
 
         match self.received(from, stamp, commands <= self.max_commands) {
             Ok(received) => {
+                // Its tick is done, so it waits for no other robot any more. As for commands, the first
+                // report counts.
                 received.waits_for = None;
                 received.report.get_or_insert((commands, report));
                 if received.is_complete() {
@@ -286,6 +298,8 @@ impl<R, C> Barrier<R, C> {
         };
 
         member.wait_for(on);
+        // The robot that is asked may be one without which the clock goes on: then its state is put
+        // now, and again with each repetition of the clock.
         self.stand_in(on, out);
         if self.is_announced {
             out.push(Output::Held);
@@ -296,6 +310,7 @@ impl<R, C> Barrier<R, C> {
     /// decides nothing that the state does not bear out.
     pub fn timer(&mut self, timer: &Timer, out: &mut Vec<Output<R, C>>) {
         let is_open = self.phase == BarrierPhase::Open;
+
         match timer {
             Timer::Announce => {
                 let is_waiting = is_open || self.phase == BarrierPhase::Gathering;
@@ -312,6 +327,8 @@ impl<R, C> Barrier<R, C> {
                 }
                 out.push(Output::SetTimer(Timer::Repeat, self.timing.repeat));
             }
+            // Where a tick is executed again, its record says who was late, not the time that it takes
+            // now.
             Timer::Deadline if is_open && self.attendance.is_none() => self.judge_late(out),
             Timer::Repeat | Timer::Deadline => {}
             Timer::Token(name) => {
@@ -333,6 +350,7 @@ impl<R, C> Barrier<R, C> {
     /// The scenario has brought a fault upon a robot's process, or that fault is over. While it lasts, the scenario
     /// decides what becomes of the robot, and no timer does.
     pub fn fault(&mut self, robot: &RobotName, fault: Option<FaultKind>) {
+        // Only noted: what follows is decided where a tick opens, or a robot misses one.
         if let Some(member) = self.members.get_mut(robot) {
             member.fault = fault;
         }
@@ -353,6 +371,7 @@ impl<R, C> Barrier<R, C> {
     /// Changes what the clock does about late robots.
     pub fn set_lateness(&mut self, lateness: Lateness, out: &mut Vec<Output<R, C>>) {
         self.lateness = lateness;
+        // The tick that is open may have no deadline yet, if all robots were waited for.
         if self.phase == BarrierPhase::Open {
             self.set_timers(out);
         }
@@ -499,6 +518,7 @@ impl<R, C> Barrier<R, C> {
     fn check_all_joined(&mut self, out: &mut Vec<Output<R, C>>) {
         if self.members.values().all(Member::is_ready) {
             self.phase = BarrierPhase::Gathered;
+            // People are told that the clock goes on only if they were told that it did not.
             if std::mem::take(&mut self.is_announced) {
                 out.push(Output::Released);
             }
@@ -508,6 +528,7 @@ impl<R, C> Barrier<R, C> {
 
     /// Has the state of a robot put that cannot answer, because the clock goes on without it in the open tick.
     fn stand_in(&self, robot: &RobotName, out: &mut Vec<Output<R, C>>) {
+        // Putting it more than once is harmless: a robot keeps the first state that it gets for a tick.
         if self.phase == BarrierPhase::Open && self.is_member(robot, Member::is_given_up) {
             out.push(Output::StandIn(robot.clone()));
         }
@@ -555,6 +576,8 @@ impl<R, C> Barrier<R, C> {
     }
 
     fn set_timers(&self, out: &mut Vec<Output<R, C>>) {
+        // Each replaces the one of the tick before, so none has to be withdrawn when a tick is
+        // complete.
         out.push(Output::SetTimer(Timer::Announce, self.timing.announce));
         out.push(Output::SetTimer(Timer::Repeat, self.timing.repeat));
         let has_deadline = self
@@ -573,6 +596,7 @@ impl<R, C> Barrier<R, C> {
         for (name, member) in &self.members {
             let is_out = match &self.attendance {
                 Some(recorded) => recorded.absent.contains(name),
+                // Under `wait` and `abort` the tick stays open for it.
                 None => member.is_out(self.tick) && self.lateness.of(name) == OnLate::Continue,
             };
             if !member.is_lost() && (is_out || member.must_rejoin()) {
@@ -587,6 +611,8 @@ impl<R, C> Barrier<R, C> {
 
     /// The deadline is over: the scenario decides, robot by robot, what follows.
     fn judge_late(&mut self, out: &mut Vec<Output<R, C>>) {
+        // All are looked at before anything is done: whether the run ends must not depend on the order
+        // of names.
         let mut late = Vec::new();
         for (name, member) in &self.members {
             if member.is_awaited() {
@@ -635,6 +661,7 @@ impl<R, C> Barrier<R, C> {
             reports: BTreeMap::new(),
             membership: std::mem::take(&mut self.membership),
         };
+        // In the order of their tokens, which is wall clock, the bytes of two records would differ.
         outcome.membership.sort();
         for (name, member) in &mut self.members {
             if let Some(reply) = member.take_reply() {

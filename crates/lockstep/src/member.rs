@@ -238,6 +238,8 @@ impl<R, C> Member<R, C> {
             self.registration = Some(Registration {
                 instance: Arc::from(instance),
                 generation: self.generation() + 1,
+                // A process that joins again has its token declared, or is still expected to declare
+                // it.
                 is_reserved: is_new || self.is_reserved(),
             });
             if let Some(active) = self.incarnation_mut() {
@@ -319,6 +321,8 @@ impl<R, C> Member<R, C> {
 
     /// Takes in the incarnation that was admitted, if there is one and its process is connected.
     pub(crate) fn take_in(&mut self) -> Option<Generation> {
+        // Before its token, what it subscribes to may not be in effect: it would miss the clock that
+        // waits for it.
         if !self.has_token || !self.has_successor(Successor::Admitted) {
             return None;
         }
@@ -329,6 +333,7 @@ impl<R, C> Member<R, C> {
     /// Misses the open tick. Returns whether it is lost now; `recorded` is whether it was, where the tick is executed
     /// again.
     pub(crate) fn miss(&mut self, lose_after: u32, recorded: Option<bool>) -> bool {
+        // Also for one that is lost already: what still arrives from it must not count.
         self.reply = TickReply::GivenUp;
         let Participation::Active(own) = &mut self.participation else {
             return false;
@@ -447,6 +452,7 @@ impl<R, C> Member<R, C> {
         };
         let (stated, report) = received.report?;
         if let Some(own) = self.incarnation_mut() {
+            // Only ticks in a row make a robot lost.
             own.missed = 0;
             own.has_reported = true;
         }

@@ -384,6 +384,7 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
             }
             TickState::Answered(answer) => epoch == answer.epoch && tick.abs_diff(answer.tick) <= 1,
         };
+
         if is_near {
             self.others.entry(of).or_default().add(epoch, tick, state);
         }

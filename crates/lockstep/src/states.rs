@@ -49,9 +49,12 @@ impl<S: Clone> States<S> {
     /// Adds the state of a tick; states may arrive in any order. The first one of a tick counts.
     pub fn add(&mut self, epoch: Epoch, tick: Tick, state: S) {
         let newest_epoch = self.kept.last().map_or(epoch, |(newest, _, _)| *newest);
+        // A message of an epoch that is over, which has come late.
         if epoch < newest_epoch {
             return;
         }
+        // The first state of a new epoch takes the place of all of the one before: their ticks count
+        // from 0, too.
         self.kept.retain(|(of_epoch, _, _)| *of_epoch == epoch);
         if self.kept.iter().any(|(_, of_tick, _)| *of_tick == tick) {
             return;
@@ -59,6 +62,8 @@ impl<S: Clone> States<S> {
 
         self.kept.push((epoch, tick, state));
         self.kept.sort_by_key(|(_, of_tick, _)| *of_tick);
+        // Two are enough: no tick ends before the robot that asks in it has reported, so no other robot
+        // is more than one tick ahead of it.
         if self.kept.len() > 2 {
             self.kept.remove(0);
         }
@@ -88,6 +93,7 @@ impl<S: Clone> States<S> {
         let found = self.kept.iter().find(|(_, of_tick, _)| *of_tick == wanted);
         match found {
             Some((_, _, state)) => Ok(state.clone()),
+            // The robot is still at the tick whose state is asked for: the query is repeated.
             None if wanted == newest_tick + 1 => Err(NoState::NotYet),
             None if wanted > *newest_tick => Err(NoState::OutOfRange),
             None => Err(NoState::Over),
