@@ -183,6 +183,8 @@ impl Host {
             gone: options.gone_patience,
         };
         let names: Vec<RobotName> = robots.iter().map(|(name, _)| name.clone()).collect();
+        // One slow robot would keep the middleware's thread from everything else, so all have to be
+        // quick.
         let are_quick = robots.iter().all(|(_, robot)| robot.is_quick());
         let actions = Inbox::new(if are_quick {
             OnArrival::WorkSoon
@@ -218,6 +220,8 @@ impl Host {
             declared: Vec::new(),
             followed: BTreeMap::new(),
         };
+        // Robots join, and declare their tokens, only in `run`: so what is declared here is in effect
+        // before a token is seen.
         for name in &names {
             host.declare(name)?;
         }
@@ -272,6 +276,8 @@ impl Host {
         };
 
         let key = self.keys.parameters(name);
+        // On the middleware's thread. The check needs neither the robot nor its runner, so a robot that
+        // computes can be asked as well.
         let queryable = self.bus.queryable(&key, move |query| {
             match decode::<ParametersOffer>(query.key(), "simulator", &query.body()) {
                 Ok(offer) => {
@@ -293,6 +299,7 @@ impl Host {
         let participants = self.participants.clone();
         let clock = self.bus.subscribe(&self.keys.clock(), move |key, bytes| {
             match decode::<Clock>(key, "simulator", bytes) {
+                // In the order of names and under one lock: no other message comes between two robots.
                 Ok(clock) => {
                     participants.each(|participant, actions| participant.clock(clock, actions));
                 }
@@ -342,6 +349,7 @@ impl Host {
     }
 
     fn leave_bus(&mut self) {
+        // The tokens first: the robots are seen to leave while everything else of them still works.
         for member in self.members.values_mut() {
             member.token = None;
         }
@@ -415,6 +423,8 @@ impl Host {
             failed: None,
         };
         let outcome = runner.run(turn, &mut network);
+        // Before the outcome: because of this the robot was interrupted, and what it made of the tick
+        // counts for nothing.
         if let Some(failed) = network.failed.take() {
             return Err(failed);
         }
@@ -425,6 +435,7 @@ impl Host {
         } = outcome?;
         // Encoded once: a repetition of the report has the same bytes, also if the robot's panel or parameters change meanwhile.
         let bytes = encode(report.as_ref());
+        // Before the participant gets the answer, which may want the next tick run at once.
         if let Some(member) = self.members.get_mut(name) {
             member.runner = Some(runner);
         }
@@ -448,6 +459,8 @@ impl Host {
             sdk: concat!("rust/", env!("CARGO_PKG_VERSION")).to_owned(),
         };
         let key = self.keys.join_as(name);
+        // This waits for an answer, for a limited time. Meanwhile the middleware's thread feeds the
+        // other participants, and queues what they want done.
         let Some(answer) = self.bus.get(&key, "", Some(encode(&request)))? else {
             self.participants
                 .with(name, lockstep::Participant::unanswered);
@@ -459,6 +472,7 @@ impl Host {
             JoinAnswer::Welcome(welcome) => {
                 let admission = Admission::from(welcome.as_ref());
                 let states = welcome.states_before();
+                // Kept first: the turn that the participant wants next makes its runner of it.
                 member.welcome = Some(*welcome);
                 self.participants.with(name, |participant, actions| {
                     participant.admitted(admission, states, actions);
@@ -495,6 +509,7 @@ impl Host {
                 None => self.bus.put(&key, encode(&command))?,
             }
         }
+        // Without a robot that follows it, the state is not even encoded.
         if member.state.has_subscribers() {
             member.state.put(encode(answer.state.as_ref()))?;
         }
@@ -621,6 +636,8 @@ struct HostNetwork<'a> {
 impl Network for HostNetwork<'_> {
     fn state_of(&mut self, target: &RobotName) -> Result<Arc<PublicState>, Undelivered> {
         let participants = self.host.participants.clone();
+        // A robot of the same process has reported the tick before, or has missed it: there is nothing
+        // to wait for.
         if participants.has(target) {
             return participants
                 .state(target, self.query)
@@ -628,6 +645,7 @@ impl Network for HostNetwork<'_> {
         }
 
         loop {
+            // The loop of the host stands still meanwhile, so its timers fire here.
             participants.fire_timers();
             match participants.ask(self.name, target) {
                 Asked::Found(state) => return Ok(state),

@@ -101,11 +101,13 @@ impl Runner {
         turn: &Turn<News>,
         network: &mut dyn Network,
     ) -> Result<Done, RobotError> {
+        // Before anything has happened: a scenario whose changes a robot refuses does not begin.
         if turn.begin == Begin::Init {
             self.check_later_parameters()?;
         }
 
         let mut has_refused = false;
+        // Each round but the first uses up parameters of the welcome, so there is a last one.
         loop {
             let mut log = Vec::new();
             if has_refused {
@@ -233,6 +235,8 @@ impl Runner {
         if !(proposal.x.is_finite() && proposal.y.is_finite()) {
             log.push("error: the projected location is not a number; staying".to_owned());
         }
+        // It stays where it is: the next tick begins from what was reported, not from what the robot
+        // meant.
         self.proposal = Point::new(
             finite_or(proposal.x, location.x),
             finite_or(proposal.y, location.y),

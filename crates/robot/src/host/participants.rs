@@ -152,6 +152,7 @@ impl Participants {
 
     /// Feeds something to every participant, in the order of their names.
     pub(super) fn each(&self, feed: impl Fn(&mut HostParticipant, &mut Vec<HostAction>)) {
+        // One lock for all of them: no other message comes between two robots.
         let mut inner = self.lock();
         let names: Vec<RobotName> = inner.participants.keys().cloned().collect();
         for name in names {
@@ -212,6 +213,8 @@ impl Participants {
     pub(super) fn ask(&self, name: &RobotName, of: &RobotName) -> Asked {
         let mut inner = self.lock();
         let mut asked = Asked::Interrupted;
+        // What arrives after this look is noted in the queue of actions, so that the wait that follows
+        // ends at once.
         inner.feed(name, |participant, actions| {
             asked = match participant.ask(of, actions) {
                 Some(state) => Asked::Found(state),
@@ -231,6 +234,8 @@ impl Participants {
     pub(super) fn fire_timers(&self) {
         let mut inner = self.lock();
         let now = Instant::now();
+
+        // One after the other: what a timer sets off may replace another one that is due.
         while let Some((name, timer)) = inner
             .timers
             .iter()
@@ -269,12 +274,14 @@ impl Inner {
                 self.actions.push((name.clone(), action));
                 continue;
             };
+
             let key = (name.clone(), timer);
             match Instant::now().checked_add(after) {
                 Some(due) => {
                     self.timers.insert(key, due);
                     self.actions.work_at(due);
                 }
+                // A time that cannot be represented does not come.
                 None => drop(self.timers.remove(&key)),
             }
         }
@@ -285,6 +292,8 @@ impl Inner {
         let participant = self.participants.get(name);
         let is_unanswered = participant.is_some_and(Participant::is_unanswered);
         let extensions = self.extensions.entry(name.clone()).or_default();
+        // One that was answered knows why it waits: another process has its name, and patience has a
+        // limit then.
         if !is_unanswered || !self.has_simulator || *extensions == EXTENSIONS {
             return false;
         }
