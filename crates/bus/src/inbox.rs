@@ -106,6 +106,7 @@ impl<T: Send + 'static> Inbox<T> {
             is_worker_waiting: false,
             has_changed: false,
         };
+
         Self(Arc::new(InboxShared {
             queue: Mutex::new(queue),
             wake_owner: Condvar::new(),
@@ -188,6 +189,8 @@ impl<T: Send + 'static> Inbox<T> {
         }
 
         let item = queue.items.pop_front();
+        // Senders wait only while the queue is full, so only the first item taken from a full one wakes
+        // them.
         if queue.items.len() + 1 == MAX_QUEUED {
             self.0.has_room.notify_all();
         }
@@ -196,6 +199,8 @@ impl<T: Send + 'static> Inbox<T> {
 
     /// Takes the first such item, whatever is before it.
     pub fn take_first(&self, is_such: impl FnMut(&T) -> bool) -> Option<T> {
+        // Nothing waits for room here: a queue from which items are taken out of turn is filled by
+        // `push`.
         let items = &mut self.0.lock().items;
         let index = items.iter().position(is_such)?;
         items.remove(index)
@@ -222,6 +227,8 @@ impl<T: Send + 'static> Inbox<T> {
     pub fn wait(&self, until: Option<Instant>) {
         runtime::block(|| {
             let mut queue = self.0.lock();
+            // Under the lock under which changes are noted: one before this is seen below, one after it
+            // notifies.
             queue.is_worker_waiting = true;
             while !queue.has_changed && !is_over(until) {
                 queue = wait(&self.0.wake_worker, queue, until);
@@ -238,6 +245,8 @@ impl<T: Send + 'static> Inbox<T> {
     /// If the worker panicked on another thread.
     pub fn run<W: Worker>(&self, worker: W) -> (W, W::Exit) {
         let slot = Arc::new(Mutex::new(Some(Slot { worker, exit: None })));
+        // A weak reference: callbacks of the middleware hold the queue, and must not keep a worker that
+        // is over.
         let shared_slot = Arc::downgrade(&slot);
         let _first = self.0.try_work.set(Box::new(move |shared| {
             if let Some(slot) = shared_slot.upgrade() {
@@ -246,6 +255,7 @@ impl<T: Send + 'static> Inbox<T> {
         }));
 
         loop {
+            // This may wait for a thread of arrival that is at work. That one never waits for this one.
             let Ok(mut working) = slot.lock() else {
                 panic!("another thread panicked while it worked");
             };
@@ -281,6 +291,7 @@ impl<T> InboxShared<T> {
     /// Wakes a worker that waits in the middle of its work: whatever was queued is left to it. Returns whether one does.
     fn notify_worker(&self) -> bool {
         let mut queue = self.lock();
+        // A worker that waits has its own lock, so no other thread could work on the item meanwhile.
         queue.has_changed = true;
         if queue.is_worker_waiting {
             self.wake_worker.notify_all();
@@ -331,6 +342,7 @@ impl<T> InboxShared<T> {
     }
 
     fn work<W: Worker>(&self, slot: &mut Option<Slot<W>>, thread: WorkerThread) {
+        // Items still arrive between the end of the work and the return of the owner's thread.
         let Some(slot) = slot.as_mut().filter(|slot| slot.exit.is_none()) else {
             return;
         };
@@ -358,6 +370,7 @@ impl<T> InboxShared<T> {
             queue = wait(&self.wake_owner, queue, until);
         }
 
+        // The work that follows looks at the whole queue, and says anew when to wake.
         queue.is_owner_woken = false;
         queue.wakes_at = None;
     }

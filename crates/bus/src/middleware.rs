@@ -106,6 +106,8 @@ impl Bus {
             endpoint: endpoint.clone(),
             reason,
         };
+        // What can be refused is refused before there is a session. Threads are checked, too, because the
+        // middleware panics where it cannot start one.
         let config = configuration(role, overrides).map_err(&failed)?;
         check_threads().map_err(BusError::NoThreads)?;
         // The middleware tries again without a word when certificates do not fit.
@@ -153,6 +155,8 @@ impl Bus {
             .wait();
         let inner = used("publish on", key, declared)?;
 
+        // The listener first, then the status: a subscriber that comes in between is seen by one of
+        // them. It is a hint, so the order of memory does not matter.
         let watched = Arc::new(AtomicBool::new(false));
         let seen = watched.clone();
         let listener = inner
@@ -354,6 +358,8 @@ impl Bus {
         let asked = self
             .query(key, parameters, None, QUERY_TIMEOUT)?
             .callback(move |reply: zenoh::query::Reply| {
+                // The first reply settles it. Where none comes, the callback is dropped, and with it
+                // `pending`, which then settles without one.
                 if let (Some(answer), Ok(mut pending)) = (Reply::read(reply), pending.lock()) {
                     pending.settle(Some(answer));
                 }
@@ -383,6 +389,7 @@ impl Bus {
                 parameters.to_owned(),
             ))
             .payload(body.map_or_else(ZBytes::new, ZBytes::from))
+            // The middleware must neither choose a queryable nor hold replies back until it has all.
             .target(QueryTarget::All)
             .consolidation(ConsolidationMode::None)
             .congestion_control(CongestionControl::Block)
@@ -418,6 +425,8 @@ impl Bus {
             .session
             .liveliness()
             .declare_subscriber(keys)
+            // Tokens that were declared before this subscriber are reported, too: nothing depends on
+            // which side starts first.
             .history(true)
             .callback(move |sample: Sample| {
                 handle(sample.key_expr().as_str(), sample.kind() == SampleKind::Put);
@@ -539,6 +548,8 @@ fn configuration(role: &Role, overrides: Option<&PathBuf>) -> Result<Config, Str
             .insert_json5(key, value)
             .map_err(|error| format!("setting {key} = {value}: {}", reason(&error)))
     };
+    // A file replaces the settings below, but never mode and endpoints: which role a process has is
+    // said on its command line.
     let mode = match role {
         Role::Router { listen, .. } => {
             set("listen/endpoints", &format!("[{:?}]", listener(listen)))?;
@@ -569,6 +580,7 @@ fn configuration(role: &Role, overrides: Option<&PathBuf>) -> Result<Config, Str
         set(key, value)?;
     }
 
+    // After the file, so that it holds for timeouts of the file as well.
     let handshakes = [
         ("connect/endpoints", "transport/unicast/open_timeout"),
         ("listen/endpoints", "transport/unicast/accept_timeout"),
@@ -729,6 +741,8 @@ pub fn check_run(file: &Path, run: &RunName) -> Result<(), BusError> {
                 .and_then(|rest| rest.split('/').next())
             {
                 Some(name) if name != "*" && name != "**" => admitted.insert(name.to_owned()),
+                // A key of any run, or one that is not understood: there is nothing to refuse for
+                // certain.
                 _ => return Ok(()),
             };
         }

@@ -33,6 +33,8 @@ pub fn use_router_threads() {
 
 fn use_threads(wanted: &str) {
     let chosen = std::env::var(RUNTIME_VARIABLE);
+    // One of the two set-ups here was inherited from a program of the project that has started this
+    // one. Any other one is the choice of a person, and stays.
     let is_ours = match chosen.as_deref() {
         Ok(ONE_THREAD | OWN_SENDER) | Err(std::env::VarError::NotPresent) => true,
         Ok(_) | Err(std::env::VarError::NotUnicode(_)) => false,
@@ -49,6 +51,8 @@ fn use_threads(wanted: &str) {
     if let Some(name) = arguments.next() {
         command.arg0(name);
     }
+    // This returns only if it fails. The program that takes over finds the variable as wanted, so it
+    // does not do the same again.
     let error = command.args(arguments).env(RUNTIME_VARIABLE, wanted).exec();
     tracing::warn!(%error, "could not apply the lock-step thread set-up");
 }
@@ -95,6 +99,7 @@ pub fn has_own_sender() -> bool {
 /// # Errors
 /// The work, if this is not the middleware's thread.
 pub fn run_soon<W: FnOnce() + Send + 'static>(work: W) -> Result<(), W> {
+    // The middleware's threads are in its runtime; those of the project are in none.
     let Ok(handle) = tokio::runtime::Handle::try_current() else {
         return Err(work);
     };
