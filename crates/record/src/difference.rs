@@ -62,6 +62,8 @@ pub fn between(a: &Entry, b: &Entry) -> Option<Difference> {
         return Some(difference);
     }
 
+    // Only where the environment is the same: what robots reported is then the first thing that
+    // differs, and the events follow from it.
     first_report(a, b)
         .or_else(|| first_in_frame(a, b))
         .or(in_events.map(|(difference, _)| difference))
@@ -157,6 +159,7 @@ fn first_report(a: &Entry, b: &Entry) -> Option<Difference> {
     let one = a.reports.as_ref()?;
     let other = b.reports.as_ref()?;
 
+    // Also a robot that has a report in one of them only.
     let names: BTreeSet<&RobotName> = one.keys().chain(other.keys()).collect();
     for name in names {
         let jsons = [one.get(name), other.get(name)]

@@ -119,10 +119,12 @@ impl RunFolder {
         let mut path = self.path.clone();
         if self.path.file_name() == Some(OsStr::new(LATEST))
             && let Ok(target) = std::fs::read_link(&self.path)
+            // A bare name: `latest` leads to a folder beside it, and nowhere else.
             && target.file_name() == Some(target.as_os_str())
         {
             path = self.path.with_file_name(target);
         }
+
         if path.is_symlink() {
             let place = path.display();
             return Err(FileError::new(format!(
@@ -169,6 +171,7 @@ impl RunFolder {
         })?;
 
         let folder = Self::new(out, run);
+
         match if_taken {
             IfTaken::Reserved => {
                 let lock = folder.take_reserved()?;
@@ -181,6 +184,8 @@ impl RunFolder {
             IfTaken::Replace | IfTaken::Refuse | IfTaken::Number => {}
         }
 
+        // One call of the system tells whether the name was free. To look first would let two processes
+        // find it so.
         if let Some(lock) = folder.try_make()? {
             return Ok(NewRun::named(run, folder, lock));
         }
@@ -208,6 +213,7 @@ impl RunFolder {
                     ..NewRun::named(&run, folder, lock)
                 });
             }
+            // Another process may have taken this one as well. Then the next one is tried.
             number += 1;
         }
     }
@@ -243,7 +249,9 @@ impl RunFolder {
     fn take_reserved(&self) -> Result<RunLock, FileError> {
         self.check_itself()?;
         self.check_links()?;
+        // Links are looked for before anything is opened for writing, the lock included.
         let lock = self.lock()?;
+        // Under the lock: no other process can begin a record any more.
         if self.file(EVENTS).exists() {
             let place = self.path.display();
             return Err(FileError::new(format!("{place} has a run already")));
@@ -264,6 +272,7 @@ impl RunFolder {
         // First that of the launcher: its simulator may be about to take the other one.
         let _launcher = self.lock_of_launcher()?;
         let lock = self.lock()?;
+        // Under both locks: neither a launcher nor a simulator is at work in the folder.
         self.clear()?;
         Ok(lock)
     }
@@ -363,7 +372,9 @@ impl RunFolder {
         }
         files.extend([LAUNCHED, LINKS].map(|name| self.file(name)));
         files.push(self.log());
+
         for file in files.clone() {
+            // What a process that was killed left of a file.
             for ending in [DRAFT, NEW] {
                 files.push(with_ending(&file, ending));
             }
@@ -380,6 +391,7 @@ impl RunFolder {
     pub fn remove(&self) -> Result<(), FileError> {
         self.clear()?;
         remove_if_there(&self.file(LOCK)).map_err(|error| self.failed("remove", &error))?;
+
         for folder in [&self.file(LOGS), &self.path] {
             match std::fs::remove_dir(folder) {
                 Err(error)
@@ -447,6 +459,8 @@ impl RunFolder {
         if new.is_symlink() {
             std::fs::remove_file(&new)?;
         }
+        // A link cannot be changed, only replaced: by renaming a new one over it there is one at any
+        // time.
         std::os::unix::fs::symlink(target, &new)?;
         std::fs::rename(&new, &link).inspect_err(|_| {
             let _stays = std::fs::remove_file(&new);
@@ -469,6 +483,7 @@ impl RunFolder {
         self.check_links()?;
 
         let lock = self.lock()?;
+        // Only under the lock: until then another process could still write, or begin a further epoch.
         let files = self.last_epoch();
         if files.events.exists() {
             let end = seal::check(&files.events)?.end;
@@ -489,6 +504,7 @@ impl RunFolder {
         if path.is_symlink() {
             return Err(is_link(&path));
         }
+        // The file stays: two processes that make it anew would lock two different ones.
         let file = File::options().create(true).append(true).open(&path);
         let file = file.map_err(|error| self.failed("lock", &error))?;
         self.try_lock(file)
@@ -500,6 +516,7 @@ impl RunFolder {
     /// # Errors
     /// [`FileError`] if a launcher has it.
     pub fn lock_of_launcher(&self) -> Result<Option<RunLock>, FileError> {
+        // The file that a launcher writes anyway is its lock: a run that was not launched has none.
         match File::open(self.file(LAUNCHED)) {
             Ok(file) => self.try_lock(file).map(Some),
             Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
@@ -545,6 +562,7 @@ impl RunFolder {
             }
 
             let renamed = self.file(&superseded_name(name, before));
+            // To rename would replace it: a record is never overwritten.
             if renamed.symlink_metadata().is_ok() {
                 let error = ErrorKind::AlreadyExists.into();
                 return Err(self.failed("keep files in", &error));
@@ -586,6 +604,8 @@ impl RunFolder {
             return Err(is_link(&path));
         }
 
+        // On the disk under another name first: a crash leaves the file before or the new one, and no
+        // half.
         let new = with_ending(&path, NEW);
         // A process that was killed may have left it.
         let written = remove_if_there(&new)
@@ -628,6 +648,7 @@ impl RunFolder {
 
     /// The record of the last epoch.
     fn last_epoch(&self) -> EpochFiles {
+        // Counted from the files, so that there is no number that could disagree with them.
         let is_superseded = |epoch: &Epoch| self.file(&superseded_name(EVENTS, *epoch)).exists();
         let superseded = (1..).take_while(is_superseded).count();
         EpochFiles {
@@ -703,6 +724,7 @@ pub fn check_no_links(folder: &Path) -> Result<(), FileError> {
         if found.is_symlink() {
             return Err(is_link(&path));
         }
+        // Each folder has several links by nature, its own `.` among them.
         if found.is_file() && found.nlink() > 1 {
             return Err(has_hard_links(&path));
         }

@@ -217,6 +217,8 @@ impl Record {
             }
 
             if let Event::Tick { seal, .. } | Event::End { seal, .. } = &mut event {
+                // Seals are about bytes. Two records whose ticks are the same may have other bytes
+                // before them.
                 *seal = None;
             }
             let is_last = event.is_sealed();
@@ -240,6 +242,8 @@ impl Record {
         let Some(recorded) = &mut self.recorded else {
             return Ok(());
         };
+        // Events of the recording beyond those of the tick are only right at the last one: no further
+        // tick may follow.
         let after = self.events_after.take().unwrap_or_default();
         if !after.is_empty() {
             let before = entry.tick.saturating_sub(1);
@@ -253,6 +257,8 @@ impl Record {
             return Ok(());
         };
 
+        // The recording has the events of the end with those of the last tick, the file of events has
+        // them after it.
         let own = entry.events.len().min(tick.events.len());
         self.events_after = Some(tick.events.split_off(own));
         entry.recorded_events = Some(tick.events);

@@ -36,6 +36,7 @@ impl Seal {
 
     /// The seal of the lines so far and of the beginning of the next one, a JSON object that is closed here.
     fn of(&self, line: &[u8]) -> String {
+        // The digest so far is kept: the line itself is added when it has its seal.
         let mut hash = self.hash.clone();
         hash.update(line);
         hash.update(b"}");
@@ -158,6 +159,7 @@ impl RawLines {
     pub(crate) fn next(&mut self) -> Result<Option<RawLine>, FileError> {
         let mut bytes = Vec::new();
         let count = (&mut self.reader)
+            // A file without line breaks must not be read into memory as one line.
             .take(MAX_LINE)
             .read_until(b'\n', &mut bytes)
             .map_err(|error| FileError::unreadable(&self.path, &error))?;

@@ -219,6 +219,7 @@ impl Summary {
     ) {
         self.network.count(tick_s, unreachable, tick, event);
         self.counts.add(event);
+        // A span is counted when it ends, by the tick in which that happens.
         for span in self.timeline.apply(tick, event) {
             self.counts.add_span(&span, tick);
         }

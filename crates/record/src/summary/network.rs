@@ -124,6 +124,7 @@ impl NetworkSummary {
     }
 
     fn begin_cut(&mut self, from: &RobotName, to: &RobotName, now_s: f64, queries: bool) {
+        // Where a cut goes on with another scope, it is the same one.
         if self.open_cut(from, to).is_none() {
             self.cuts.push(CutSummary {
                 from: from.clone(),
@@ -134,6 +135,7 @@ impl NetworkSummary {
                 healed_after_s: None,
             });
         }
+
         if queries {
             self.notice_cut(from, to, now_s);
         }
@@ -153,6 +155,7 @@ impl NetworkSummary {
         }
 
         for (name, link) in &mut self.links {
+            // A query was possible in this tick: the age begins anew.
             if !aged.contains(name) {
                 link.stale_ticks = 0;
             }
