@@ -214,6 +214,7 @@ impl McapFile {
         record.text(media_type);
         record.u64(data.len() as u64);
         record.bytes.extend_from_slice(data);
+        // An attachment has a checksum of its own, because it is no part of a chunk.
         let crc = crc32fast::hash(record.body());
         record.u32(crc);
         record.end();
@@ -250,6 +251,7 @@ impl McapFile {
         record.u64(self.compressed.len() as u64);
         record.bytes.extend_from_slice(&self.compressed);
         record.end();
+        // The index of a chunk's messages follows it directly, as the format wants it.
         let chunk_len = self.records.len() as u64;
         let message_indexes = self.add_message_indexes(chunk);
         let message_indexes_len = self.records.len() as u64 - chunk_len;
@@ -269,6 +271,7 @@ impl McapFile {
         entry.u64(self.compressed.len() as u64);
         entry.u64(chunk.content.len() as u64);
         entry.end();
+        // Only noted: the index is written at the end, and a file without it is read chunk by chunk.
         self.index.chunk_count += 1;
         let (first_before, last_before) = self.index.times_ns.unwrap_or((first_ns, last_ns));
         self.index.times_ns = Some((first_before.min(first_ns), last_before.max(last_ns)));
@@ -308,12 +311,15 @@ impl McapFile {
     /// Writes the index and ends the file.
     pub(crate) fn finish(mut self) -> io::Result<()> {
         let mut record = Record::begin(&mut self.records, op::DATA_END);
+        // Of all bytes before this record, which is written only now.
         record.u32(self.crc.clone().finalize());
         record.end();
         self.write()?;
 
         let summary_start = self.len;
         let statistics = self.index.statistics();
+        // The index is made in memory, so that its checksum and its offsets are known when it is
+        // written.
         let mut groups = Vec::new();
         for (op, group) in [
             (op::SCHEMA, &self.index.channels.schemas),
@@ -351,6 +357,7 @@ impl McapFile {
     /// Writes the records that have been made.
     fn write(&mut self) -> io::Result<()> {
         self.file.write_all(&self.records)?;
+        // Counted only when it has been written.
         self.crc.update(&self.records);
         self.len += self.records.len() as u64;
         self.records.clear();

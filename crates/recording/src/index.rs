@@ -113,6 +113,7 @@ impl Bytes {
         let metadata = metadata.map_err(|error| self.name.unreadable(error))?;
         self.len = metadata.len();
 
+        // From where the last look ended. A file is only appended to, so nothing before that changes.
         let mut index = self.scan(end)?;
         index.is_finished = self.summary()?.is_some();
         Ok(index)
@@ -146,6 +147,7 @@ impl Bytes {
             len: little_endian(&head[1..]),
         };
         let end = record.body.checked_add(record.len);
+        // One that is not whole is being written, or was cut off.
         Ok(end.is_some_and(|end| end <= self.len).then_some(record))
     }
 
@@ -185,6 +187,8 @@ impl Bytes {
 
         let footer = self.len - MAGIC.len() as u64 - FOOTER;
         let start = little_endian(&self.read(footer + RECORD_HEAD, 8)?);
+        // Nothing in the file is trusted before its checksum is right: a place that is wrong must not
+        // be read from.
         if start < MAGIC.len() as u64 || start > footer || footer - start > MAX_BYTES {
             return Ok(None);
         }
@@ -244,6 +248,8 @@ impl Bytes {
         }
         index.end = offset;
 
+        // A file with an end is whole, so its records lead up to that end. If they did not, a length on
+        // the way is wrong.
         if self.has_end()? {
             return Err(self.name.damaged(offset, &"a length is wrong"));
         }
@@ -355,6 +361,8 @@ impl Bytes {
             return Err(damaged(&"a length is wrong"));
         }
 
+        // The checksum of the file is not read here: each chunk has its own, so that one tick is
+        // checked without reading all.
         let size = header.size as usize;
         let content = match header.compression {
             "" => compressed.to_vec(),

@@ -72,6 +72,7 @@ impl Recording {
         let mut chunks = index.chunks;
         let first = chunks.first().ok_or_else(|| bytes.name.headless())?;
         let preamble = read_preamble(&bytes, first)?;
+        // The writer puts the channels into a chunk of their own, which has no tick.
         if !preamble.has_ticks {
             chunks.remove(0);
         }
@@ -101,6 +102,7 @@ impl Recording {
 
         let grown = self.bytes.grown(self.end)?;
         self.add_chunks(grown.chunks)?;
+        // Only after the chunks were added: where one is damaged, the next call finds it again.
         self.end = grown.end;
         self.is_finished = grown.is_finished;
         Ok(())
@@ -242,6 +244,8 @@ impl Recording {
         let to = to.min(self.len());
         let mut next = from;
         while next < to {
+            // Piece by piece: a range may be the whole run, and what was read of it need not be in
+            // memory at once.
             let end = to.min(next + AT_ONCE);
             self.events(next, end)?.into_iter().for_each(&mut each);
             next = end;
@@ -274,6 +278,7 @@ impl Recording {
         let mut end = from;
         for chunk in self.chunks_of(from, to) {
             bytes = bytes.saturating_add(chunk.chunk.size);
+            // At least one chunk, however large: otherwise a caller would make no progress.
             if bytes > max_bytes && end > from {
                 return end;
             }
@@ -283,6 +288,7 @@ impl Recording {
     }
 
     fn chunks_of(&self, from: Tick, to: Tick) -> &[TickChunk] {
+        // Chunks are in the order of ticks, and none is left out: `add_chunks` has checked that.
         let begin = self.chunks.partition_point(|chunk| chunk.last < from);
         let end = self.chunks.partition_point(|chunk| chunk.first < to);
         self.chunks.get(begin..end).unwrap_or_default()
@@ -303,6 +309,8 @@ impl Recording {
 
         for message in messages {
             let tick = self.header.tick_at(message.time_ns);
+            // The times of a chunk are in its header, which has no checksum, and decide which chunks
+            // are read.
             if !(chunk.first..=chunk.last).contains(&tick) {
                 return Err(self.damaged(chunk, &"a message of another tick"));
             }
@@ -390,6 +398,7 @@ impl Partial {
             Topic::Frame => self.frame = Some(parse(json)?),
             Topic::Wall => self.wall = Some(parse(json)?),
             Topic::Events => self.events.push(Line::from_json(json)?.event),
+            // Decoded only for callers that want it: reports and panels are most of a recording.
             Topic::Report(robot) => {
                 self.reports.insert(robot.clone(), Json::unchecked(json));
             }

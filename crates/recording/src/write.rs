@@ -109,14 +109,18 @@ impl Writer {
     /// [`WriteError`] if what was recorded before cannot be written.
     pub fn tick(&mut self, tick: &TickView<'_>) -> Result<(), WriteError> {
         let mut state = self.queue.lock();
+        // The only wait of a run for its recording. It ends when a chunk has been written, or the
+        // thread that writes has ended.
         while state.chunks.len() > QUEUE && !state.is_over {
             state = wait(&self.queue.done, state);
         }
         if state.is_over {
             drop(state);
+            // An error of the other thread: its result is fetched here, once.
             return self.join();
         }
 
+        // Encoded under the lock, so that the other thread takes whole ticks only.
         let open = state.open_chunk();
         self.encoder.add_tick(tick, &mut open.chunk);
         if open.is_due() {
@@ -147,6 +151,7 @@ impl Writer {
     /// [`WriteError`] if it cannot be written.
     pub fn sync(&mut self) -> Result<(), WriteError> {
         let mut state = self.queue.lock();
+        // The other thread writes every chunk first, the open one included, and then synchronizes.
         state.wants_sync = true;
         self.queue.due.notify_one();
         while state.wants_sync && !state.is_over {
@@ -170,6 +175,8 @@ impl Writer {
     fn join(&mut self) -> Result<(), WriteError> {
         self.queue.lock().is_ended = true;
         self.queue.due.notify_one();
+        // It writes all chunks before it finds that nothing more is to come. For a second call there is
+        // no thread any more.
         let ended = match self.thread.take().map(JoinHandle::join) {
             None => Ok(()),
             Some(Ok(written)) => written,
@@ -201,6 +208,8 @@ impl WriteQueue {
     fn next(&self) -> WriterTask {
         let mut state = self.lock();
         loop {
+            // Chunks come before a synchronization, and that before the end: so both are about all that
+            // was recorded.
             if let Some(chunk) = state.next_chunk() {
                 return WriterTask::Write(chunk);
             }
@@ -211,6 +220,7 @@ impl WriteQueue {
                 return WriterTask::Finish;
             }
 
+            // Also without a word: a chunk of a slow run becomes due with time.
             let waited = self.due.wait_timeout(state, CHUNK_INTERVAL);
             state = waited.unwrap_or_else(PoisonError::into_inner).0;
         }
@@ -220,6 +230,7 @@ impl WriteQueue {
 impl WriterState {
     /// The chunk that gets the next tick.
     fn open_chunk(&mut self) -> &mut OpenChunk {
+        // Also after the other thread has taken the open chunk.
         if self.chunks.back().is_none_or(|last| last.is_full) {
             let chunk = self.spare.pop().unwrap_or_default();
             self.chunks.push_back(OpenChunk {
@@ -252,12 +263,14 @@ impl OpenChunk {
 
 /// Writes until there is nothing more to come.
 fn write(mut file: McapFile, queue: &WriteQueue) -> io::Result<()> {
+    // Dropped last, also after an error or a panic: callers that wait get to know.
     let _over = Over(queue);
 
     loop {
         match queue.next() {
             WriterTask::Write(mut chunk) => {
                 file.add_chunk(&chunk)?;
+                // Its memory goes round: at full speed nothing is allocated for a tick.
                 chunk.clear();
                 queue.lock().spare.push(chunk);
             }
