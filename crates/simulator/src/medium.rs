@@ -235,6 +235,7 @@ impl Medium {
 
         let now = self.cuts_at(tick);
         let before = std::mem::replace(&mut self.cut, now);
+        // In the order of names, so that the events are, too.
         let concerned: BTreeSet<&Pair> = before.keys().chain(self.cut.keys()).collect();
         for pair in concerned {
             let was = before.get(pair).copied().unwrap_or_default();
@@ -427,6 +428,7 @@ impl Medium {
             for _ in 0..copies {
                 let used = bytes.entry(to.clone()).or_default();
                 if *used + encoded_bytes > MAX_DELIVERED_BYTES {
+                    // Only this one: a shorter command after it may still have room.
                     decision.events.push(command.dropped(Cause::Overflow));
                     continue;
                 }

@@ -53,6 +53,7 @@ impl LineFile {
 
     /// A file that grows from epoch to epoch.
     fn append(path: PathBuf) -> Result<Self, FileError> {
+        // To append follows links, and the line would be written elsewhere.
         if path.is_symlink() {
             return Err(unwritable(&path, &"it is a link"));
         }
@@ -115,6 +116,7 @@ impl Observed {
 
     /// Takes the times of a tick that is complete now, and what is about it alone.
     fn take(&mut self, tick: Tick, begun: Instant) -> (Wall, BTreeMap<RobotName, Panel>) {
+        // Each tick has the panels that arrived in it, whether its times are recorded or not.
         let panels = std::mem::take(&mut self.panels);
         let Some(opened) = self.opened.take() else {
             return (Wall::default(), panels);
@@ -180,6 +182,8 @@ impl Recorder {
     ) -> Result<Self, FileError> {
         let scenario = simulation.scenario();
         let epoch = simulation.epoch();
+        // The files of the epoch before are out of the way first: new ones are made only where there is
+        // nothing.
         if epoch > 1 {
             folder.supersede(epoch)?;
             folder.write_scenario(scenario)?;
@@ -187,6 +191,7 @@ impl Recorder {
 
         let record = &scenario.record;
         let path = folder.file(&record.log_name);
+        // The log of a run goes on from epoch to epoch, under one name.
         let log = record.log.then(|| match epoch {
             1 => LineFile::create(path),
             _ => LineFile::append(path),
@@ -218,6 +223,8 @@ impl Recorder {
         }
         let mut recorder = Self::open(folder, run, simulation, log, DRAFT)?;
 
+        // Only what was opened: each of these takes the place of its file, and no other file is
+        // touched.
         recorder.drafts.push(EVENTS.to_owned());
         if recorder.log.is_some() {
             recorder.drafts.push(record.log_name.clone());
@@ -312,6 +319,7 @@ impl Recorder {
         simulation: &Simulation,
         record: &TickRecord,
     ) -> Result<Vec<LogRecord>, FileError> {
+        // The tick before first: the memory of its frame is used again below.
         self.write_noted()?;
 
         let mut lines = Vec::new();
@@ -369,6 +377,7 @@ impl Recorder {
         for line in noted.record.lines() {
             self.add_event(&line)?;
         }
+        // Handed to the system at once: a crash of this process does not lose them.
         self.events.flush()?;
         self.write_log(&noted.lines)?;
 
@@ -404,6 +413,8 @@ impl Recorder {
     fn add_event(&mut self, line: &Line) -> Result<(), FileError> {
         let mut text = line.to_json();
         if line.event.is_sealed() {
+            // The seal is about all lines before and the beginning of this one; then the whole line
+            // counts for the next.
             text = self.seal.seal(&text);
         }
         self.seal.add(text.as_bytes());
@@ -494,6 +505,8 @@ fn copy_log_of_earlier_epochs(
 ) -> Result<(), FileError> {
     let mut epochs = folder.epochs();
     epochs.pop();
+    // The log has no mark where an epoch begins, so its lines are counted by the events that they are
+    // made of.
     let mut count = 0;
     for files in epochs {
         let mut record = Record::of_events(&files.events)?;
@@ -539,6 +552,7 @@ fn unrecordable(error: &WriteError) -> FileError {
 #[must_use]
 pub fn header(run: &RunName, simulation: &Simulation) -> Header {
     let scenario = simulation.scenario();
+
     Header {
         run: run.clone(),
         epoch: simulation.epoch(),

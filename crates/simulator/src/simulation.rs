@@ -126,6 +126,8 @@ impl Simulation {
             scenario.network.clone(),
             names.clone(),
         );
+        // A change may name a command by its number in the run, so it is counted for from the
+        // beginning.
         for change in &scenario.changes {
             medium.count_for(&change.network);
         }
@@ -210,22 +212,26 @@ impl Simulation {
             });
         }
 
+        // No body has moved yet, so there are no verdicts.
         self.compose_news(&[]);
     }
 
     /// The first half of a tick (Figure 5 of the paper): bodies move, the medium decides, news are composed. Returns the
     /// tick.
     pub fn begin_tick(&mut self) -> Tick {
+        // What is changed at this tick holds for all of it, so changes come before moves and messages.
         self.now = self.tick + 1;
         self.events = std::mem::take(&mut self.between);
         self.change_scenario();
 
+        // Robots move by what they proposed in the tick before, guests by their own stream.
         let verdicts = self.world.advance(&self.proposals());
         self.note_moves(&verdicts);
 
         let decision = self.medium.decide(self.now);
         self.events.extend(decision.events);
         self.arriving = decision.delivered;
+        // Beside the network's decisions: robots that have no state of the last tick to answer with.
         self.unreachable = self.join_unanswering(decision.unreachable);
         self.stopped.clear();
 
@@ -237,6 +243,7 @@ impl Simulation {
     fn change_scenario(&mut self) {
         let mut network = None;
         for change in self.scenario.changes_at(self.now) {
+            // Each change has the whole network as it is from then on, so the last one counts.
             network = Some(change.network.clone());
             for set in &change.set {
                 self.events.push(Event::Changed {
@@ -279,6 +286,7 @@ impl Simulation {
             );
         }
 
+        // At the first time only: later ones find changes by hand among those of the scenario.
         self.planned
             .get_or_insert_with(|| self.scenario.changes.clone());
         self.scenario = changed;
@@ -370,9 +378,12 @@ impl Simulation {
 
     /// The second half of a tick: reports become events and are added to the digest, and expectations are judged by them.
     pub fn end_tick(&mut self, outcome: Reports) -> TickRecord {
+        // The order of the record: who takes part, what has arrived, what was reported. None of it
+        // depends on when a message came.
         self.note_membership(outcome.membership);
         self.note_deliveries(&outcome.reports);
 
+        // Where all bodies stand, then what each robot reported: what the run is compared by.
         let mut digest = self.digest.tick(self.now);
         for body in self.world.robots().iter().chain(self.world.guests()) {
             digest.place(body.x, body.y);
@@ -382,6 +393,7 @@ impl Simulation {
         self.tick = self.now;
         self.stood_at = self.world.robots().iter().copied().map(to_wire).collect();
         self.digest.close(&digest);
+        // After the digest: verdicts are about the run and no part of what it is compared by.
         self.judge();
         self.events.push(Event::Tick {
             digest: self.digest.to_string(),
@@ -425,6 +437,7 @@ impl Simulation {
     fn note_reports(&mut self, mut reports: ReportsByName, digest: &mut TickDigest) {
         self.silent.clear();
 
+        // In the order of names, not in that of arrival.
         for name in self.names.clone() {
             if let Some((report, commands)) = reports.remove(&name) {
                 let sent = self.number_commands(&name, commands);
@@ -432,6 +445,7 @@ impl Simulation {
                 self.note_done_late(&name);
                 self.note_report(&name, &report, sent);
             } else {
+                // That it has missed the tick is part of what the run is compared by.
                 digest.report(&name, None);
                 self.silent.push(name.clone());
                 self.events.push(Event::Missed { robot: name });
@@ -441,6 +455,7 @@ impl Simulation {
 
     /// A robot has done a tick of which its report does not count, because the clock goes on without it.
     pub fn done_late(&mut self, robot: &RobotName, tick: Tick) {
+        // A repetition of a report that has counted is not late.
         if tick <= self.now && self.has_not_reported_since(robot, tick) {
             self.late.entry(robot.clone()).or_default().insert(tick);
         }
@@ -455,6 +470,7 @@ impl Simulation {
     /// Records what a robot that takes part again has done of the ticks that it missed: its state depends on them.
     fn note_done_late(&mut self, robot: &RobotName) {
         let mut ticks = self.late.remove(robot).unwrap_or_default();
+        // The report of the open tick is in time.
         ticks.remove(&self.now);
         if !ticks.is_empty() {
             self.events.push(Event::DoneLate {
@@ -505,6 +521,7 @@ impl Simulation {
     fn proposals(&self) -> Vec<Option<world::Point>> {
         let mut proposals = Vec::with_capacity(self.names.len());
         for name in &self.names {
+            // What it proposed before counts no more: it stays where it is.
             let is_silent = self.silent.contains(name);
             let report = self.reports.get(name).filter(|_| !is_silent);
             proposals.push(report.map(|report| to_world(report.proposal)));
@@ -516,6 +533,7 @@ impl Simulation {
         for (index, verdict) in verdicts.iter().enumerate() {
             let by = self.blocker(*verdict);
             self.blocked[index] = by.is_some();
+
             if let Some(by) = by {
                 if by == Blocker::TooFast {
                     self.note_too_fast(index);
@@ -603,6 +621,7 @@ impl Simulation {
                 sensed: self.sensed_robots(index),
                 bodies: self.sensed_bodies(index),
             };
+            // A robot without news gets none: silence says that all is as it expects.
             if !news.is_empty() {
                 all.insert(name.clone(), news);
             }
@@ -636,6 +655,8 @@ impl Simulation {
                     others.push(other.clone());
                 }
             }
+            // A robot may be out of reach for two reasons, and the order of names is that of the
+            // record.
             others.sort();
             others.dedup();
         }
@@ -686,6 +707,7 @@ impl Simulation {
     fn note_deliveries(&mut self, reports: &ReportsByName) {
         for (target, arrivals) in std::mem::take(&mut self.arriving) {
             let has_arrived = reports.contains_key(&target);
+
             for Arrival { seq, delivery } in arrivals {
                 let to = target.clone();
                 let from = delivery.from;
@@ -709,6 +731,8 @@ impl Simulation {
         from: &RobotName,
         commands: Vec<Sent<CommandText>>,
     ) -> Vec<SentCommand> {
+        // On the wire the numbers begin with 1 in every tick. Those of the record go on through the
+        // epoch, whichever incarnation sends.
         let count = self.sent.entry(from.clone()).or_default();
         let mut numbered = Vec::with_capacity(commands.len());
 
@@ -730,6 +754,8 @@ impl Simulation {
         self.incarnations
             .insert(robot.clone(), follow(last, report.generation));
         let before = self.reports.insert(robot.clone(), report.clone());
+
+        // The record has changes only, and before its first report a robot has no state.
         let emotion_before = before.as_ref().map(|report| report.emotion_state.clone());
         let behavior_before = before.as_ref().map(|report| report.behavior_state.clone());
 
@@ -749,6 +775,7 @@ impl Simulation {
         }
         for command in sent {
             self.events.push(command.event());
+            // The medium decides about it at the beginning of the next tick.
             self.medium.accept(command);
         }
         for text in &report.log {
@@ -904,6 +931,8 @@ impl Simulation {
             earlier_parameters: within_message(earlier),
             later_parameters: within_message(later),
             news_flag: 1 << (index % NEWS_FLAGS),
+            // With an answer to the open tick the newest state is that one, and others may still query
+            // the one before.
             state_before: open_state.as_ref().and(last_state.clone()),
             last_state: open_state.or(last_state),
         })
@@ -1080,6 +1109,8 @@ fn within_message<'a>(all: impl Iterator<Item = &'a Parameters>) -> Vec<Paramete
             parameters: parameters.clone(),
         })
         .len();
+
+        // Without gaps: a robot goes through them in their order.
         if bytes > MAX_OTHER_PARAMETERS {
             break;
         }

@@ -49,6 +49,7 @@ pub(super) fn execute<S: TickSource>(
         Control::Setup => answer_setup(&query, source.scenario()),
         Control::Log => frontend.observers.answer_log(&query),
         Control::Stop => {
+            // Answered now: a server that stops answers nothing more.
             source.answer_status(&query, frontend);
             return Err(Exit::End(End::Stopped).into());
         }
@@ -74,6 +75,7 @@ fn act<S: TickSource>(
         Control::Start => source
             .check_next_tick()
             .and_then(|()| frontend.pace.start()),
+
         Control::Pause => {
             frontend.pace.pause()?;
             source.answer_stepping(frontend);

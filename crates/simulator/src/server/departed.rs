@@ -26,6 +26,7 @@ impl Departed {
 
     /// A process takes the place of this robot.
     pub(super) fn forget(&mut self, robot: &RobotName) {
+        // A process is here after all, started by hand or by another launcher.
         self.because.remove(robot);
         self.refused.remove(robot);
     }

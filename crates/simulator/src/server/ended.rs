@@ -25,6 +25,7 @@ impl LiveRun {
     /// Whether the clock waits for a robot whose process has ended for good.
     pub(super) fn endless_wait(&self) -> Wait {
         let mut wait = Wait::Bounded;
+        // Nearly always so, and this is asked in every turn of the loop.
         if self.departed.is_empty() {
             return wait;
         }
@@ -34,10 +35,12 @@ impl LiveRun {
             if !is_gone || self.departed.because(&robot).is_none() {
                 continue;
             }
+            // Its successor declares its token, or a timer of the barrier ends the reservation.
             if self.barrier.is_reserved(&robot) {
                 wait = Wait::Standby(STANDBY);
                 continue;
             }
+            // One robot that does not come is enough. The others only say when to look again.
             match self.departed.standby_left(&robot) {
                 None => return Wait::Endless,
                 Some(left) => wait = Wait::Standby(left),
@@ -143,6 +146,7 @@ impl LiveRun {
         end: End,
         mut frontend: Frontend,
     ) -> Result<Summary, ServerError> {
+        // Its failure is looked at last, so that the robots get to know the end in any case.
         let summary = self.end(end, &mut frontend);
         self.leave(end, frontend)?;
         Ok(summary?)
@@ -163,6 +167,8 @@ impl LiveRun {
         let simulation = &self.epoch.simulation;
         let mut awaited: Vec<RobotName> = Vec::new();
         for name in self.barrier.roster() {
+            // Also one that has just reported and seems to be gone: its link may come back, and it
+            // would wait for a further tick.
             let took_part = simulation
                 .report(name)
                 .is_some_and(|report| report.tick == simulation.tick());

@@ -27,8 +27,12 @@ impl LiveRun {
         let simulation = &mut self.epoch.simulation;
         let mut orders = simulation.faults_due();
         let lateness = self.barrier.lateness();
+        // Before the orders of restarts are added: a restart has events of its own kind, whatever the
+        // launcher is told.
         simulation.note_faults(&orders, |robot| lateness.of(robot));
 
+        // A restart takes two orders. The second one follows when the process is gone, so that its
+        // successor finds the name free.
         let mut then = Vec::new();
         for robot in simulation.restarts_due() {
             orders.push(restart_order(&robot, true));
@@ -61,6 +65,7 @@ impl LiveRun {
             begins: false,
             for_s: None,
         }];
+
         self.orders.note(&orders);
         self.orders.publisher.put(encode(&FaultOrder {
             epoch: simulation.epoch(),
@@ -76,11 +81,14 @@ impl LiveRun {
         orders: Vec<ProcessOrder>,
         then: Vec<ProcessOrder>,
     ) -> PendingOrders {
+        // Before the order is put, so that the barrier knows why a token goes.
         for order in &orders {
             self.barrier.fault(&order.robot, order.lasting());
         }
         self.orders.note(&orders);
 
+        // An order that follows another one is of the same tick: the answer to the first must not count
+        // for it.
         self.orders.done = None;
         let now = Instant::now();
         PendingOrders {
@@ -116,6 +124,8 @@ impl LiveRun {
             self.orders.publisher.put(encode(&pending_orders.order))?;
         }
         let is_done = self.orders.done == Some((pending_orders.order.epoch, tick));
+        // Two things must hold: the launcher says that it has done its part, and the tokens show what
+        // came of it.
         let mut is_carried_out = is_done;
         for order in &pending_orders.order.orders {
             // Before tick 0 robots are gathered, which waits for those whose faults are over.
@@ -132,6 +142,7 @@ impl LiveRun {
             self.epoch.waits_for = WaitsFor::Faults(pending_orders);
             return Ok(Some(Duration::ZERO));
         }
+        // A robot whose hang is over finds in the clock that it is asked to join again.
         if is_done && pending_orders.repeated.elapsed() > REJOIN_INTERVAL {
             pending_orders.repeated = Instant::now();
             self.barrier.repeat(&mut self.outputs);
@@ -149,6 +160,7 @@ impl LiveRun {
             return Ok(Some(POLL_INTERVAL));
         }
 
+        // It is waited for once: without a launcher, later faults do not hold the clock.
         if self.orders.has_complained {
             return Ok(None);
         }

@@ -34,6 +34,7 @@ impl Frontend {
         } else {
             OnArrival::Wake
         };
+
         Ok(Self {
             run,
             observers: Observers::new(&bus, &keys)?,
@@ -59,6 +60,8 @@ impl Frontend {
         let inbox = self.inbox.clone();
         self.bus.subscribe(keys, move |key, bytes| {
             let robot = Keys::robot_of(key).unwrap_or_default().to_owned();
+            // Decoded where it arrives. The state of the server is changed only by the thread that
+            // works.
             inbox.send_and_work(match decode(key, &robot, bytes) {
                 Ok(message) => event(robot, message),
                 Err(error) => Event::Malformed(error),
@@ -86,6 +89,7 @@ impl Frontend {
         self.declare_queryable(&self.keys.join(), Event::Join)?;
         self.declare_queryable(&self.keys.joins(), Event::Join)?;
         self.declare_queryable(&self.keys.control(), Event::Control)?;
+        // Last, for the same reason as a robot's token: a robot that sees it can ask at once.
         let token = self.bus.token(&self.keys.alive_sim())?;
         self.keep(token);
         Ok(())

@@ -31,12 +31,14 @@ impl LiveRun {
     fn judge_join(&mut self, query: &Query, run: &RunName) -> Result<JoinAnswer, NotAdmitted> {
         let request: JoinRequest = decode(query.key(), "a robot", &query.body())
             .map_err(|error| (Refusal::Malformed, error.to_string()))?;
+        // What the request itself shows to be wrong is refused before the barrier is asked.
         check_request(query, &request, run)?;
 
         let name = &request.name;
         let admission = self
             .barrier
             .join(name, &request.instance, &mut self.outputs);
+        // It asks again soon, and takes the place when it is free: the clock may wait for it a little.
         if admission == Err(Refused::NameTaken) {
             self.departed.refused(name);
         }
@@ -50,6 +52,7 @@ impl LiveRun {
         let simulation = &mut self.epoch.simulation;
         simulation.list_bodies(name, request.bodies);
 
+        // A predecessor may have answered the open tick: then its successor begins after that answer.
         let open = self.barrier.open_report(name).map(AsRef::as_ref);
         let welcome = simulation.welcome(run, name, admission.generation, open);
         match welcome {

@@ -103,6 +103,7 @@ impl LiveEpoch {
     ) -> Result<Self, ServerError> {
         let simulation = Simulation::new(scenario, epoch)?;
         let record = EpochRecord::begin(folder, &frontend.run, &simulation, replay_log)?;
+
         Ok(Self {
             simulation,
             record,
@@ -230,6 +231,7 @@ impl TickSource for LiveRun {
             self.barrier.timer(&timer, &mut self.outputs);
         }
         self.carry_out(frontend)?;
+        // Only now: what has arrived, and the timers, may have changed for whom the clock waits.
         let standby = match self.endless_wait() {
             Wait::Bounded => None,
             Wait::Standby(left) => Some(left),
@@ -237,6 +239,7 @@ impl TickSource for LiveRun {
         };
         let simulation = &self.epoch.simulation;
         let is_waiting_for_robots = matches!(self.epoch.waits_for, WaitsFor::Robots);
+        // Complete, not only granted: while robots are awaited, the last tick is open.
         if simulation.tick() >= simulation.scenario().ticks && !is_waiting_for_robots {
             return Err(Exit::End(End::Finished).into());
         }
@@ -412,6 +415,9 @@ impl LiveRun {
         // The files of this epoch are finished before the next one renames them.
         self.epoch.record.supersede()?;
         let deferred = std::mem::take(&mut self.epoch.deferred);
+
+        // The record of the new epoch begins here: what has to be answered from the old one was taken
+        // out before.
         let number = self.epoch.simulation.epoch() + 1;
         self.epoch = LiveEpoch::begin(scenario, number, &self.folder, frontend, None)?;
         for query in deferred {
@@ -427,6 +433,7 @@ impl LiveRun {
     fn begin_epoch(&mut self, frontend: &mut Frontend) -> Result<(), BusError> {
         self.outputs.clear();
         let simulation = &mut self.epoch.simulation;
+        // A robot says this when it joins, which may have been in an earlier epoch.
         for name in &self.with_bodies {
             simulation.list_bodies(name, true);
         }
@@ -440,6 +447,8 @@ impl LiveRun {
 
         frontend.pace.gather();
         self.gather();
+        // A process that a fault keeps from running cannot join: faults of the epoch before are ended
+        // first, and then robots are gathered once more (`open_next_tick`).
         let number = self.epoch.simulation.epoch();
         if let Some(pending_orders) = self.order_end_of_faults(number) {
             self.epoch.waits_for = WaitsFor::Faults(pending_orders);

@@ -38,15 +38,20 @@ impl LiveRun {
         let Some(name) = self.known(robot) else {
             return;
         };
+        // Observed first: the barrier may complete the tick with it.
         let epoch = &mut self.epoch;
         if let Some(observed) = epoch.record.observed() {
             observed.report(&name, report.tick);
         }
+
+        // An answer that does not count is noted as well: the robot's state depends on the ticks that
+        // it has done.
         let stamp = Stamp::from(&report);
         let is_of_epoch = stamp.epoch == epoch.simulation.epoch();
         if is_of_epoch && self.barrier.is_behind(&name, stamp.generation) {
             epoch.simulation.done_late(&name, stamp.tick);
         }
+
         let commands = report.commands;
         self.barrier
             .report(&name, stamp, commands, Arc::new(report), &mut self.outputs);

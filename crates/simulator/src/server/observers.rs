@@ -50,6 +50,7 @@ impl Observers {
 
     /// A tick is complete: observers see it, unless another one is complete before it is time for a frame.
     pub(super) fn request_frame(&mut self) {
+        // Only noted: at full speed most ticks are never shown, and cost no frame.
         self.is_frame_due = self.world.has_subscribers();
     }
 
@@ -68,12 +69,14 @@ impl Observers {
     pub(super) fn put(&mut self, mut frame: WorldFrame) {
         self.last_frame = Instant::now();
         self.is_frame_due = false;
+        // Also those of ticks that no frame has shown: what became of a command is seen once.
         frame.flights = std::mem::take(&mut self.flights).into();
         put_lossy(&self.world, encode(&frame));
     }
 
     /// Notes what the next frame shows of the events of a tick.
     pub(super) fn note(&mut self, tick: Tick, events: &[Event]) {
+        // Without observers nothing is noted, and so nothing grows.
         if !self.world.has_subscribers() {
             return;
         }
@@ -152,6 +155,7 @@ impl PastLines {
     fn add(&mut self, line: &LogRecord) {
         self.bytes += line.text.len();
         self.lines.push_back(line.clone());
+        // Two limits, because an answer has both: entries of a list, and bytes of a message.
         while self.lines.len() > MAX_ENTRIES || self.bytes > MAX_PAST_BYTES {
             let dropped = self.lines.pop_front();
             self.bytes -= dropped.map_or(self.bytes, |dropped| dropped.text.len());

@@ -40,6 +40,7 @@ impl LiveRun {
         let bus = frontend.bus.clone();
         let keys = frontend.keys.clone();
         let inbox = frontend.inbox.clone();
+
         let asking = thread::Builder::new()
             .name("offers".to_owned())
             .spawn(move || {
@@ -50,6 +51,7 @@ impl LiveRun {
                     refusal,
                 });
             });
+        // The query has gone with the closure: it ends at once where it was sent, without an answer.
         if let Err(error) = asking {
             tracing::warn!("robots cannot be asked about their parameters: {error}");
         }
@@ -61,6 +63,7 @@ impl LiveRun {
 /// # Errors
 /// The first refusal, in words.
 fn ask_all(bus: &Bus, keys: &Keys, offers: &[Offer]) -> Result<(), String> {
+    // One limit for all robots together: a client waits for this.
     let deadline = Instant::now() + TIMEOUT;
     for (robot, parameters) in offers {
         let left = deadline.saturating_duration_since(Instant::now());
@@ -75,6 +78,7 @@ fn ask_all(bus: &Bus, keys: &Keys, offers: &[Offer]) -> Result<(), String> {
         };
         match bus.get_within(&key, "", Some(encode(&offer)), left) {
             Ok(Some(reply)) => judge(robot, &key, reply.result)?,
+            // It has no check, or is stopped: then it finds out when it begins.
             Ok(None) => {}
             Err(error) => tracing::warn!("{error}"),
         }

@@ -29,6 +29,8 @@ impl Orders {
     /// Notes orders that are about to be put.
     pub(super) fn note(&mut self, orders: &[ProcessOrder]) {
         for order in orders {
+            // Whether it begins or ends: of a robot and a kind of fault there is one order in effect at
+            // most.
             self.in_effect
                 .retain(|begun| (&begun.robot, begun.kind) != (&order.robot, order.kind));
             if order.begins {
@@ -57,6 +59,7 @@ impl Orders {
                     ..begun.clone()
                 });
             }
+
             ends.push(ProcessOrder {
                 begins: false,
                 for_s: None,

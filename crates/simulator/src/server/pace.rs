@@ -143,6 +143,7 @@ impl Pace {
 
     /// Takes one tick of what was granted. `Err` says how long to wait at most before looking again.
     pub(super) fn take_grant(&mut self, tick_s: f64) -> Result<(), Option<Duration>> {
+        // Steps do not wait for their time: a person has asked for them.
         if self.pending_steps > 0 {
             self.pending_steps -= 1;
             return Ok(());
@@ -162,6 +163,8 @@ impl Pace {
 
         // A speed is finite and positive, but a very slow one asks for a very long tick.
         let tick = Duration::try_from_secs_f64(tick_s / speed).unwrap_or(Duration::MAX);
+        // A clock that is a little behind catches up, so that the mean speed is right. One that was
+        // held does not race.
         let from = if now - self.due > MAX_BEHIND {
             now
         } else {

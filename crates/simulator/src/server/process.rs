@@ -39,6 +39,7 @@ impl<S: TickSource> Worker for Loop<S> {
     fn work(&mut self, _: WorkerThread) -> Result<Option<Duration>, Exit> {
         let Server { frontend, source } = &mut self.0;
         source.begin_work();
+        // Whatever stops the work, `end_work` still writes what is complete.
         let outcome = work_until_idle(source, frontend);
         source.end_work(outcome, frontend)
     }
@@ -50,6 +51,8 @@ fn work_until_idle<S: TickSource>(
     frontend: &mut Frontend,
 ) -> Result<Option<Duration>, S::Interrupt> {
     loop {
+        // One event at a time: what it changes is seen by the next one, and by the look at the clock
+        // after all of them.
         while let Some(event) = frontend.inbox.take() {
             handle(event, source, frontend)?;
         }

@@ -41,6 +41,8 @@ impl EpochRecord {
             None => Recorder::begin(folder, run, simulation)?,
             Some(_) => Recorder::resume(folder, run, simulation)?,
         };
+
+        // With nothing to execute again, the drafts are the record from the beginning.
         let is_empty = replay_log.as_ref().is_some_and(ReplayLog::is_empty);
         if is_empty {
             recorder.supersede_record()?;
@@ -92,6 +94,7 @@ impl EpochRecord {
         let Some(open) = self.open() else {
             unreachable!("no tick takes place after the end of a run");
         };
+
         if let Some(observed) = open.recorder.observed() {
             observed.opened = Some(opened);
         }
@@ -118,6 +121,7 @@ impl EpochRecord {
             return Ok(false);
         };
 
+        // The drafts are left behind then, and the record is as it was.
         if let Some(difference) = replay_log.compare(record)? {
             return Err(Exit::Failed(ServerError::NotRepeated(difference)));
         }
@@ -148,6 +152,8 @@ impl EpochRecord {
         let Some(OpenRecord { recorder, .. }) = self.open() else {
             unreachable!("a run ends once");
         };
+        // The events get their end before the summary is written: a folder with a summary is one of a
+        // run that is over.
         let record = simulation.end_waiting(end, waited_for);
         let lines = recorder.write(simulation, &record)?;
 

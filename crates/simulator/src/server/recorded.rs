@@ -72,6 +72,7 @@ impl Server<RecordedRun> {
             shown_at: Instant::now(),
         };
         frontend.pace.ready();
+        // After the queryables of the robots: an observer that sees the token finds all of them.
         frontend.declare_simulator()?;
         Ok(Self { frontend, source })
     }
@@ -138,6 +139,8 @@ impl TickSource for RecordedRun {
             Ok(()) => {
                 self.put_tick(frontend);
                 self.answer_reached(self.player.tick(), frontend);
+                // The tick at which the replay holds is shown in any case, those on the way only as
+                // often as people can see.
                 let is_held = frontend.pace.is_held();
                 if is_held || self.shown_at.elapsed() >= FRAME_INTERVAL {
                     self.put_frame(frontend);
@@ -176,6 +179,7 @@ impl TickSource for RecordedRun {
 
                 // The lines that follow do not continue those before.
                 let text = format!("the replay continues at tick {tick}");
+                // After the seek: the line belongs to the tick from which the replay goes on.
                 let status = self.status(frontend);
                 frontend.observers.log_line(&status, LogKind::Run, &text);
                 self.put_tick(frontend);
@@ -284,6 +288,7 @@ impl RecordedRun {
                 put_lossy(&robot.state, encode(&state));
             }
             let arrived = player.panel(name).map(|(arrived, _)| *arrived);
+            // A panel is put when it changes, also after a seek to where another one was shown.
             if arrived != robot.panel_arrived {
                 robot.panel_arrived = arrived;
                 robot.is_panel_due = true;
@@ -304,6 +309,7 @@ impl RecordedRun {
             let is_present =
                 shown.any(|shown| shown.name == *name && shown.presence == Presence::Here);
             if !is_present {
+                // Dropping the declaration undeclares it, as the robot's process did.
                 robot.token = None;
             } else if robot.token.is_none() {
                 robot.token = Some(frontend.bus.token(&frontend.keys.alive_robot(name))?);
@@ -373,8 +379,10 @@ impl RecordedRun {
                 self.what_it_is()
             ));
         }
+        // Before anything is changed: where the tick cannot be read, the replay stays as it is.
         self.player.seek(tick).map_err(|error| error.to_string())?;
 
+        // What was under way before would be shown as if it led to the ticks after.
         frontend.observers.forget();
         frontend.pace.pending_steps = 0;
         frontend.pace.due = Instant::now();

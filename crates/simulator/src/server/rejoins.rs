@@ -68,6 +68,7 @@ impl LiveRun {
             return None;
         };
         let barrier = &self.barrier;
+        // One that is back stays back: nothing is granted meanwhile that it could miss.
         wait.robots.retain(|robot| !barrier.is_back(robot));
         if wait.robots.is_empty() {
             return None;

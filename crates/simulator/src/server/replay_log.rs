@@ -34,6 +34,8 @@ impl ReplayLog {
         let mut done_late = BTreeMap::new();
 
         if files.events.exists() {
+            // The whole record is read once in advance: an answer that came too late is noted in a
+            // later tick than the one that it is of.
             done_late = read_done_late(&files.events)?;
             let mut events = Record::of_events(&files.events)?;
             next = next_tick(&mut events)?;

@@ -39,6 +39,7 @@ impl LiveRun {
             Control::Load { scenario } => {
                 self.on_init(load(scenario, simulation.scenario()), &query, frontend)
             }
+
             // The faults before the next tick are being carried out: it waits for that tick.
             Control::Intervene { .. } if matches!(self.epoch.waits_for, WaitsFor::Faults(_)) => {
                 self.defer(query);
@@ -57,6 +58,7 @@ impl LiveRun {
             }
             Control::ProcessEnded { robots, because } => self.note_departed(robots, because),
             Control::Intervene { what } => self.intervene(what),
+
             Control::Late {
                 robot,
                 on_late,
@@ -113,6 +115,8 @@ impl LiveRun {
             simulation.change_by_hand(&[Scenario::words_of_lateness(robot, on_late)?])?;
         }
 
+        // At once as well, and not only from the next tick on: the clock may be held because of the
+        // robot.
         let mut lateness = self.barrier.lateness().clone();
         match (robot, on_late) {
             (Some(robot), Some(on_late)) => {
@@ -139,6 +143,8 @@ impl LiveRun {
 
     /// Does something to the run, from the next tick on.
     fn intervene(&mut self, what: &Intervention) -> Result<(), String> {
+        // Refused before anything is looked at: while the record is executed again, nothing may differ
+        // from it.
         self.check_interventions()?;
         let concerns_processes = match what {
             Intervention::Fault { .. } | Intervention::Recover { .. } => true,
@@ -157,6 +163,8 @@ impl LiveRun {
             );
         }
 
+        // The clock is held because of the fault, so no further tick comes at which a change could end
+        // it.
         if let Intervention::Recover { robot } = what
             && let Some(kind) = self.fault_that_holds_clock(robot)
         {
@@ -206,6 +214,8 @@ impl LiveRun {
                 refuse(query, &format!("the run is {}", frontend.pace.phase));
             }
             Ok(next) => {
+                // All are answered now: the epoch that they asked about is over when the next one
+                // begins.
                 self.answer_stepping(frontend);
                 self.answer_status(query, frontend);
                 return Err(Interrupt::Init(Box::new(next)));

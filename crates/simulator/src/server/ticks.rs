@@ -58,6 +58,8 @@ impl LiveRun {
             }
         }
 
+        // Nothing holds the clock any more. The operator's commands are sent between two ticks, so that
+        // they arrive in the one that begins now.
         let epoch = &mut self.epoch;
         let commands = match epoch.record.replay_log() {
             Some(replay_log) => replay_log.commands(),
@@ -78,6 +80,7 @@ impl LiveRun {
     fn open_tick(&mut self, tick: Tick) {
         self.epoch.waits_for = WaitsFor::Robots;
         self.epoch.waiting_since = Instant::now();
+        // Before the barrier opens the tick, and by this decides for whom it waits.
         self.recall_attendance();
         let news = self.epoch.simulation.robots_with_news();
         self.barrier.open(tick, news, &mut self.outputs);
@@ -108,6 +111,8 @@ impl LiveRun {
 
     /// Carries out what the barrier wants done, also what it wants because of that.
     pub(super) fn carry_out(&mut self, frontend: &mut Frontend) -> Result<(), Exit> {
+        // Until nothing is left: `Gathered`, for example, opens tick 0, which is granted by a further
+        // output.
         while !self.outputs.is_empty() {
             for output in std::mem::take(&mut self.outputs) {
                 match output {
@@ -165,6 +170,7 @@ impl LiveRun {
         mut outcome: Outcome<Arc<Report>, CommandText>,
         frontend: &mut Frontend,
     ) -> Result<(), Exit> {
+        // First, because it measures until now how long the tick was held.
         self.count_stragglers();
         // Before the tick ends: what does not count must not reach the events.
         self.drop_late(&mut outcome);
@@ -184,6 +190,7 @@ impl LiveRun {
 
         epoch.waits_for = WaitsFor::Pace;
         if epoch.record.is_repeating() {
+            // After the last tick of the record the run goes on as a new one, at its pace.
             if epoch.record.compare(&record)? {
                 frontend.pace.ready();
                 tracing::info!("resumed after tick {}", record.tick);
@@ -233,6 +240,7 @@ impl LiveRun {
 
     /// The clock is held: tells people for which robots, and answers a client that waits for a step.
     fn report_held(&mut self, frontend: &mut Frontend) {
+        // Those for whom people were told first: who is awaited may change until the tick is complete.
         if self.epoch.stragglers.is_empty() && self.barrier.is_open() {
             for (name, reason) in self.barrier.awaited() {
                 if !matches!(reason, Reason::WaitsFor(_)) {

@@ -27,6 +27,8 @@ struct PendingTimer {
 impl Timers {
     /// Sets a timer, or sets it anew.
     pub(super) fn set(&mut self, timer: Timer, after: Duration, now: Instant) {
+        // A time that cannot be represented never comes, and the timer that it replaces must not fire
+        // either.
         let Some(due) = now.checked_add(after) else {
             self.set.remove(&timer);
             return;
@@ -51,6 +53,7 @@ impl Timers {
     pub(super) fn take_due(&mut self, now: Instant) -> Option<Timer> {
         self.put_off_deadline(now);
 
+        // In a fixed order. The others follow in the next turns of the caller's loop.
         let (timer, _) = self.set.iter().find(|(_, pending)| pending.due <= now)?;
         let timer = timer.clone();
         self.set.remove(&timer);
@@ -64,6 +67,7 @@ impl Timers {
             return;
         };
         let overdue = now.saturating_duration_since(deadline.due);
+        // Once only: a machine that stalls again and again must not keep a robot from being late.
         if overdue > STALL && !deadline.was_put_off {
             deadline.due = now + deadline.after;
             deadline.was_put_off = true;

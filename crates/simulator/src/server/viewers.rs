@@ -26,6 +26,7 @@ impl Viewers {
         if self.are_present {
             return None;
         }
+        // Where there has never been a browser, none is waited for.
         let gone = self.gone_at.map_or(GRACE, |gone_at| gone_at.elapsed());
         Some(GRACE.saturating_sub(gone))
     }

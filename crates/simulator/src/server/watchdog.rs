@@ -76,6 +76,7 @@ impl Watchdog {
 
 /// What takes too long, once in a while. `slept` is how long the thread that looks was asleep.
 fn look(activity: &Mutex<ActivityLog>, slept: Duration) -> Option<String> {
+    // Where this thread did not run either, nothing can be said about the other one.
     let oversleep = slept.saturating_sub(LOOK_EVERY);
     if oversleep > STALL {
         let seconds = oversleep.as_secs_f64();
