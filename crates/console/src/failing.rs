@@ -24,6 +24,7 @@ pub(crate) enum Next {
 /// Looks for the file in which the launcher says that the run has failed, and tells browsers. Returns when a person wants the run
 /// to go on, or when it has failed and no browser shows it. `awaits_browser` is whether one has been started.
 pub(crate) async fn watch(file: &Path, app: &App, awaits_browser: bool) -> Next {
+    // A browser that was started counts as seen until it can be here.
     let mut seen_at = awaits_browser.then(|| Instant::now() + GRACE);
     loop {
         tokio::select! {
@@ -34,6 +35,7 @@ pub(crate) async fn watch(file: &Path, app: &App, awaits_browser: bool) -> Next 
             seen_at = seen_at.max(Some(Instant::now()));
         }
 
+        // Told once. From then on only the browsers decide when this ends.
         if app.failed().borrow().is_none() {
             let Some(failed) = Failed::read(file) else {
                 continue;

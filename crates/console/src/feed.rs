@@ -87,6 +87,7 @@ impl Feed {
 
     fn change<T>(&self, change: impl FnOnce(&mut FeedState) -> T) -> T {
         let outcome = change(&mut self.lock());
+        // After the change and without its lock: a browser that wakes finds it, and need not wait.
         self.changed.send_replace(());
         outcome
     }
@@ -101,6 +102,8 @@ impl Feed {
     pub(crate) fn set_present(&self, is_present: bool) {
         self.change(|state| {
             if is_present && !state.is_present {
+                // Lines put before this console could receive them are still to be fetched, and come
+                // before these.
                 state.held_lines = Some(VecDeque::new());
             }
             state.is_present = is_present;
@@ -182,6 +185,7 @@ impl FeedState {
     fn put_frame(&mut self, encoded: EncodedFrame) {
         let frame = &encoded.frame;
         let previous = self.frame.as_ref().map(|previous| &previous.frame);
+        // Ticks of a new epoch begin at 0 again: a flight of the one before would be shown in it.
         if previous.is_some_and(|previous| previous.epoch != frame.epoch) {
             self.flights.clear();
         }
@@ -200,6 +204,7 @@ impl FeedState {
     }
 
     fn put_panel(&mut self, robot: &RobotName, text: Utf8Bytes) -> Result<(), String> {
+        // Its own panel is replaced, so it does not count.
         if self.panel_bytes_without(robot) + text.len() > MAX_PANEL_BYTES {
             return Err(format!(
                 "panels are larger than the {MAX_PANEL_BYTES} bytes allowed together"
@@ -227,9 +232,12 @@ impl FeedState {
     fn catch_up(&mut self, lines: Option<Vec<LogRecord>>) {
         let held = self.held_lines.take().unwrap_or_default();
         let lines = lines.unwrap_or_default();
+        // A line that arrived while the others were fetched may be among these as well. It is left out
+        // of those that were held, and so are all before it.
         let is_told = held.iter().rposition(|(line, _)| lines.contains(line));
         let newer = is_told.map_or(0, |index| index + 1);
 
+        // After a simulator that has come back, the feed knows the first of them already.
         let last = self.lines.back().map(|line| &line.value);
         let is_known = lines.iter().rposition(|line| Some(line) == last);
         let new = is_known.map_or(0, |index| index + 1);
@@ -250,6 +258,7 @@ impl FeedState {
             return;
         }
 
+        // Lines that were lost have numbers, too: the gap is what a browser is told.
         let number = self.next_line + lost;
         self.next_line = number + 1;
 
@@ -318,10 +327,13 @@ impl FeedState {
         let from = self.lines.partition_point(|line| line.number < wanted);
         let to = self.lines.len().min(from + MAX_LINES_PER_MESSAGE);
         let new = self.lines.range(from..to);
+        // Where nothing is new, the cursor stays.
         let next = new.clone().next_back()?.number + 1;
         cursor.next_line = Some(next);
 
         let lines: Vec<LogRecord> = new.map(|line| line.value.clone()).collect();
+        // Numbers that no line has: those that were lost before they came here, and those that this
+        // browser was too slow for.
         let dropped = next - wanted - lines.len() as u64;
         Some(NewLines { lines, dropped })
     }
@@ -337,6 +349,7 @@ struct NewFrame {
 impl NewFrame {
     fn message(self) -> Utf8Bytes {
         let frame = self.encoded.frame;
+        // Nothing was skipped: the text that all browsers share is enough.
         if self.flights.len() <= frame.flights.len() {
             return self.encoded.text;
         }

@@ -133,6 +133,7 @@ impl Guard {
     pub(crate) fn url(&self) -> String {
         let mut address = self.address;
         if address.ip().is_unspecified() {
+            // A browser cannot open the address that means all of them.
             address.set_ip(loopback_like(address.ip()));
         }
 
@@ -159,6 +160,8 @@ impl Guard {
         path: &str,
         query: Option<&str>,
     ) -> Option<Refusal> {
+        // The host before anything else: under a name that was rebound to this machine, a page would be
+        // of the same origin as its request, and pass the next check.
         let named = single(headers, &HOST);
         let is_allowed = named.is_some_and(|host| self.is_allowed(host));
         let Some(host) = named.filter(|host| is_allowed || self.is_own(host)) else {
@@ -180,6 +183,7 @@ impl Guard {
             ));
         }
 
+        // The token is good for one path alone, and what it buys, the cookie, for all others.
         let is_admitted = match path.strip_prefix(&self.path) {
             Some(rest) => is_static(rest) || self.has_cookie(headers),
             None => path == ENTRANCE && self.has_token(query),
@@ -307,6 +311,7 @@ fn single<'a>(headers: &'a HeaderMap, name: &HeaderName) -> Option<&'a str> {
     let mut values = headers.get_all(name).iter();
     let first = values.next()?.to_str().ok()?;
 
+    // Of two values, this server and the browser or a proxy might each take another one.
     values.next().is_none().then_some(first)
 }
 

@@ -166,6 +166,7 @@ impl Live {
 
     /// Registers a viewer.
     pub(crate) fn viewer(self: &Arc<Self>) -> Viewer {
+        // Counted before the guard exists that counts it back.
         self.lock().viewers += 1;
         self.notify();
         Viewer(self.clone())
@@ -173,6 +174,7 @@ impl Live {
 
     /// Ends the session thread and closes the session.
     pub(crate) fn end(&self) {
+        // Noted first: a thread that finds the session closed finds out why.
         self.lock().is_over = true;
         self.notify();
 
@@ -228,8 +230,10 @@ impl Live {
             command: command.to_owned(),
             ..Command::default()
         };
+        // Checked here, because a put has no answer that could say so.
         message.check().map_err(|error| malformed(&error))?;
         let bus = self.found_simulator()?;
+
         let key = self.keys.command(to, &RobotName::operator());
         bus.put(&key, encode(&message))
             .map_err(|error| error.to_string())?;
@@ -263,6 +267,7 @@ impl Live {
 
     /// The connection to the simulator; waits until the simulator has been found once.
     fn found_simulator(&self) -> Result<&Bus, String> {
+        // Only at the beginning: later a request must not wait for a simulator that has ended.
         let rest_of_search = SEARCH.saturating_sub(self.started_at.elapsed());
         let timeout = FIRST_CONTACT_TIMEOUT.min(rest_of_search);
         let waited = self
@@ -272,6 +277,7 @@ impl Live {
             });
         drop(waited);
 
+        // A session may be open to a router behind which there is no simulator yet.
         let bus = self.bus.get().filter(|_| self.feed.was_present());
         bus.ok_or_else(|| self.no_simulator())
     }
@@ -300,6 +306,8 @@ impl Live {
     /// Enqueues a sample, or drops it if there is no room. Never waits.
     fn enqueue(&self, sample: Sample) {
         let is_line = matches!(sample, Sample::Log(_));
+        // A frame or panel that is dropped is replaced by the next one. A line is missed for good, and
+        // counted.
         if !self.try_enqueue(sample) && is_line {
             self.lost_lines.fetch_add(1, Ordering::Relaxed);
         }
@@ -314,6 +322,8 @@ impl Live {
             return false;
         }
 
+        // Reserved before it is queued: the decoder gives the bytes back, and must not be ahead of
+        // this.
         let queued_bytes = self.queued_bytes.fetch_add(len, Ordering::Relaxed) + len;
         if queued_bytes <= MAX_QUEUED_BYTES && self.queue.try_send(sample).is_ok() {
             return true;
@@ -360,6 +370,7 @@ impl Live {
     fn decode_line(&self, payload: &[u8]) -> Result<(), String> {
         let line = decode_from(&self.keys.log(), "simulator", payload)?;
 
+        // Counted to the first line that came through after them.
         let lost = self.lost_lines.swap(0, Ordering::Relaxed);
         self.feed.add_line(line, lost);
         Ok(())
@@ -433,6 +444,7 @@ impl Live {
     fn subscribe_always(self: &Arc<Self>, bus: &Bus) -> Result<[Declared; 2], BusError> {
         let live = self.clone();
         let token = bus.liveliness(&self.keys.alive_sim(), move |_, is_present| {
+            // Before the thread is woken that asks for frame and log.
             live.feed.set_present(is_present);
             live.notify();
         })?;
@@ -473,6 +485,8 @@ impl Live {
                 return Ok(());
             }
 
+            // Dropped when the last viewer is gone: robots and simulator then put nothing for the
+            // console any more.
             let _declared = self.subscribe_for_viewers(bus)?;
             self.follow_simulator();
         }
@@ -513,6 +527,7 @@ impl Live {
     /// Queries the status until a frame arrives. A simulator whose clock is held publishes no frames by itself, but it
     /// publishes one when it replies to a query.
     fn request_frame(&self) {
+        // Any frame will do, also one that the simulator puts by itself meanwhile.
         let frames_before = self.feed.frame_count();
         let mut retry = FRAME_RETRY;
 

@@ -85,12 +85,14 @@ impl Past {
     /// # Errors
     /// [`OpenError`] if there is none, or it cannot be read.
     pub(crate) fn last(&self) -> Result<Arc<Recording>, OpenError> {
+        // One look at a time: two requests that find the file grown would read it twice.
         let mut open = self.lock();
         let RecordingSource::Growing { folder, run } = &self.place else {
             return open.last.clone().ok_or(OpenError::NoEpoch);
         };
 
         let file = folder.join(recording::FILE);
+        // By its identity, not by its name: `init` and a further run put another file in its place.
         if let Some(last) = open.last.as_ref().filter(|last| last.is_at(&file)) {
             last.grow()?;
             return Ok(last.clone());
@@ -102,9 +104,12 @@ impl Past {
             OpenError::Unreadable(RecordingError::Damaged { .. }) => error,
             _ => OpenError::NotYet,
         })?;
+
+        // The folder may have been copied or renamed: its recording is then of another run.
         if last.run() != run.as_str() {
             return Err(OpenError::OtherRun(file.display().to_string()));
         }
+        // A page that shows the recording before finds another number, and starts anew.
         open.number += 1;
         open.earlier.clear();
         Ok(open.last.insert(Arc::new(last)).clone())
@@ -115,6 +120,7 @@ impl Past {
     /// # Errors
     /// [`OpenError`] if there is none, or it cannot be read.
     pub(crate) fn epoch(&self, epoch: Option<Epoch>) -> Result<Arc<Recording>, OpenError> {
+        // Outside of the lock below, which this takes itself.
         let last = self.last();
         let Some(epoch) = epoch else {
             return last;
@@ -132,6 +138,7 @@ impl Past {
         let folder = self.folder().ok_or(OpenError::NoEpoch)?;
         let file = folder.join(earlier_name(epoch));
         let earlier = Arc::new(Recording::open(&file, open.number)?);
+        // The oldest epoch makes room: opening a recording again is cheap.
         if open.earlier.len() == MAX_EARLIER {
             open.earlier.pop_first();
         }
@@ -142,6 +149,7 @@ impl Past {
     /// The epochs that have a recording, in order: the newest [`MAX_EPOCHS`]. One that has just begun may have none yet.
     pub(crate) fn epochs(&self) -> Vec<Epoch> {
         let last = self.last().ok().map(|last| last.epoch());
+        // Between two epochs there may be no last one: then the earlier ones are counted.
         let next = last.or_else(|| (1..).find(|epoch| !self.has_earlier(*epoch)));
 
         let earlier = (1..next.unwrap_or(1)).rev().take(MAX_EPOCHS);

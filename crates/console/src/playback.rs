@@ -200,6 +200,8 @@ impl Recording {
         let file = self.file();
         let Wanted { from, count, every } = wanted;
         let to = file.fitting(from, from.saturating_add(count), MAX_BYTES);
+        // A panel is shown for some time: those that arrived shortly before the first tick are part of
+        // it.
         let begin = if every.is_none() {
             self.header.first_of_panels(from)
         } else {
@@ -210,6 +212,7 @@ impl Recording {
             end: to.min(file.len()).max(from),
             ..EncodedRange::default()
         };
+        // Whether a robot is lost in the first tick depends on ticks before the range.
         let mut timeline = self.diagrams.before(&file, begin)?;
         let mut last_reports = BTreeMap::new();
         for mut recorded in file.read_raw(begin, to)? {

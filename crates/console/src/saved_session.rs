@@ -33,6 +33,8 @@ impl SavedSession {
 
     /// What the console before has left; `None` if there was none, or others could have read or written it.
     pub(crate) fn read(file: &Path) -> Option<Self> {
+        // A token that others could have read is not used again, and one that they could have written
+        // is theirs.
         let found = fs::symlink_metadata(file).ok()?;
         if !found.is_file() || found.permissions().mode() & 0o077 != 0 {
             return None;
@@ -69,6 +71,7 @@ impl SavedSession {
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
             Err(error) => return Err(failed(error)),
         }
+
         Err(format!(
             "{} is there, and is not what a console keeps: name another file by --keep",
             file.display()
@@ -81,12 +84,14 @@ impl SavedSession {
         // Nobody else's: two consoles are two processes.
         let mut unfinished = file.as_os_str().to_owned();
         unfinished.push(format!(".{}.new", std::process::id()));
+
         let mut options = OpenOptions::new();
         let mut to = options
             .write(true)
             .create_new(true)
             .mode(OWN)
             .open(&unfinished)?;
+
         to.write_all(&text)?;
         fs::rename(&unfinished, file).inspect_err(|_| {
             let _is_not_there = fs::remove_file(&unfinished);
