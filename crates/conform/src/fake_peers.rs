@@ -90,6 +90,7 @@ impl FakePeers {
 
     /// They answer what they held back, and everything from now on.
     pub(crate) fn release(&self) {
+        // Answered without the lock, which `answer` takes itself.
         let held = {
             let mut state = self.state();
             state.is_holding = false;

@@ -42,6 +42,8 @@ impl Limit {
         }
 
         let starved = process.starved();
+        // It gets back what it has waited for a processor since the last look, its threads together; no
+        // more than its time again.
         let more = starved.saturating_sub(self.starved).min(self.patience);
         self.starved = starved;
         self.extensions += 1;

@@ -48,6 +48,7 @@ impl RobotProcess {
         command: &Command,
         environment: &[(&str, String)],
     ) -> std::io::Result<Self> {
+        // Files, not pipes: a program that prints much is never blocked by a kit that does not read.
         let output = tempfile::tempfile()?;
         let errors = tempfile::tempfile()?;
         let mut own = copy(command);

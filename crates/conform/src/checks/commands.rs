@@ -53,6 +53,8 @@ impl Votes {
 /// Two commands in the same news have the effect of the same two in two ticks, in the same order.
 pub(super) fn order(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
     for [one, two] in kit.pairs() {
+        // Two ticks show what the order of two commands means to this robot; one tick shows which order
+        // it takes.
         let straight = values(&commanded(kit, &[(&one, LAST - 1), (&two, LAST)])?);
         let swapped = values(&commanded(kit, &[(&two, LAST - 1), (&one, LAST)])?);
         let in_order = values(&commanded(kit, &[(&one, LAST), (&two, LAST)])?);
@@ -74,6 +76,7 @@ pub(super) fn order(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailur
                 ));
             }
         }
+        // Both ways: a robot that sorts its commands would be right in one of them.
         if votes.right > 0 && back.right > 0 {
             return Ok(());
         }

@@ -53,6 +53,8 @@ impl Disturbance for QueriesDuringTicks {
             }
 
             self.pairs.push(Pair {
+                // At the same moment to both: what delays one of them for no fault of the robot delays
+                // the other.
                 robot: harness.begin_query(harness.epoch(), tick)?,
                 control: harness.begin_control()?,
                 at: Instant::now(),
@@ -71,6 +73,7 @@ impl Disturbance for QueriesDuringTicks {
 
             let report = &harness.seen.answers[entry.index];
             let had = report.at.saturating_duration_since(pair.at);
+            // By the order of arrival on one session, not by clocks.
             let is_late = harness.seen.replies[&pair.robot].0 > report.order;
             let is_control_late = harness.seen.replies[&pair.control].0 > report.order;
             if is_late && !is_control_late && had >= ENOUGH {
@@ -89,6 +92,7 @@ pub(super) fn check(kit: &Kit) -> Result<(), RuleFailure> {
             return Ok(());
         }
         let again: BTreeSet<Tick> = late_ticks(kit)?.into_keys().collect();
+        // Only what is late in the same tick each time is the robot's doing.
         late.retain(|tick, _| again.contains(tick));
     }
 

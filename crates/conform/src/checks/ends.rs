@@ -30,6 +30,7 @@ pub(super) fn clock(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         demand_end(&mut harness, end, "between two ticks")?;
     }
 
+    // The end must also reach a robot that waits: nothing else would ever end its wait.
     let mut harness = waiting::for_news(kit)?;
     demand_end(&mut harness, End::Stopped, "while it waits for its news")?;
 
@@ -101,6 +102,7 @@ fn back_in_time(kit: &Kit, gone_patience_s: u32) -> Result<(), RuleFailure> {
     let patience = Duration::from_secs(gone_patience_s.into());
     harness.pass(patience / 4);
     harness.show_simulator(true)?;
+    // Until after its patience would have been over.
     harness.pass(patience);
     demand_running(
         &mut harness,

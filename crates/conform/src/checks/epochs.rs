@@ -69,6 +69,7 @@ pub(super) fn streams(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     let mut by_seed = Vec::new();
     for number in 1..=DRAWS {
         by_stream.push(moves(&mut harness, seed, format!("{stream}#{number}"))?);
+        // It does not start over, so there is nothing to compare.
         if by_stream.last().is_some_and(Vec::is_empty) {
             return Ok(());
         }
@@ -76,6 +77,8 @@ pub(super) fn streams(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     }
 
     let expected = format!("{DRAWS} streams and {DRAWS} seeds give different moves");
+    // A robot that draws nothing moves the same way each time, which is right. Wrong is only one that
+    // follows the one and not the other.
     if are_all_different(&by_seed) && are_all_the_same(&by_stream) {
         return Err(RuleFailure::new(
             expected,
@@ -166,6 +169,8 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     harness.begin_epoch(2);
     harness.keeps_requests = true;
     let again = play(&mut harness, &PlayScript::usual(kit), &mut WrongWelcome);
+    // Before the play itself is judged: a process that has another identity explains what else is
+    // wrong.
     demand_same_process(&harness)?;
     let again = again?;
     if harness.seen.tokens_lost > tokens_lost {
@@ -189,6 +194,7 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     let tokens_lost = harness.seen.tokens_lost;
 
     harness.begin_epoch(2);
+    // Tick 0 goes on without it: from then on only its news can tell it that it takes part.
     harness.miss()?;
     harness.keeps_requests = true;
 

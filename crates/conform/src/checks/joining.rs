@@ -24,6 +24,7 @@ pub(super) fn ready_last(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure>
     let mut harness = Harness::open_run(kit, HarnessOptions::default())?;
     harness.prepare()?;
     let joining = harness.next_join(START_PATIENCE)?;
+    // The welcome is held back: a robot that declares its token anyway does not wait for it.
     harness.settle(HELD_BACK);
     if harness.is_present() {
         return Err(RuleFailure::new(
@@ -122,6 +123,7 @@ fn taken_forever(kit: &Kit) -> Result<(), RuleFailure> {
     harness.refuse_join(&first, Refusal::NameTaken, explanation);
 
     let mut limit = Limit::new(patience);
+    // Each request is refused, as long as the robot asks: only its own patience ends this.
     while harness.process.ended().is_none() && !limit.is_over(&harness.process) {
         if let Ok(joining) = harness.next_join(Duration::from_millis(100)) {
             harness.refuse_join(&joining, Refusal::NameTaken, explanation);

@@ -117,6 +117,8 @@ pub fn check(
 /// Takes the robot through all checks that the wanted rules need.
 fn all(kit: &Kit, wanted: &[Rule]) -> Result<(Verdicts, Option<AnswerTimes>), CannotRun> {
     let mut findings = Findings::default();
+    // First and alone: all other checks compare with these ticks, and a robot that does not get through
+    // them shows nothing else.
     let (broken, times) = ticks::usual(kit, &mut findings)?;
     if let Some(rule) = broken {
         let reason = format!("the robot does not get through the usual ticks, see {rule}");
@@ -125,6 +127,7 @@ fn all(kit: &Kit, wanted: &[Rule]) -> Result<(Verdicts, Option<AnswerTimes>), Ca
         }
         return Ok((findings.0, times));
     }
+    // Then whether the robot repeats itself: if not, differences mean nothing.
     let again = epochs::same_seed(kit, &mut findings);
     findings.close(&["determinism.seed"], again);
 
@@ -140,6 +143,8 @@ fn all(kit: &Kit, wanted: &[Rule]) -> Result<(Verdicts, Option<AnswerTimes>), Ca
         while let Some(check) = due.get(next.fetch_add(1, Ordering::Relaxed)) {
             let mut own = Findings::default();
             let end = (check.run)(kit, &mut own);
+            // Each check finds for itself, and is merged as a whole: the order in which they end
+            // changes nothing.
             own.close(check.rules, end);
             all.lock()
                 .unwrap_or_else(PoisonError::into_inner)

@@ -34,6 +34,7 @@ pub(super) fn wait(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
             }
 
             put_stale(harness, tick)?;
+            // Time for an answer that must not come.
             harness.settle(QUIET);
             let has_answered = harness.seen.answers.iter().any(|answer| {
                 let report = &answer.reading.report;

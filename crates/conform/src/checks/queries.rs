@@ -57,6 +57,7 @@ pub(super) fn by_tick(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFail
     };
 
     let played = play(&mut harness, &PlayScript::usual(kit), &mut queries);
+    // Also after a play that broke off: what came until then is judged.
     wire::check(&harness, findings);
     findings.0.extend(queries.findings.0);
     if harness.seen.states.is_empty() {
@@ -99,6 +100,7 @@ fn late_state_of(
     tick: Tick,
     expected: &str,
 ) -> Result<Result<PublicState, RuleFailure>, RuleFailure> {
+    // A state that is there a little later is a flaw of its own, and not a missing one.
     let begun = Instant::now();
 
     loop {
@@ -232,6 +234,7 @@ fn check_followed(
         .states
         .iter()
         .filter(|(order, _)| *order < report);
+    // Until it knows of the subscriber, a robot puts none.
     let Some((_, last)) = before.next_back() else {
         return Ok(());
     };
@@ -441,6 +444,8 @@ fn reply_in(
             let (_, reply) = harness.seen.replies.get(&number)?;
             Some(reply.clone())
         })?;
+        // While the tick is open, a query that ended without a reply is repeated: its own time limit is
+        // shorter than the wait.
         if reply.is_some() || !harness.is_open() {
             return Ok(reply);
         }
@@ -522,6 +527,7 @@ fn demand_one_reply(
 ) -> Result<(), RuleFailure> {
     let key = harness.keys.query(&harness.kit.subject(), what);
     let begun = Instant::now();
+    // It ends when the last queryable has released it, or with the patience: the time tells which.
     let replies = harness.kit.bus.get_all(&key, "tick=4;epoch=1", patience)?;
     let took = begun.elapsed();
 

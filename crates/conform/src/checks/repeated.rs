@@ -43,6 +43,7 @@ pub(super) fn duplicate(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> 
 fn repeat(harness: &mut Harness<'_>, entry: &Entry) -> Result<(), RuleFailure> {
     // A robot that reports twice by itself breaks another rule: what it still sends is not the repetition.
     harness.pass(BEFORE_REPEATING);
+    // What comes from here on follows the repetition.
     let since = harness.seen.count;
     harness.repeat();
 
@@ -149,6 +150,7 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
             }
 
             let late = [(1, tick - 2), (1, tick - 5), (0, tick), (0, tick + 9)];
+            // Counted before: ticks of this epoch have been answered once already.
             self.0 = late.map(|of| (of, count_of(harness, of))).into();
             let flag = harness.flag();
             for (epoch, tick) in late {

@@ -123,6 +123,7 @@ pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     for _ in 0..=LAST {
         step(&mut harness, &usual, &mut Straight)?;
     }
+    // The welcome of the further incarnation is set before the barrier asks for it.
     bequeath(kit, &mut harness)?;
     harness.miss()?;
 
@@ -149,6 +150,7 @@ pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     harness.settle(QUIET);
     let again = play(&mut harness, &PlayScript::quiet(5), &mut Straight)?;
     demand_generation(&again)?;
+    // What a new process does in the same place is what it has to do.
     let anew = play(
         &mut returned(kit, last)?,
         &PlayScript::quiet(5),
@@ -162,6 +164,7 @@ pub(super) fn replaced(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     let mut harness = with_robot(kit, HarnessOptions::default())?;
     play(&mut harness, &PlayScript::quiet(3), &mut Straight)?;
     let tick = harness.next_tick();
+    // The robot's own process runs on, as after a cut: it must end by itself.
     harness.play_successor();
     harness.open(&News::default())?;
     let expected = "its process ends, with an exit status other than 0, when its news name a later incarnation";

@@ -46,8 +46,10 @@ pub(super) fn usual(
 ) -> Result<(Option<&'static str>, Option<AnswerTimes>), CannotRun> {
     let mut harness = Harness::open_run(kit, HarnessOptions::default())
         .map_err(|failure| CannotRun::Robot(failure.came))?;
+    // What fails until the robot takes part is no verdict on a rule: nothing could be checked.
     let joining = harness.next_join(START_PATIENCE).map_err(cannot_run)?;
     let request = joining.request.clone().map_err(CannotRun::Robot)?;
+    // Everything else needs the name, which the robot itself says first.
     kit.learn(&request)?;
     findings.settle("join.request", check_request(&harness, &joining));
     harness.prepare().map_err(cannot_run)?;
@@ -240,6 +242,7 @@ fn check_tick(harness: &Harness<'_>, entry: &Entry) -> Result<(), RuleFailure> {
         if (command.epoch, command.tick) != (entry.epoch, tick) {
             continue;
         }
+        // One that was repeated with its clock is the same to the byte.
         let known = *first.entry(command.number).or_insert(sent);
         if known.bytes != sent.bytes || known.to != sent.to {
             let expected = format!("one command with number {} in tick {tick}", command.number);

@@ -55,6 +55,7 @@ pub(super) fn malformed(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> 
     }
 
     let mut harness = with_robot(kit, HarnessOptions::default())?;
+    // What it has printed when it started does not count.
     let before = harness.process.error_bytes();
     let played = play(&mut harness, &PlayScript::usual(kit), &mut Rubbish)?;
     demand_same(

@@ -32,6 +32,7 @@ pub(super) fn for_news(kit: &Kit) -> Result<Harness<'_>, RuleFailure> {
     let mut harness = with_robot(kit, HarnessOptions::default())?;
     play(&mut harness, &PlayScript::quiet(3), &mut Straight)?;
 
+    // The clock says that there are news: without them the robot must not begin.
     harness.withholds_news = true;
     harness.open(&News {
         correction: Some(Correction {
@@ -48,6 +49,7 @@ pub(super) fn for_news(kit: &Kit) -> Result<Harness<'_>, RuleFailure> {
 /// last tick is then open.
 pub(super) fn for_another(kit: &Kit) -> Result<(Harness<'_>, bool), RuleFailure> {
     let mut harness = of_queries(kit)?;
+    // From here on no query is answered, so the robot waits in the first tick in which it asks.
     harness.fake_peers.hold();
     for _ in 0..TICKS {
         harness.open(&News::default())?;

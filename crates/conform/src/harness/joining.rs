@@ -82,6 +82,7 @@ impl Harness<'_> {
             self.outcome = None;
         }
 
+        // Its name is free then, and the process that joins is the next incarnation.
         self.drive(|barrier, out| barrier.token(&subject, false, out));
         Ok(())
     }

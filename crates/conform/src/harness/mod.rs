@@ -185,11 +185,13 @@ impl<'k> Harness<'k> {
 
     /// Waits for one event and files it, and lets timers fire that are due. Returns whether there was an event.
     fn pump(&mut self, patience: Duration) -> bool {
+        // Also without an event: the clock is repeated for a robot that says nothing.
         self.fire_timers();
         let Some(event) = self.wire.receive(patience) else {
             return false;
         };
 
+        // All that comes is numbered in one order, so that rules can say what comes before what.
         let order = self.seen.next_order();
         match event {
             WireEvent::Join(query) => self.on_join(Joining::new(query)),
@@ -326,6 +328,7 @@ impl<'k> Harness<'k> {
     /// Puts news and clock, and reports for the robots that the kit plays.
     fn grant(&mut self, news: &[(RobotName, IncarnationNotice)], clock: &Clock) {
         let at = (clock.epoch, clock.tick);
+        // A robot that is slow may get its clock twice, and may answer it twice.
         if self.granted == Some(at) {
             self.repeated.insert(at);
         }
@@ -337,6 +340,7 @@ impl<'k> Harness<'k> {
             let _ = self.put_tick(news, clock);
         }
 
+        // The played robots answer at once, so that the tick waits for the one that is checked alone.
         let others: Vec<RobotName> = self.fake_peers.names().cloned().collect();
         for name in others {
             let (generation, _) = self.barrier.presence(&name);
@@ -392,6 +396,7 @@ impl<'k> Harness<'k> {
                 continue;
             }
 
+            // What it put last may still be on its way.
             if self.process.ended().is_some() {
                 last_words.get_or_insert_with(Instant::now);
             }

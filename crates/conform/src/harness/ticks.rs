@@ -78,6 +78,7 @@ impl Harness<'_> {
 
         self.news = news.clone();
         self.next += 1;
+        // Before the barrier opens the tick, which it may complete at once: where the robot is lost.
         self.outcome = None;
         self.begun = Instant::now();
         self.drive(|barrier, out| barrier.open(tick, named, out));
@@ -92,6 +93,7 @@ impl Harness<'_> {
             if let Some(outcome) = harness.outcome.take() {
                 return Some(Ok(outcome));
             }
+            // What can never become right ends the wait at once, with a better reason than time.
             harness.hopeless(tick).map(Err)
         });
         let mut outcome = match came {
@@ -199,6 +201,7 @@ impl Harness<'_> {
             harness.outcome.take()
         })?;
 
+        // From here on the barrier waits again, whatever happens.
         self.drive(|barrier, out| barrier.set_lateness(patient(), out));
         self.is_cut_off = false;
         Ok(())
