@@ -73,6 +73,7 @@ impl Timeline {
                 robot, generation, ..
             } => {
                 let mut over = self.join(robot, tick);
+                // That all robots take part from tick 0 on is no span of its own.
                 if tick > 0 || generation.is_some() {
                     over.push(Span::Joined(Joined {
                         robot: robot.clone(),
@@ -89,12 +90,14 @@ impl Timeline {
                 kind,
                 begins,
             } => self.fault(robot, *kind, *begins, tick),
+
             Event::LinkCut {
                 from,
                 to,
                 commands,
                 queries,
             } => {
+                // A cut that goes on with another scope is another span.
                 let over = self.heal(from, to, tick);
                 let cut = Cut {
                     from: from.clone(),
@@ -126,6 +129,8 @@ impl Timeline {
                     is_doubled: false,
                     ends: Vec::new(),
                 };
+                // Numbers are unique within an epoch. Should one come again, the command before is
+                // given out as it is, and none is lost.
                 let before = self.commands.insert((from.clone(), *seq), sent);
                 before.map(Span::Command).into_iter().collect()
             }
@@ -151,6 +156,8 @@ impl Timeline {
                 before: self.replace_setting(set),
                 set: set.clone(),
             })],
+            // Named one by one, so that a new event has to be decided about here. These say nothing
+            // about what lasts.
             Event::Init { .. }
             | Event::DoneLate { .. }
             | Event::Blocked { .. }
@@ -222,6 +229,7 @@ impl Timeline {
             begin: tick,
         });
 
+        // The stay of a robot that is lost has ended with its loss.
         let over = before.filter(|_| robot.lost.is_none());
         let stay = over.and_then(|before| before.until(name, kind, tick));
         stay.into_iter().collect()
@@ -248,6 +256,7 @@ impl Timeline {
             return Vec::new();
         };
 
+        // It is in the states that it reported last, until it reports others: their stays begin anew.
         let states = [&mut robot.emotion, &mut robot.behavior];
         for state in states.into_iter().flatten() {
             state.begin = tick;
@@ -262,6 +271,8 @@ impl Timeline {
 
     fn miss(&mut self, name: &RobotName, tick: Tick) -> Vec<Span> {
         let last = &mut self.robot(name).missed;
+        // Ticks in a row are one span. It is given out when another tick is missed later, or with what
+        // is in progress.
         if extend(last.as_mut(), tick) {
             return Vec::new();
         }
@@ -275,6 +286,7 @@ impl Timeline {
     fn fault(&mut self, name: &RobotName, kind: FaultKind, begins: bool, tick: Tick) -> Vec<Span> {
         let faults = &mut self.robot(name).faults;
         let mut over = Vec::new();
+        // A fault that begins while one of its kind lasts ends that one: a process has each kind once.
         if let Some(index) = faults.iter().position(|(other, _)| *other == kind) {
             let (_, begin) = faults.remove(index);
             over.push(Span::Fault(Fault {
@@ -310,6 +322,7 @@ impl Timeline {
     ) -> Vec<Span> {
         let pair = (from.clone(), to.clone());
         let last = self.queries.get_mut(&pair);
+        // Another cause is another span, also in the tick after.
         let last = last.filter(|last| last.because == because);
         if extend(last.map(|last| &mut last.period), tick) {
             return Vec::new();
@@ -338,6 +351,7 @@ impl Timeline {
         };
 
         change(command);
+        // What is over is forgotten: so memory does not grow with the run.
         let over = command.is_over().then(|| self.commands.remove(&key));
         over.flatten().map(Span::Command).into_iter().collect()
     }
@@ -346,6 +360,7 @@ impl Timeline {
     fn replace_setting(&mut self, set: &str) -> Option<String> {
         let (path, _) = set.split_once('=')?;
         let below = format!("{path}.");
+        // To set a table replaces what was set within it.
         self.set.retain(|other, _| !other.starts_with(&below));
         self.set.insert(path.to_owned(), set.to_owned())
     }

@@ -567,6 +567,8 @@ impl Tracked {
         let robot = &condition.robot;
         let known = (seen.state)(robot).and_then(|state| Some((state, condition.is.holds(state)?)));
         let Some((state, holds)) = known else {
+            // Without a report, or such a number, nothing is known of the state, and a time without a
+            // break begins anew.
             self.since = None;
             self.unknown
                 .get_or_insert_with(|| condition.is.unknown(robot));
@@ -583,6 +585,7 @@ impl Tracked {
         let Some(lasting) = condition.lasting else {
             return Some(condition.is.in_words(robot, state));
         };
+        // In the tick in which it begins a state has lasted for no time.
         if seen.tick - since < ticks_in(lasting, tick_s) {
             return None;
         }
@@ -601,6 +604,8 @@ impl Tracked {
 
         let mut has_risen = false;
         let mut missing = None;
+        // A counter that is lower than before, because its robot began anew, is no progress; the next
+        // rise is.
         self.before.resize(stalled.progress.len(), None);
         for (counter, before) in stalled.progress.iter().zip(&mut self.before) {
             let state = (seen.state)(&counter.robot);

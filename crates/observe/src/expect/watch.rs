@@ -81,6 +81,7 @@ impl Watch {
     /// decided; it must not be called after that.
     pub fn observe(&mut self, seen: &Observation<'_>) -> Option<Judgment> {
         self.now = seen.tick;
+        // In every tick, whether it is asked for or not: some conditions depend on the ticks before.
         let held = self.condition.holds(seen);
 
         match &self.rule {
@@ -142,6 +143,8 @@ impl Watch {
         is_over: bool,
         within: Time,
     ) -> Option<Judgment> {
+        // Waits do not overlap: the earliest event has the earliest limit, and what fulfills it
+        // fulfills all after it as well.
         if self.pending.is_none() {
             let since = self.now;
             self.pending = triggered.map(|event| OpenCheck { since, event });
@@ -154,6 +157,8 @@ impl Watch {
             self.met += 1;
             self.longest = self.longest.max(waited);
         }
+        // Before the limit is looked at: in the last tick in which it is not too late, it may still
+        // happen.
         if holds || is_over {
             self.pending = None;
             return None;
@@ -176,6 +181,7 @@ impl Watch {
     #[must_use]
     pub fn end(&self, end: End) -> Judgment {
         let here = self.place(self.now);
+        // What is open is looked at first: even in a run that was long enough, its time was not over.
         if let Some(pending) = &self.pending {
             let because = format!(
                 "the run ended at {here}, and it had not happened after {}: {}",
