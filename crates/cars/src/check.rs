@@ -10,13 +10,13 @@ use experiments::{Experiment, Plan, Request, Robots};
 use lab::inspect::inspect;
 use lab::run::Local;
 use launch::{LaunchFile, default_run_name, scenario_file};
-use miette::{IntoDiagnostic, WrapErr, miette};
 use protocol::RunName;
 use record::RunFolder;
 use record::seal::Checked;
 use scenario::{Scenario, roster};
 use terminal::OutputError;
 
+use crate::errors::{Context, Result, refusal, render};
 use crate::experiment::equal_arms;
 use crate::kind::{Kind, class_of};
 use crate::{named, remarks};
@@ -30,7 +30,7 @@ pub(crate) struct CheckArgs {
 }
 
 /// Checks every file, also after an error.
-pub(crate) fn check(args: &CheckArgs) -> miette::Result<ExitCode> {
+pub(crate) fn check(args: &CheckArgs) -> Result<ExitCode> {
     let mut are_all_good = true;
     for path in &args.files {
         match describe(path) {
@@ -41,7 +41,7 @@ pub(crate) fn check(args: &CheckArgs) -> miette::Result<ExitCode> {
             }
             Err(error) => {
                 are_all_good = false;
-                terminal::note(format_args!("{error:?}"));
+                terminal::note(render(error.as_ref()));
             }
         }
     }
@@ -54,7 +54,7 @@ pub(crate) fn check(args: &CheckArgs) -> miette::Result<ExitCode> {
 }
 
 /// The content of a file in one line.
-fn describe(path: &Path) -> miette::Result<String> {
+fn describe(path: &Path) -> Result<String> {
     if path.is_dir() {
         return describe_run(path);
     }
@@ -82,7 +82,7 @@ fn describe(path: &Path) -> miette::Result<String> {
     }
 }
 
-fn describe_launch(path: &Path) -> miette::Result<String> {
+fn describe_launch(path: &Path) -> Result<String> {
     let changes = Changes::default();
     let file = LaunchFile::load(path)?;
     let scenario = file.load_scenario(&changes)?;
@@ -95,7 +95,7 @@ fn describe_launch(path: &Path) -> miette::Result<String> {
 }
 
 /// The parameters of a robot. Where its class comes with the programs, a robot of it takes them.
-fn describe_parameters(path: &Path) -> miette::Result<String> {
+fn describe_parameters(path: &Path) -> Result<String> {
     let source = Source::read(path)?;
     let table: toml::Table = source.parse()?;
     let number = count(table.len(), "parameter", "parameters");
@@ -107,13 +107,12 @@ fn describe_parameters(path: &Path) -> miette::Result<String> {
     };
 
     let scenario = Scenario::parse(&scenario_with(class, path), Path::new(""))?;
-    let run = RunName::new("check").into_diagnostic()?;
+    let run = RunName::new("check")?;
     let mut local = Local::new(scenario, &run)?;
     local
         .simulation
         .init(&mut local.robots)
-        .into_diagnostic()
-        .wrap_err_with(|| path.display().to_string())?;
+        .context(path.display().to_string())?;
     Ok(format!("{number}, which {class} takes"))
 }
 
@@ -139,14 +138,14 @@ fn scenario_with(class: &str, parameters: &Path) -> Source {
 }
 
 /// A roster, as `cars launch --roster` takes it.
-fn describe_roster(path: &Path) -> miette::Result<String> {
+fn describe_roster(path: &Path) -> Result<String> {
     let roster = Source::read(path)?;
     let scenario = Scenario::parse(&roster::scenario_of(&roster)?, Path::new(""))?;
     Ok(format!("a roster: {}", content(&scenario)))
 }
 
 /// An experiment, every scenario of which has been read, and begun where its robots can run in this process.
-fn describe_experiment(path: &Path) -> miette::Result<String> {
+fn describe_experiment(path: &Path) -> Result<String> {
     let mut experiment = Experiment::load(path)?;
     experiment.scenario = scenario_file(&experiment.scenario)?;
     let plan = Plan::new(&Request {
@@ -176,19 +175,19 @@ fn describe_experiment(path: &Path) -> miette::Result<String> {
 }
 
 /// The record of a run, read whole: all that is damaged is the error.
-fn describe_run(folder: &Path) -> miette::Result<String> {
+fn describe_run(folder: &Path) -> Result<String> {
     let mut inspection = inspect(&RunFolder::at(folder.to_owned()))?;
     if inspection.damages.len() == 1
         && let Some(damage) = inspection.damages.pop()
     {
-        return Err(damage);
+        return Err(damage.into());
     }
     if !inspection.damages.is_empty() {
         let mut damages = Vec::new();
         for damage in &inspection.damages {
             damages.push(damage.to_string());
         }
-        return Err(miette!("{}", damages.join("\n")));
+        return Err(refusal!("{}", damages.join("\n")));
     }
 
     let mut described = Vec::new();

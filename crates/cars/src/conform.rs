@@ -6,11 +6,11 @@ use std::process::{Command, ExitCode};
 use clap::Args;
 use config::Changes;
 use conform::{CheckSetting, Report, Role, Rule};
-use miette::miette;
 use protocol::{RobotName, Tick};
 use scenario::Scenario;
 use terminal::OutputError;
 
+use crate::errors::{Result, refusal, render};
 use crate::named;
 
 /// `cars conform`.
@@ -54,11 +54,11 @@ fn parse_rule(name: &str) -> Result<Rule, String> {
 }
 
 /// Checks a robot and prints the report.
-pub(crate) fn conform(args: &ConformArgs) -> miette::Result<ExitCode> {
+pub(crate) fn conform(args: &ConformArgs) -> Result<ExitCode> {
     let report = match check(args) {
         Ok(report) => report,
         Err(error) => {
-            terminal::note(format_args!("{error:?}"));
+            terminal::note(render(error.as_ref()));
             return Ok(ExitCode::from(2));
         }
     };
@@ -78,20 +78,20 @@ pub(crate) fn conform(args: &ConformArgs) -> miette::Result<ExitCode> {
     }
 }
 
-fn check(args: &ConformArgs) -> miette::Result<Report> {
+fn check(args: &ConformArgs) -> Result<Report> {
     let setting = setting(args)?;
     let (program, arguments) = args
         .command
         .split_first()
-        .ok_or_else(|| miette!("no command is given"))?;
+        .ok_or_else(|| refusal!("no command is given"))?;
     let mut command = Command::new(program);
     command.args(arguments);
 
-    conform::check(&command, &setting, &args.rules).map_err(|error| miette!("{program}: {error}"))
+    conform::check(&command, &setting, &args.rules).map_err(|error| refusal!("{program}: {error}"))
 }
 
 /// The setting of the checks: the default one, with what the command line and its scenario change.
-fn setting(args: &ConformArgs) -> miette::Result<CheckSetting> {
+fn setting(args: &ConformArgs) -> Result<CheckSetting> {
     let mut setting = CheckSetting {
         name: args.name.clone(),
         ..CheckSetting::default()
@@ -115,7 +115,7 @@ fn setting(args: &ConformArgs) -> miette::Result<CheckSetting> {
 
 /// Takes field, roster and parameters from a scenario. The states and commands of the other robots are those of a run of
 /// the scenario in this process; if a class cannot run here, the other robots stand still.
-fn take_scenario(setting: &mut CheckSetting, file: &Path) -> miette::Result<()> {
+fn take_scenario(setting: &mut CheckSetting, file: &Path) -> Result<()> {
     let scenario = Scenario::load(file, &Changes::default())?;
     setting.seed = scenario.seed;
     setting.tick_s = scenario.tick_s;

@@ -5,7 +5,6 @@ use clap::{Args, Subcommand, ValueEnum};
 use config::units::Time;
 use config::{Changes, Speed};
 use lab::folder::find;
-use miette::{IntoDiagnostic, miette};
 use protocol::event::log_line;
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{
@@ -20,6 +19,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::mpsc::sync_channel;
 use std::time::Duration;
+
+use crate::errors::{Result, refusal};
 
 /// How long to wait for the simulator or a robot. They reply at once, but a machine under load may keep them from it.
 const PATIENCE: Duration = Duration::from_secs(10);
@@ -47,28 +48,28 @@ pub(crate) struct RunRef {
 }
 
 impl RunRef {
-    fn run(&self) -> miette::Result<RunName> {
+    fn run(&self) -> Result<RunName> {
         if let Some(run) = &self.run {
             return Ok(run.clone());
         }
 
         let link = self.out.join(LATEST);
         let target = std::fs::read_link(&link).map_err(|_| {
-            miette!(
+            refusal!(
                 help = "name it with --run, or start one with `cars launch`",
                 "there is no run in {}",
                 self.out.display()
             )
         })?;
 
-        RunName::new(&target.to_string_lossy()).into_diagnostic()
+        Ok(RunName::new(&target.to_string_lossy())?)
     }
 
-    fn folder(&self) -> miette::Result<RunFolder> {
+    fn folder(&self) -> Result<RunFolder> {
         Ok(RunFolder::new(&self.out, &self.run()?))
     }
 
-    fn endpoint(&self) -> miette::Result<String> {
+    fn endpoint(&self) -> Result<String> {
         if let Some(connect) = &self.connect {
             return Ok(connect.clone());
         }
@@ -78,7 +79,7 @@ impl RunRef {
         let text = std::fs::read_to_string(&file).map_err(|_| {
             let help =
                 "start one with `cars launch`, or give the endpoint of its simulator with --connect";
-            miette!(
+            refusal!(
                 help = help,
                 "run {run} is not in progress: there is no {}",
                 file.display()
@@ -89,7 +90,7 @@ impl RunRef {
     }
 
     /// The configuration file: from the command line, or, for a run that is found by its folder, the one noted there.
-    fn config(&self) -> miette::Result<Option<PathBuf>> {
+    fn config(&self) -> Result<Option<PathBuf>> {
         if self.zenoh_config.is_some() || self.connect.is_some() {
             return Ok(self.zenoh_config.clone());
         }
@@ -97,13 +98,13 @@ impl RunRef {
         Ok(noted.ok().map(|text| PathBuf::from(text.trim())))
     }
 
-    fn open(&self) -> miette::Result<(Bus, Keys)> {
+    fn open(&self) -> Result<(Bus, Keys)> {
         let role = Role::Client {
             connect: self.endpoint()?,
             patience: PATIENCE,
         };
         let config = self.config()?;
-        let bus = Bus::open(&role, config.as_ref()).into_diagnostic()?;
+        let bus = Bus::open(&role, config.as_ref())?;
 
         Ok((bus, Keys::new(&self.run()?)))
     }
@@ -296,7 +297,7 @@ impl From<LateMode> for OnLate {
 }
 
 impl CtlRequest {
-    fn control(self) -> miette::Result<Control> {
+    fn control(self) -> Result<Control> {
         Ok(match self {
             Self::Init { seed } => Control::Init {
                 seed,
@@ -351,7 +352,7 @@ impl From<ByHand> for Intervention {
 }
 
 /// Carries out a request and prints its answer.
-pub(crate) fn ctl(args: CtlArgs) -> miette::Result<ExitCode> {
+pub(crate) fn ctl(args: CtlArgs) -> Result<ExitCode> {
     match args.request {
         ControlRequest::Query { robot, what } => query(&args.run, &robot, what.as_deref()),
         ControlRequest::Command { robot, command } => send_command(&args.run, &robot, command),
@@ -363,14 +364,14 @@ pub(crate) fn ctl(args: CtlArgs) -> miette::Result<ExitCode> {
 }
 
 /// Sends a request to the simulator of a run and prints its answer.
-fn print_answer(run: &RunRef, control: &Control, is_json: bool) -> miette::Result<ExitCode> {
+fn print_answer(run: &RunRef, control: &Control, is_json: bool) -> Result<ExitCode> {
     let (bus, keys) = run.open()?;
     let answer = ask(&bus, &keys, run, control);
     bus.close();
 
     match answer? {
         ControlAnswer::Done(status) if is_json => {
-            let status = serde_json::to_string(&status).into_diagnostic()?;
+            let status = serde_json::to_string(&status)?;
             terminal::data(format_args!("{status}\n"))?;
         }
         ControlAnswer::Done(status) => terminal::print(describe(&status))?,
@@ -381,14 +382,14 @@ fn print_answer(run: &RunRef, control: &Control, is_json: bool) -> miette::Resul
             }
         }
         ControlAnswer::Refused { explanation, .. } => {
-            return Err(miette!("refused: {explanation}"));
+            return Err(refusal!("refused: {explanation}"));
         }
     }
     Ok(ExitCode::SUCCESS)
 }
 
 /// Gets the simulator's answer to a control request.
-fn ask(bus: &Bus, keys: &Keys, run: &RunRef, control: &Control) -> miette::Result<ControlAnswer> {
+fn ask(bus: &Bus, keys: &Keys, run: &RunRef, control: &Control) -> Result<ControlAnswer> {
     let patience = if matches!(control, Control::Step { .. }) {
         STEP_PATIENCE
     } else {
@@ -396,21 +397,19 @@ fn ask(bus: &Bus, keys: &Keys, run: &RunRef, control: &Control) -> miette::Resul
     };
 
     let key = keys.control();
-    let reply = bus
-        .get_within(&key, "", Some(encode(control)), patience)
-        .into_diagnostic()?;
+    let reply = bus.get_within(&key, "", Some(encode(control)), patience)?;
     let run = run.run()?;
-    let reply = reply.ok_or_else(|| miette!("no simulator of run {run} answers"))?;
+    let reply = reply.ok_or_else(|| refusal!("no simulator of run {run} answers"))?;
 
-    decode(&key, "simulator", &payload(reply)?).into_diagnostic()
+    Ok(decode(&key, "simulator", &payload(reply)?)?)
 }
 
 /// The payload of a reply.
 ///
 /// # Errors
 /// The reason of an error reply.
-fn payload(reply: Reply) -> miette::Result<Vec<u8>> {
-    reply.result.map_err(|reason| miette!("refused: {reason}"))
+fn payload(reply: Reply) -> Result<Vec<u8>> {
+    reply.result.map_err(|reason| refusal!("refused: {reason}"))
 }
 
 /// The status of a run as lines of text.
@@ -467,22 +466,22 @@ fn headline(status: &Status) -> String {
 }
 
 /// Queries a robot of a run in progress, as another robot can, and prints the answer.
-fn query(run: &RunRef, robot: &RobotName, what: Option<&str>) -> miette::Result<ExitCode> {
+fn query(run: &RunRef, robot: &RobotName, what: Option<&str>) -> Result<ExitCode> {
     let (bus, keys) = run.open()?;
     let key = keys.query(robot, what.unwrap_or(STATE));
-    let reply = bus.get_within(&key, "", None, PATIENCE).into_diagnostic()?;
+    let reply = bus.get_within(&key, "", None, PATIENCE)?;
     bus.close();
 
     let run = run.run()?;
-    let reply = reply.ok_or_else(|| miette!("no robot called {robot} answers in run {run}"))?;
-    let answer: serde_json::Value = serde_json::from_slice(&payload(reply)?).into_diagnostic()?;
+    let reply = reply.ok_or_else(|| refusal!("no robot called {robot} answers in run {run}"))?;
+    let answer: serde_json::Value = serde_json::from_slice(&payload(reply)?)?;
 
     // Epoch and tick around the value are for programs.
     let value = answer.get("value").unwrap_or(&answer);
     match value.as_str() {
         Some(text) => terminal::print_line(text)?,
         None => {
-            let value = serde_json::to_string_pretty(value).into_diagnostic()?;
+            let value = serde_json::to_string_pretty(value)?;
             terminal::data(format_args!("{value}\n"))?;
         }
     }
@@ -491,32 +490,32 @@ fn query(run: &RunRef, robot: &RobotName, what: Option<&str>) -> miette::Result<
 }
 
 /// Sends a command from the operator. It takes effect at the next tick boundary and is part of the record.
-fn send_command(run: &RunRef, robot: &RobotName, text: String) -> miette::Result<ExitCode> {
+fn send_command(run: &RunRef, robot: &RobotName, text: String) -> Result<ExitCode> {
     let command = Command {
         command: text,
         ..Command::default()
     };
     command
         .check()
-        .map_err(|error| miette!("{}: {}", error.field, error.reason))?;
+        .map_err(|error| refusal!("{}: {}", error.field, error.reason))?;
 
     let (bus, keys) = run.open()?;
     let key = keys.command(robot, &RobotName::operator());
-    bus.put(&key, encode(&command)).into_diagnostic()?;
+    bus.put(&key, encode(&command))?;
     // Samples of one session arrive in order, so a simulator that answers this get has received the command.
     let answer = ask(&bus, &keys, run, &Control::Status);
     bus.close();
 
     let ControlAnswer::Done(status) = answer? else {
-        return Err(miette!("the simulator does not answer with its status"));
+        return Err(refusal!("the simulator does not answer with its status"));
     };
     if let Some(run) = &status.replay_of {
-        return Err(miette!(
+        return Err(refusal!(
             "refused: this is a replay of run {run}: its robots execute no commands"
         ));
     }
     if !status.robots.iter().any(|other| other.name == *robot) {
-        return Err(miette!("refused: no robot of this run is called {robot}"));
+        return Err(refusal!("refused: no robot of this run is called {robot}"));
     }
     terminal::print_line(format_args!(
         "{robot} receives {:?} at the tick after {}",
@@ -540,7 +539,7 @@ pub(crate) struct LogArgs {
 
 impl LogArgs {
     /// The folder of the run, and how to reach the run.
-    fn subject(&self) -> miette::Result<(RunFolder, RunRef)> {
+    fn subject(&self) -> Result<(RunFolder, RunRef)> {
         let mut run = self.run.clone();
         let Some(of) = &self.of else {
             return Ok((run.folder()?, run));
@@ -558,11 +557,11 @@ impl LogArgs {
 }
 
 /// Shows the log of a run.
-pub(crate) fn log(args: &LogArgs) -> miette::Result<ExitCode> {
+pub(crate) fn log(args: &LogArgs) -> Result<ExitCode> {
     let (folder, run) = args.subject()?;
     let file = folder.log();
     let past = std::fs::read_to_string(&file)
-        .map_err(|error| miette!("cannot read {}: {error}", file.display()));
+        .map_err(|error| refusal!("cannot read {}: {error}", file.display()));
 
     if args.follow {
         follow(&run, &past.unwrap_or_default())?;
@@ -573,25 +572,21 @@ pub(crate) fn log(args: &LogArgs) -> miette::Result<ExitCode> {
 }
 
 /// Prints the end of the past log, then every line that the simulator puts until its token is undeclared.
-fn follow(run: &RunRef, past: &str) -> miette::Result<()> {
+fn follow(run: &RunRef, past: &str) -> Result<()> {
     let (bus, keys) = run.open()?;
     let (lines, received) = sync_channel(1024);
     let end = lines.clone();
-    let _log = bus
-        .subscribe(&keys.log(), move |key, bytes| {
-            // A reader that is too slow misses lines instead of holding up the run; the file has all lines.
-            if let Ok(line) = decode::<LogRecord>(key, "simulator", bytes) {
-                let _is_full = lines.try_send(Some(line));
-            }
-        })
-        .into_diagnostic()?;
-    let _token = bus
-        .liveliness(&keys.alive_sim(), move |_, is_declared| {
-            if !is_declared {
-                let _has_ended = end.send(None);
-            }
-        })
-        .into_diagnostic()?;
+    let _log = bus.subscribe(&keys.log(), move |key, bytes| {
+        // A reader that is too slow misses lines instead of holding up the run; the file has all lines.
+        if let Ok(line) = decode::<LogRecord>(key, "simulator", bytes) {
+            let _is_full = lines.try_send(Some(line));
+        }
+    })?;
+    let _token = bus.liveliness(&keys.alive_sim(), move |_, is_declared| {
+        if !is_declared {
+            let _has_ended = end.send(None);
+        }
+    })?;
 
     // The past log of a replay is that of the recorded run, to its end.
     let answer = ask(&bus, &keys, run, &Control::Status);

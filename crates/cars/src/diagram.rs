@@ -10,6 +10,7 @@ use protocol::Epoch;
 use record::names::LATEST;
 use reports::diagram::{Options, Window, draw};
 
+use crate::errors::Result;
 use crate::output;
 
 /// `cars diagram`.
@@ -42,7 +43,7 @@ pub(crate) struct DiagramArgs {
 }
 
 /// Draws a run.
-pub(crate) fn diagram(args: &DiagramArgs) -> miette::Result<ExitCode> {
+pub(crate) fn diagram(args: &DiagramArgs) -> Result<ExitCode> {
     let folder = find(&args.out, &args.run)?;
     let files = recorded_epoch(&folder, args.epoch)?;
     let mut title = folder.title();

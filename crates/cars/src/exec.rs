@@ -6,8 +6,9 @@ use std::process::ExitCode;
 use clap::Args;
 use launch::child::{AtExit, become_program};
 use launch::exec::{Ended, exec as run_program};
-use miette::miette;
 use robot::RobotArgs;
+
+use crate::errors::{Result, refusal};
 
 /// `cars exec`.
 #[derive(Debug, Args)]
@@ -33,11 +34,11 @@ pub(crate) struct ChildArgs {
 }
 
 /// Runs a program as a robot until the run, or the program, ends.
-pub(crate) fn exec(args: &ExecArgs) -> miette::Result<ExitCode> {
+pub(crate) fn exec(args: &ExecArgs) -> Result<ExitCode> {
     bus::runtime::use_one_thread();
     let [name] = args.robot.names.as_slice() else {
         let help = "for example: cars exec --name Leguin -- ./leguin.sh";
-        return Err(miette!(
+        return Err(refusal!(
             help = help,
             "a program is one robot: give one --name"
         ));

@@ -13,6 +13,7 @@ use record::names::LATEST;
 use scenario::Scenario;
 use scenario::expectations;
 
+use crate::errors::Result;
 use crate::table::verdicts;
 
 /// `cars expect`.
@@ -33,7 +34,7 @@ pub(crate) struct ExpectArgs {
 }
 
 /// Judges a recorded run. The exit status is that of the verdict.
-pub(crate) fn expect(args: &ExpectArgs) -> miette::Result<ExitCode> {
+pub(crate) fn expect(args: &ExpectArgs) -> Result<ExitCode> {
     let folder = find(&args.out, &args.run)?;
     let files = recorded_epoch(&folder, args.epoch)?;
     let scenario = Scenario::load(&files.scenario, &Changes::default())?;

@@ -18,11 +18,11 @@ use experiments::shell;
 use experiments::{Experiment, LaunchText, Plan, Provenance, Request, Results, Robots, Store};
 use indicatif::{ProgressBar, ProgressStyle};
 use launch::{is_launch_file, scenario_file};
-use miette::{IntoDiagnostic, miette};
 use protocol::messages::Verdict;
 use protocol::random::MAX_SEED;
 
 use self::launcher::launcher;
+use crate::errors::{Result, refusal};
 use crate::named;
 use crate::submit::EngineArgs;
 
@@ -184,7 +184,7 @@ fn parse_range<T: FromStr + PartialOrd>(text: &str) -> Option<RangeInclusive<T>>
 }
 
 /// Plays experiments and shows their results.
-pub(crate) fn experiment(args: ExperimentArgs) -> miette::Result<ExitCode> {
+pub(crate) fn experiment(args: ExperimentArgs) -> Result<ExitCode> {
     match args.what {
         ExperimentCommand::Run(args) => run(&args),
         ExperimentCommand::Submit(args) => submit(&args),
@@ -198,7 +198,7 @@ pub(crate) fn experiment(args: ExperimentArgs) -> miette::Result<ExitCode> {
     }
 }
 
-fn run(args: &ExperimentRunArgs) -> miette::Result<ExitCode> {
+fn run(args: &ExperimentRunArgs) -> Result<ExitCode> {
     let (plan, folder) = args.plan.save()?;
     if args.plan_only {
         let units = plan.units();
@@ -208,7 +208,7 @@ fn run(args: &ExperimentRunArgs) -> miette::Result<ExitCode> {
 
     let store = play(&plan, &folder, &args.workers, 0..plan.units())?;
     if !plan.is_in(&folder)? {
-        return Err(miette!(
+        return Err(refusal!(
             help = "`cars experiment merge` writes the results of the plan that is there now",
             "another process has written another plan to {}",
             folder.display()
@@ -217,7 +217,7 @@ fn run(args: &ExperimentRunArgs) -> miette::Result<ExitCode> {
     conclude(&Results::of(plan, &store), &folder, args.json)
 }
 
-fn submit(args: &SubmitArgs) -> miette::Result<ExitCode> {
+fn submit(args: &SubmitArgs) -> Result<ExitCode> {
     let (plan, folder) = if args.plan.file.is_dir() {
         args.plan.check_folder()?;
         (Plan::load(&args.plan.file)?, args.plan.file.clone())
@@ -229,14 +229,14 @@ fn submit(args: &SubmitArgs) -> miette::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn play_units(args: &UnitArgs) -> miette::Result<ExitCode> {
+fn play_units(args: &UnitArgs) -> Result<ExitCode> {
     let plan = Plan::load(&args.folder)?;
     plan.check_program()?;
     plan.check()?;
     let first = *args.units.start();
     let end = plan.units().min(args.units.end().saturating_add(1));
     if first >= end {
-        return Err(miette!(
+        return Err(refusal!(
             "there is no unit {first}: the experiment in {} has the units 0 to {}",
             args.folder.display(),
             plan.units() - 1
@@ -253,7 +253,7 @@ fn play_units(args: &UnitArgs) -> miette::Result<ExitCode> {
 }
 
 /// Shows how far an experiment has come.
-fn status(folder: &Path) -> miette::Result<ExitCode> {
+fn status(folder: &Path) -> Result<ExitCode> {
     let results = Results::load(folder)?;
     terminal::print_line(format_args!(
         "{} units: {} played, {} failed, {} missing",
@@ -269,7 +269,7 @@ fn status(folder: &Path) -> miette::Result<ExitCode> {
 
 impl PlanArgs {
     /// Plans the experiment and writes the plan into its folder.
-    fn save(&self) -> miette::Result<(Plan, PathBuf)> {
+    fn save(&self) -> Result<(Plan, PathBuf)> {
         let request = self.request()?;
         let folder = match &self.out {
             Some(out) => out.clone(),
@@ -292,7 +292,7 @@ impl PlanArgs {
     }
 
     /// Checks that nothing is to be changed in a folder that has been planned.
-    fn check_folder(&self) -> miette::Result<()> {
+    fn check_folder(&self) -> Result<()> {
         let is_changed = self.out.is_some()
             || self.scenario.is_some()
             || self.seeds.is_some()
@@ -300,7 +300,7 @@ impl PlanArgs {
             || !self.set.is_empty()
             || self.processes;
         if is_changed {
-            return Err(miette!(
+            return Err(refusal!(
                 help = "give the experiment's file with these options, and its folder as --out",
                 "{}: the experiment in this folder has been planned; options do not change it",
                 self.file.display()
@@ -310,7 +310,7 @@ impl PlanArgs {
         Ok(())
     }
 
-    fn request(&self) -> miette::Result<Request> {
+    fn request(&self) -> Result<Request> {
         let mut experiment = Experiment::find(&self.file)?;
         if let Some(duration) = self.duration {
             experiment.duration_s = duration.0;
@@ -349,12 +349,7 @@ pub(crate) fn equal_arms(one: &str, other: &str) -> String {
 }
 
 /// Plays those of these units that have not been played.
-fn play(
-    plan: &Plan,
-    folder: &Path,
-    workers: &Workers,
-    units: Range<usize>,
-) -> miette::Result<Store> {
+fn play(plan: &Plan, folder: &Path, workers: &Workers, units: Range<usize>) -> Result<Store> {
     let jobs = match workers.jobs {
         Some(jobs) => jobs as usize,
         None => std::thread::available_parallelism().map_or(1, usize::from),
@@ -377,8 +372,7 @@ fn play(
     ));
 
     be_quiet_about_units();
-    let style =
-        ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {eta} left").into_diagnostic()?;
+    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {eta} left")?;
     let bar = ProgressBar::new(open as u64).with_style(style);
     let done = || bar.inc(1);
     engine::play(
@@ -400,7 +394,7 @@ fn be_quiet_about_units() {
 
 /// Writes the results into their folder and prints them. The exit status is 1 if a unit is missing, failed, or gave different
 /// runs; otherwise it is that of the worst verdict about what the experiment file expects.
-fn conclude(results: &Results, folder: &Path, is_json: bool) -> miette::Result<ExitCode> {
+fn conclude(results: &Results, folder: &Path, is_json: bool) -> Result<ExitCode> {
     let played = results.outcomes.len();
     if played >= MANY {
         terminal::note(format_args!(

@@ -7,12 +7,12 @@ use std::process::ExitCode;
 use clap::Args;
 use export::{ExportError, emotionml, shiviz, tables, trace};
 use lab::folder::{find, recorded_epoch, recorded_epochs, recording, run_name};
-use miette::miette;
 use protocol::{Epoch, RobotName, Tick};
 use record::names::LATEST;
 use record::{EpochFiles, RunFolder};
 use terminal::OutputError;
 
+use crate::errors::{Result, refusal};
 use crate::output::{Output, cannot_write, check_no_record};
 
 /// `cars export`.
@@ -65,7 +65,7 @@ struct ExportFormat {
 }
 
 /// Exports a run.
-pub(crate) fn export(args: &ExportArgs) -> miette::Result<ExitCode> {
+pub(crate) fn export(args: &ExportArgs) -> Result<ExitCode> {
     let folder = find(&args.out, &args.run)?;
     if let (true, Some(into)) = (args.format.csv, &args.output) {
         return write_tables(&args.epochs(&folder)?, into);
@@ -89,7 +89,7 @@ pub(crate) fn export(args: &ExportArgs) -> miette::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn write_tables(epochs: &[EpochFiles], into: &Path) -> miette::Result<ExitCode> {
+fn write_tables(epochs: &[EpochFiles], into: &Path) -> Result<ExitCode> {
     // A log may be called what a table is called.
     for name in tables::FILES {
         check_no_record(&into.join(name))?;
@@ -102,7 +102,7 @@ fn write_tables(epochs: &[EpochFiles], into: &Path) -> miette::Result<ExitCode> 
         OutputError::unless_closed(terminal::print_line(file.display()))?;
     }
     if !written.damage.is_empty() {
-        return Err(miette!(
+        return Err(refusal!(
             help = "everything else was exported",
             "{}",
             written.damage.join("\n")

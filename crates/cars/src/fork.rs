@@ -11,12 +11,12 @@ use lab::folder::{find, recorded_epoch, run_name};
 use lab::fork::Fork;
 use lab::moment::Moment;
 use launch::RunOptions;
-use miette::miette;
 use protocol::{Epoch, RunName};
 use record::NewRun;
 use scenario::Scenario;
 use scenario::files::LATEST;
 
+use crate::errors::{Result, refusal};
 use crate::execution::if_taken;
 use crate::table;
 
@@ -71,7 +71,7 @@ impl FromStr for TickOfRun {
 }
 
 /// Forks a run.
-pub(crate) fn fork(args: ForkArgs) -> miette::Result<ExitCode> {
+pub(crate) fn fork(args: ForkArgs) -> Result<ExitCode> {
     // A link such as `latest` will lead to the fork.
     let parent_folder = find(&args.out, &args.at.run)?.resolved()?;
     let parent = run_name(&parent_folder);
@@ -92,7 +92,7 @@ pub(crate) fn fork(args: ForkArgs) -> miette::Result<ExitCode> {
         .unwrap_or_else(|| parent.with_suffix(&format!("-fork-{tick}")));
     let place = args.out.join(run.as_str());
     if args.replace && is_same_place(&place, parent_folder.path()) {
-        return Err(miette!(
+        return Err(refusal!(
             help = "give it another name by --run",
             "the fork would overwrite the run {parent}"
         ));

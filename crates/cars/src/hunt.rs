@@ -15,10 +15,10 @@ use experiments::hunt::{
 };
 use experiments::shell;
 use indicatif::{ProgressBar, ProgressStyle};
-use miette::IntoDiagnostic;
 use protocol::random::MAX_SEED;
 use terminal::OutputError;
 
+use crate::errors::{Result, render};
 use crate::named;
 
 /// Time for which a hunt draws plans if neither a time nor a number of plans is given, seconds.
@@ -76,20 +76,20 @@ pub(crate) fn hunt(args: &HuntArgs) -> ExitCode {
         Ok(report) if report.findings.is_empty() => ExitCode::SUCCESS,
         Ok(_) => ExitCode::FAILURE,
         Err(error) => {
-            terminal::note(format_args!("Error: {error:?}"));
+            terminal::note(format_args!("Error: {}", render(error.as_ref())));
             ExitCode::from(2)
         }
     }
 }
 
-fn play(args: &HuntArgs) -> miette::Result<Report> {
+fn play(args: &HuntArgs) -> Result<Report> {
     let file = launch::scenario_file(&args.file)?;
     let changes = Changes {
         set: args.set.clone(),
         ..Changes::default()
     };
     let subject = Subject::load(&file, &changes)?;
-    ctrlc::set_handler(|| STOP.store(true, Ordering::Relaxed)).into_diagnostic()?;
+    ctrlc::set_handler(|| STOP.store(true, Ordering::Relaxed))?;
 
     if subject.scenario.expectations.is_empty() {
         terminal::note(
@@ -97,7 +97,7 @@ fn play(args: &HuntArgs) -> miette::Result<Report> {
         );
     }
     let options = args.options();
-    let style = ProgressStyle::with_template("{spinner} {msg}, {elapsed}").into_diagnostic()?;
+    let style = ProgressStyle::with_template("{spinner} {msg}, {elapsed}")?;
     let bar = ProgressBar::new_spinner().with_style(style);
     let begun = Instant::now();
     let report = go(&subject, &options, &mut |progress| match progress {
@@ -124,7 +124,7 @@ fn play(args: &HuntArgs) -> miette::Result<Report> {
     bar.finish_and_clear();
 
     let printed = if args.json {
-        let json = serde_json::to_string_pretty(&report).into_diagnostic()?;
+        let json = serde_json::to_string_pretty(&report)?;
         terminal::data(format_args!("{json}\n"))
     } else {
         terminal::print(in_words(&report))

@@ -8,8 +8,9 @@ use std::process::ExitCode;
 use clap::Args;
 use config::{FileError, shipped};
 use experiments::shell;
-use miette::miette;
 use terminal::OutputError;
+
+use crate::errors::{Result, refusal};
 
 /// `cars init`.
 #[derive(Debug, Args)]
@@ -19,7 +20,7 @@ pub(crate) struct InitArgs {
 }
 
 /// Writes all files, or none if one is there with another text.
-pub(crate) fn init(args: &InitArgs) -> miette::Result<ExitCode> {
+pub(crate) fn init(args: &InitArgs) -> Result<ExitCode> {
     let folder = &args.folder;
     let mut missing = Vec::new();
     for (name, text) in shipped::files() {
@@ -27,7 +28,7 @@ pub(crate) fn init(args: &InitArgs) -> miette::Result<ExitCode> {
         match fs::read(&path) {
             Ok(found) if found == text.as_bytes() => {}
             Ok(_) => {
-                return Err(miette!(
+                return Err(refusal!(
                     help = "give another folder, or remove the file",
                     "{} has been changed; nothing was written",
                     path.display()
@@ -40,7 +41,7 @@ pub(crate) fn init(args: &InitArgs) -> miette::Result<ExitCode> {
 
     for (path, text) in &missing {
         write_new(path, text)
-            .map_err(|error| miette!("cannot write {}: {error}", path.display()))?;
+            .map_err(|error| refusal!("cannot write {}: {error}", path.display()))?;
     }
 
     let count = missing.len();

@@ -8,12 +8,12 @@ use std::str::FromStr;
 use clap::{Args, ValueEnum};
 use config::units::Time;
 use launch::{Launch, LaunchOptions, Outcome, Planned, ProcessLink, What, code_of};
-use miette::miette;
 use protocol::RobotName;
 use protocol::messages::Verdict;
 use record::RunFolder;
 use terminal::OutputError;
 
+use crate::errors::{Result, refusal};
 use crate::execution::ExecutionArgs;
 use crate::replay_robot::open;
 use crate::{named, remarks, siblings, table};
@@ -111,7 +111,7 @@ enum LauncherFormat {
 }
 
 /// Launches a launch file or a roster.
-pub(crate) fn launch(args: LaunchArgs) -> miette::Result<ExitCode> {
+pub(crate) fn launch(args: LaunchArgs) -> Result<ExitCode> {
     // Before the observer opens its session. The launched processes inherit the setting.
     bus::runtime::use_one_thread();
     siblings::build()?;
@@ -148,7 +148,7 @@ pub(crate) fn launch(args: LaunchArgs) -> miette::Result<ExitCode> {
 }
 
 impl LaunchArgs {
-    fn load(self) -> miette::Result<Launch> {
+    fn load(self) -> Result<Launch> {
         let replayed = self.replayed()?;
         let options = LaunchOptions {
             run: self.execution.options(),
@@ -169,9 +169,9 @@ impl LaunchArgs {
         match (self.resume, self.roster, self.file) {
             (Some(run), ..) => {
                 let folder = lab::folder::find(&options.run.out, &run)?;
-                Launch::resume(folder.path(), options)
+                Ok(Launch::resume(folder.path(), options)?)
             }
-            (None, Some(roster), _) => Launch::load(What::Roster(roster), options),
+            (None, Some(roster), _) => Ok(Launch::load(What::Roster(roster), options)?),
             (None, None, Some(file)) => {
                 let changes = options.run.changes();
                 let scenario = launch::scenario_file(&file)?;
@@ -179,14 +179,14 @@ impl LaunchArgs {
                 remarks::show(&scenario, &changes);
                 Ok(launch)
             }
-            (None, None, None) => Err(miette!("no file is given")),
+            (None, None, None) => Err(refusal!("no file is given")),
         }
     }
 }
 
 impl LaunchArgs {
     /// The robots that are played from records, with the folders of these; they are looked into before anything starts.
-    fn replayed(&self) -> miette::Result<BTreeMap<RobotName, PathBuf>> {
+    fn replayed(&self) -> Result<BTreeMap<RobotName, PathBuf>> {
         let mut replayed = BTreeMap::new();
         for ReplayArg { robot, run } in &self.replayed {
             let folder = lab::folder::find(&self.execution.out, run)?;
@@ -214,7 +214,7 @@ fn print_plan(planned: Vec<Planned>) -> Result<(), OutputError> {
 }
 
 /// Prints the summary of the run, or its failure; returns the exit status.
-fn conclude(outcome: &Outcome, folder: &RunFolder, is_quiet: bool) -> miette::Result<ExitCode> {
+fn conclude(outcome: &Outcome, folder: &RunFolder, is_quiet: bool) -> Result<ExitCode> {
     let summary = lab::folder::read_summary(folder)?;
     if let Some(summary) = &summary
         && !is_quiet

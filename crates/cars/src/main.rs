@@ -4,6 +4,7 @@ mod check;
 mod conform;
 mod control;
 mod diagram;
+mod errors;
 mod exec;
 mod execution;
 mod expect;
@@ -34,7 +35,8 @@ mod verify;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
-use miette::IntoDiagnostic;
+
+use crate::errors::Result;
 
 /// The help of `cars`, with the subcommands by what they are for.
 const HELP: &str = "\
@@ -174,11 +176,11 @@ fn main() -> ExitCode {
     };
     terminal::print_diagnostics("warn,zenoh=error");
 
-    terminal::conclude(dispatch(cli.subcommand))
+    terminal::conclude(dispatch(cli.subcommand), errors::render)
 }
 
 /// Calls the subcommand; the hidden ones follow the public ones.
-fn dispatch(subcommand: Subcommands) -> miette::Result<ExitCode> {
+fn dispatch(subcommand: Subcommands) -> Result<ExitCode> {
     match subcommand {
         Subcommands::Launch(args) => launch::launch(args),
         Subcommands::Exec(args) => exec::exec(&args),
@@ -207,14 +209,14 @@ fn dispatch(subcommand: Subcommands) -> miette::Result<ExitCode> {
 
         Subcommands::Child(args) => Ok(exec::child(&args)),
         Subcommands::Guard { launch } => {
-            ::launch::guard(&launch).into_diagnostic()?;
+            ::launch::guard(&launch)?;
             Ok(ExitCode::SUCCESS)
         }
         Subcommands::ReplayRobot(args) => replay_robot::take_part(&args),
     }
 }
 
-fn print_completions(shell: clap_complete::Shell) -> miette::Result<ExitCode> {
+fn print_completions(shell: clap_complete::Shell) -> Result<ExitCode> {
     let mut script = Vec::new();
     clap_complete::generate(shell, &mut Cli::command(), "cars", &mut script);
 

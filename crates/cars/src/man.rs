@@ -8,9 +8,9 @@ use clap::{Args, Command};
 use clap_mangen::Man;
 use export::draft::{Draft, unwritable};
 use launch::{SIBLINGS, find_sibling};
-use miette::{IntoDiagnostic, WrapErr, ensure};
 use terminal::MAN_PAGE;
 
+use crate::errors::{Context, Result, refusal};
 use crate::siblings;
 
 /// `cars man`.
@@ -21,7 +21,7 @@ pub(crate) struct ManArgs {
 }
 
 /// Writes a page for each subcommand of `cars`, whose command line is given, and for each program beside it that is there.
-pub(crate) fn man(args: &ManArgs, cars: Command) -> miette::Result<ExitCode> {
+pub(crate) fn man(args: &ManArgs, cars: Command) -> Result<ExitCode> {
     let folder = &args.folder;
     std::fs::create_dir_all(folder).map_err(|error| unwritable(folder, &error))?;
 
@@ -39,20 +39,21 @@ pub(crate) fn man(args: &ManArgs, cars: Command) -> miette::Result<ExitCode> {
 }
 
 /// The page that a program prints.
-fn page_of(program: &Path) -> miette::Result<Vec<u8>> {
+fn page_of(program: &Path) -> Result<Vec<u8>> {
     let output = std::process::Command::new(program)
         .arg(MAN_PAGE)
         .stderr(Stdio::inherit())
         .output()
-        .into_diagnostic()
-        .wrap_err_with(|| program.display().to_string())?;
+        .context(program.display().to_string())?;
     let status = output.status;
-    ensure!(status.success(), "{}: {status}", program.display());
+    if !status.success() {
+        return Err(refusal!("{}: {status}", program.display()));
+    }
     Ok(output.stdout)
 }
 
 /// Writes the page of a command and those of its subcommands.
-fn write_pages(command: &Command, folder: &Path) -> miette::Result<()> {
+fn write_pages(command: &Command, folder: &Path) -> Result<()> {
     for subcommand in command.get_subcommands() {
         if !subcommand.is_hide_set() {
             write_pages(subcommand, folder)?;
@@ -61,11 +62,11 @@ fn write_pages(command: &Command, folder: &Path) -> miette::Result<()> {
 
     let page = Man::new(command.clone());
     let mut text = Vec::new();
-    page.render(&mut text).into_diagnostic()?;
+    page.render(&mut text)?;
     write(&folder.join(page.get_filename()), &text)
 }
 
-fn write(path: &Path, page: &[u8]) -> miette::Result<()> {
+fn write(path: &Path, page: &[u8]) -> Result<()> {
     let mut draft = Draft::create(path)?;
     draft
         .write_all(page)

@@ -10,10 +10,10 @@ use std::sync::Arc;
 
 use clap::{Args, Subcommand, ValueEnum};
 use launch::net::{self, Flow, LinkOrder, Plan, Proxy, Shape, address};
-use miette::{IntoDiagnostic, WrapErr};
 use protocol::RobotName;
 use terminal::OutputError;
 
+use crate::errors::{Context, Result};
 use crate::execution::ExecutionArgs;
 use crate::{named, siblings};
 
@@ -79,7 +79,7 @@ enum LinkKind {
 }
 
 /// Runs a subcommand.
-pub(crate) fn net(command: NetCommand) -> miette::Result<ExitCode> {
+pub(crate) fn net(command: NetCommand) -> Result<ExitCode> {
     match command {
         NetCommand::Proxy(args) => proxy(args),
         NetCommand::Play(args) => play(args),
@@ -87,16 +87,15 @@ pub(crate) fn net(command: NetCommand) -> miette::Result<ExitCode> {
 }
 
 /// Forwards until the process is killed; carries out the plan and the orders of the standard input.
-fn proxy(args: ProxyArgs) -> miette::Result<ExitCode> {
+fn proxy(args: ProxyArgs) -> Result<ExitCode> {
     let closes = args.close;
     let plan = match args.plan.zip(args.robot) {
         Some((file, robot)) => Some(Plan::load(&file, &BTreeSet::from([robot]))?),
         None => None,
     };
 
-    let proxy = Proxy::start(args.listen, args.to)
-        .into_diagnostic()
-        .wrap_err_with(|| format!("cannot listen at {}", args.listen))?;
+    let proxy =
+        Proxy::start(args.listen, args.to).context(format!("cannot listen at {}", args.listen))?;
     let proxy = Arc::new(proxy);
     show(format_args!(
         "listening at {}, on to {}",
@@ -108,8 +107,7 @@ fn proxy(args: ProxyArgs) -> miette::Result<ExitCode> {
         let proxy = proxy.clone();
         std::thread::Builder::new()
             .spawn(move || play_plan(&proxy, &plan, closes))
-            .into_diagnostic()
-            .wrap_err("no thread can be started for the plan")?;
+            .context("no thread can be started for the plan")?;
     }
     obey_input(&proxy, closes)?;
 
@@ -136,9 +134,9 @@ fn play_plan(proxy: &Proxy, plan: &Plan, closes: bool) {
 }
 
 /// Carries out the orders of the standard input to its end.
-fn obey_input(proxy: &Proxy, closes: bool) -> miette::Result<()> {
+fn obey_input(proxy: &Proxy, closes: bool) -> Result<()> {
     for line in std::io::stdin().lock().lines() {
-        let line = line.into_diagnostic()?;
+        let line = line?;
         match line.parse::<LinkOrder>() {
             Ok(order) => {
                 proxy.set(closing(order.apply(proxy.shape()), closes));
@@ -161,7 +159,7 @@ fn closing(shape: Shape, closes: bool) -> Shape {
 }
 
 /// Plays a plan of faults on the links of a launch.
-fn play(args: PlayArgs) -> miette::Result<ExitCode> {
+fn play(args: PlayArgs) -> Result<ExitCode> {
     siblings::build()?;
 
     let via = match args.via {

@@ -8,9 +8,10 @@ use std::process::ExitCode;
 use clap::{Args, Subcommand, ValueEnum};
 use config::{FileError, Source};
 use launch::LaunchFile;
-use miette::{IntoDiagnostic, WrapErr, miette};
 use protocol::{RobotName, RunName};
 use scenario::Scenario;
+
+use crate::errors::{Context, Result, refusal};
 
 /// `cars new`.
 #[derive(Debug, Args)]
@@ -159,7 +160,7 @@ impl Language {
 }
 
 /// Makes a skeleton and prints the next steps.
-pub(crate) fn new(args: &NewArgs) -> miette::Result<ExitCode> {
+pub(crate) fn new(args: &NewArgs) -> Result<ExitCode> {
     let NewCommand::Robot(args) = &args.what;
     let folder = args.out.join(args.name.as_str());
     let skeleton = args.lang.skeleton();
@@ -177,7 +178,7 @@ pub(crate) fn new(args: &NewArgs) -> miette::Result<ExitCode> {
         folder: shown(&folder),
         cars: &cars,
     };
-    let place = folder.canonicalize().into_diagnostic()?;
+    let place = folder.canonicalize()?;
     for (name, text) in [skeleton.program]
         .iter()
         .chain(skeleton.more)
@@ -201,8 +202,8 @@ pub(crate) fn new(args: &NewArgs) -> miette::Result<ExitCode> {
 }
 
 /// Checks that the robot can be launched: some names are reserved.
-fn check_launch(skeleton: &Skeleton, name: &RobotName) -> miette::Result<()> {
-    RunName::new(name.as_str()).map_err(|error| miette!("{error}"))?;
+fn check_launch(skeleton: &Skeleton, name: &RobotName) -> Result<()> {
+    RunName::new(name.as_str())?;
 
     let template = Template {
         skeleton,
@@ -215,7 +216,7 @@ fn check_launch(skeleton: &Skeleton, name: &RobotName) -> miette::Result<()> {
         text: template.fill(text),
     });
     let wrong = |error: FileError| {
-        miette!(
+        refusal!(
             help = "choose another name",
             "no robot can be called {name}: {}",
             error.in_words()
@@ -228,25 +229,22 @@ fn check_launch(skeleton: &Skeleton, name: &RobotName) -> miette::Result<()> {
 }
 
 /// Makes the folder of the robot, which must not exist.
-fn make_folder(out: &Path, folder: &Path) -> miette::Result<()> {
-    std::fs::create_dir_all(out)
-        .into_diagnostic()
-        .wrap_err_with(|| format!("making {}", out.display()))?;
+fn make_folder(out: &Path, folder: &Path) -> Result<()> {
+    std::fs::create_dir_all(out).context(format!("making {}", out.display()))?;
 
     std::fs::create_dir(folder).map_err(|error| match error.kind() {
         std::io::ErrorKind::AlreadyExists => {
             let help = "nothing is overwritten: choose another name or another --out, or remove it";
-            miette!(help = help, "{} is there already", folder.display())
+            refusal!(help = help, "{} is there already", folder.display())
         }
-        _ => miette!("{} cannot be made: {error}", folder.display()),
+        _ => refusal!("{} cannot be made: {error}", folder.display()),
     })
 }
 
 /// Copies the lock file of the project: the robot is built with the same versions as the simulator.
-fn copy_lock(cars: &Path, place: &Path) -> miette::Result<()> {
-    let lock = std::fs::read_to_string(cars.join("Cargo.lock"))
-        .into_diagnostic()
-        .wrap_err("the project's Cargo.lock")?;
+fn copy_lock(cars: &Path, place: &Path) -> Result<()> {
+    let lock =
+        std::fs::read_to_string(cars.join("Cargo.lock")).context("the project's Cargo.lock")?;
     write(&place.join("Cargo.lock"), &lock)
 }
 
@@ -311,11 +309,11 @@ fn shown(folder: &Path) -> String {
 }
 
 /// The folder of the CARS project.
-fn project(given: Option<&Path>) -> miette::Result<PathBuf> {
+fn project(given: Option<&Path>) -> Result<PathBuf> {
     let help = "give the folder that you have cloned: --cars DIR";
     let Some(given) = given else {
         return find_project().ok_or_else(|| {
-            miette!(
+            refusal!(
                 help = help,
                 "the CARS project, whose SDK this robot uses, is neither around this program nor \
                  around the current folder"
@@ -325,7 +323,7 @@ fn project(given: Option<&Path>) -> miette::Result<PathBuf> {
 
     let found = given.canonicalize().ok().filter(|path| is_project(path));
     found.ok_or_else(|| {
-        miette!(
+        refusal!(
             help = help,
             "the CARS project, whose SDK this robot uses, is not at {}",
             given.display()
@@ -351,10 +349,8 @@ fn is_project(folder: &Path) -> bool {
 }
 
 /// Writes a file; a script is made executable.
-fn write(file: &Path, text: &str) -> miette::Result<()> {
-    try_write(file, text)
-        .into_diagnostic()
-        .wrap_err_with(|| format!("writing {}", file.display()))
+fn write(file: &Path, text: &str) -> Result<()> {
+    try_write(file, text).context(format!("writing {}", file.display()))
 }
 
 fn try_write(file: &Path, text: &str) -> std::io::Result<()> {

@@ -1,13 +1,15 @@
 //! Files that commands write: they get their names when they are complete.
 
+use std::error::Error;
 use std::fs::File;
 use std::io::{BufWriter, ErrorKind, Stdout, Write};
 use std::path::Path;
 
 use experiments::is_of_experiment;
 use export::draft::{Draft, unwritable};
-use miette::miette;
 use record::RunFolder;
+
+use crate::errors::{Result, refusal};
 
 /// Paths of the standard output.
 const STANDARD: [&str; 3] = ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"];
@@ -30,7 +32,7 @@ impl Output {
     ///
     /// # Errors
     /// If it cannot be written.
-    pub(crate) fn create(path: Option<&Path>) -> miette::Result<Self> {
+    pub(crate) fn create(path: Option<&Path>) -> Result<Self> {
         let Some(path) = path.filter(|path| !STANDARD.iter().any(|name| *path == Path::new(name)))
         else {
             return Ok(Self::Standard(BufWriter::new(std::io::stdout())));
@@ -54,10 +56,10 @@ impl Output {
     ///
     /// # Errors
     /// The reason why it cannot be written.
-    pub(crate) fn finish(mut self) -> miette::Result<()> {
+    pub(crate) fn finish(mut self) -> Result<()> {
         match self.flush() {
             Err(error) if error.kind() == ErrorKind::BrokenPipe => return Ok(()),
-            flushed => flushed.map_err(|error| miette!("cannot write: {error}"))?,
+            flushed => flushed.map_err(|error| refusal!("cannot write: {error}"))?,
         }
         if let Self::File(draft) = self {
             draft.publish()?;
@@ -88,7 +90,7 @@ impl Write for Output {
 ///
 /// # Errors
 /// If it cannot be written. A file is then as it was before, or not there.
-pub(crate) fn write(path: Option<&Path>, text: &str) -> miette::Result<()> {
+pub(crate) fn write(path: Option<&Path>, text: &str) -> Result<()> {
     let mut output = Output::create(path)?;
     match output.write_all(text.as_bytes()) {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
@@ -101,9 +103,9 @@ pub(crate) fn write(path: Option<&Path>, text: &str) -> miette::Result<()> {
 ///
 /// # Errors
 /// If it is.
-pub(crate) fn check_no_record(path: &Path) -> miette::Result<()> {
+pub(crate) fn check_no_record(path: &Path) -> Result<()> {
     if is_part_of_record(path) {
-        return Err(miette!(
+        return Err(refusal!(
             help = "choose another --output",
             "{} is part of the record of a run or an experiment",
             path.display()
@@ -129,9 +131,12 @@ fn is_part_of_record(path: &Path) -> bool {
 }
 
 /// The error of an output that cannot be written.
-pub(crate) fn cannot_write(path: Option<&Path>, error: &std::io::Error) -> miette::Report {
+pub(crate) fn cannot_write(
+    path: Option<&Path>,
+    error: &std::io::Error,
+) -> Box<dyn Error + Send + Sync> {
     match path {
         Some(path) => unwritable(path, error).into(),
-        None => miette!("cannot write to the standard output: {error}"),
+        None => refusal!("cannot write to the standard output: {error}"),
     }
 }

@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use config::{Changes, FileError};
-use miette::Report;
 use scenario::Scenario;
 
 /// Shows the remarks about a scenario file that has been loaded.
@@ -17,6 +16,6 @@ pub(crate) fn show(path: &Path, changes: &Changes) {
 /// Shows remarks.
 pub(crate) fn show_all(remarks: Vec<FileError>) {
     for remark in remarks {
-        terminal::note(format_args!("{:?}", Report::from(remark)));
+        terminal::note(config::render(&remark, None));
     }
 }

@@ -8,7 +8,6 @@ use bus::{Bus, DEFAULT_ENDPOINT, Role};
 use clap::Args;
 use config::Speed;
 use lab::folder::{find, recorded_epoch, recording};
-use miette::IntoDiagnostic;
 use protocol::{Epoch, RunName};
 use record::RunLock;
 use record::names::ENDPOINT;
@@ -16,6 +15,8 @@ use record::{EpochFiles, RunFolder};
 use recording::Recording;
 use simulator::server::{Options, REPEAT_AFTER, Server, Stay};
 use terminal::OutputError;
+
+use crate::errors::Result;
 
 /// `cars replay`.
 #[derive(Debug, Args)]
@@ -47,7 +48,7 @@ pub(crate) struct ReplayArgs {
 }
 
 /// Replays a recorded run until it is stopped.
-pub(crate) fn replay(args: &ReplayArgs) -> miette::Result<ExitCode> {
+pub(crate) fn replay(args: &ReplayArgs) -> Result<ExitCode> {
     bus::runtime::use_router_threads();
 
     let folder = find(&args.out, &args.recorded)?;
@@ -60,7 +61,7 @@ pub(crate) fn replay(args: &ReplayArgs) -> miette::Result<ExitCode> {
         listen: args.listen.clone(),
         trusts_network: args.insecure,
     };
-    let bus = Bus::open(&role, None).into_diagnostic()?;
+    let bus = Bus::open(&role, None)?;
     let run = args.run.clone().unwrap_or_else(|| recorded.clone());
     let options = Options {
         run: run.clone(),
@@ -69,8 +70,8 @@ pub(crate) fn replay(args: &ReplayArgs) -> miette::Result<ExitCode> {
         stay: Stay::Always,
         repeat_after: REPEAT_AFTER,
     };
-    let server = Server::replay(bus, recording, options).into_diagnostic()?;
-    ctrlc::set_handler(server.stopper()).into_diagnostic()?;
+    let server = Server::replay(bus, recording, options)?;
+    ctrlc::set_handler(server.stopper())?;
 
     let endpoint = connectable(&args.listen);
     // Nothing is written through a link.
@@ -91,7 +92,7 @@ pub(crate) fn replay(args: &ReplayArgs) -> miette::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn open_recording(files: &EpochFiles) -> miette::Result<Recording> {
+fn open_recording(files: &EpochFiles) -> Result<Recording> {
     let recording = recording(files)?;
     if !recording.is_finished() && !recording.is_empty() {
         terminal::note(format_args!(

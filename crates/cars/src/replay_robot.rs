@@ -7,9 +7,10 @@ use clap::Args;
 use config::FileError;
 use lab::folder::recorded_epoch;
 use lab::replayed::Replayed;
-use miette::IntoDiagnostic;
 use record::RunFolder;
 use robot::{Host, Robot, RobotArgs, RobotName};
+
+use crate::errors::Result;
 
 /// `cars replay-robot`.
 #[derive(Debug, Args)]
@@ -22,13 +23,13 @@ pub(crate) struct ReplayRobotArgs {
 }
 
 /// Takes part with a robot from a record.
-pub(crate) fn take_part(args: &ReplayRobotArgs) -> miette::Result<ExitCode> {
+pub(crate) fn take_part(args: &ReplayRobotArgs) -> Result<ExitCode> {
     let mut robots: Vec<(RobotName, Box<dyn Robot>)> = Vec::new();
     for name in &args.robot.names {
         robots.push((name.clone(), Box::new(open(&args.record, name)?)));
     }
-    let host = Host::connect(robots, args.robot.options()).into_diagnostic()?;
-    host.run().into_diagnostic()?;
+    let host = Host::connect(robots, args.robot.options())?;
+    host.run()?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -6,11 +6,11 @@ use std::process::ExitCode;
 use clap::Args;
 use experiments::PLAN;
 use lab::folder::find;
-use miette::miette;
 use record::RunFolder;
 use record::names::LATEST;
 use reports::{of_experiment, of_runs};
 
+use crate::errors::{Result, refusal};
 use crate::output;
 
 /// `cars report`.
@@ -28,7 +28,7 @@ pub(crate) struct ReportArgs {
 }
 
 /// Writes a report.
-pub(crate) fn report(args: &ReportArgs) -> miette::Result<ExitCode> {
+pub(crate) fn report(args: &ReportArgs) -> Result<ExitCode> {
     let mut folders = Vec::new();
     let page = match &args.subjects[..] {
         [subject] if let Some(experiment) = find_experiment(&args.out, subject) => {
@@ -52,9 +52,9 @@ fn find_experiment(out: &Path, subject: &Path) -> Option<PathBuf> {
     candidates.into_iter().find(|path| path.join(PLAN).exists())
 }
 
-fn find_run(out: &Path, subject: &Path) -> miette::Result<RunFolder> {
+fn find_run(out: &Path, subject: &Path) -> Result<RunFolder> {
     if find_experiment(out, subject).is_some() {
-        return Err(miette!(
+        return Err(refusal!(
             help = "report it by itself",
             "{} is the folder of an experiment, and a report shows runs or one experiment",
             subject.display()
@@ -62,12 +62,12 @@ fn find_run(out: &Path, subject: &Path) -> miette::Result<RunFolder> {
     }
 
     if subject.is_file() {
-        return Err(miette!(
+        return Err(refusal!(
             help = "play it first, with `cars run` or `cars experiment run`, and report the folder that it leaves",
             "{} is a file, and not the folder of a run or an experiment",
             subject.display()
         ));
     }
 
-    find(out, subject)
+    Ok(find(out, subject)?)
 }

@@ -6,8 +6,9 @@ use std::process::ExitCode;
 
 use bus::{Bus, Role};
 use clap::Args;
-use miette::{IntoDiagnostic, WrapErr};
 use terminal::OutputError;
+
+use crate::errors::{Context, Result};
 
 /// `cars router`.
 #[derive(Debug, Args)]
@@ -32,25 +33,22 @@ pub(crate) struct RouterArgs {
 }
 
 /// Forwards until a signal ends it.
-pub(crate) fn router(args: &RouterArgs) -> miette::Result<ExitCode> {
+pub(crate) fn router(args: &RouterArgs) -> Result<ExitCode> {
     bus::runtime::use_router_threads();
-    bus::runtime::check_threads()
-        .into_diagnostic()
-        .wrap_err("no thread can be started")?;
+    bus::runtime::check_threads().context("no thread can be started")?;
 
     let (end, ended) = std::sync::mpsc::sync_channel(1);
     ctrlc::set_handler(move || {
         // A second signal finds the queue full and changes nothing.
         let _asked_already = end.try_send(());
-    })
-    .into_diagnostic()?;
+    })?;
 
     let role = Role::Relay {
         listen: args.listen.clone(),
         connect: args.connect.clone(),
         trusts_network: args.insecure,
     };
-    let bus = Bus::open(&role, args.zenoh_config.as_ref()).into_diagnostic()?;
+    let bus = Bus::open(&role, args.zenoh_config.as_ref())?;
     let endpoints = if args.listen.is_empty() {
         "the endpoints of the configuration file".to_owned()
     } else {
@@ -58,7 +56,7 @@ pub(crate) fn router(args: &RouterArgs) -> miette::Result<ExitCode> {
     };
     let printed = terminal::print_line(format_args!("forwarding at {endpoints}"));
     OutputError::unless_closed(printed)?; // It forwards also where its line is not read.
-    ended.recv().into_diagnostic()?;
+    ended.recv()?;
     bus.close();
 
     Ok(ExitCode::SUCCESS)

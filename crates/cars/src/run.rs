@@ -7,6 +7,7 @@ use clap::Args;
 use lab::run::check_faults;
 use scenario::Scenario;
 
+use crate::errors::Result;
 use crate::execution::ExecutionArgs;
 use crate::{named, remarks, table};
 
@@ -26,7 +27,7 @@ pub(crate) struct RunArgs {
 }
 
 /// Runs a scenario in this process.
-pub(crate) fn run(args: RunArgs) -> miette::Result<ExitCode> {
+pub(crate) fn run(args: RunArgs) -> Result<ExitCode> {
     let options = args.execution.options();
     let file = launch::scenario_file(&args.file)?;
     let scenario = Scenario::load(&file, &options.changes())?;

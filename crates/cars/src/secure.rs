@@ -8,6 +8,8 @@ use launch::Certificates;
 use protocol::{RobotName, RunName};
 use terminal::OutputError;
 
+use crate::errors::Result;
+
 /// `cars secure`.
 #[derive(Debug, Args)]
 pub(crate) struct SecureArgs {
@@ -44,7 +46,7 @@ struct SecureInitArgs {
 }
 
 /// Makes the certificates and configuration files of a secured run.
-pub(crate) fn secure(args: SecureArgs) -> miette::Result<ExitCode> {
+pub(crate) fn secure(args: SecureArgs) -> Result<ExitCode> {
     let SecureCommand::Init(init) = args.task;
     let certificates = Certificates {
         folder: init.folder,

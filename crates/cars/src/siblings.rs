@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-use miette::{IntoDiagnostic, ensure};
+use crate::errors::Result;
 
 /// A build that lasts longer than this is announced. One that finds nothing to do takes about 0.3 s.
 const SILENT: Duration = Duration::from_secs(1);
@@ -16,22 +16,24 @@ const POLL: Duration = Duration::from_millis(10);
 ///
 /// # Errors
 /// If they do not build.
-pub(crate) fn build() -> miette::Result<()> {
+pub(crate) fn build() -> Result<()> {
     let Some(mut build) = build_command() else {
         return Ok(());
     };
 
     let begun = Instant::now();
-    let mut child = build.spawn().into_diagnostic()?;
-    while child.try_wait().into_diagnostic()?.is_none() && begun.elapsed() < SILENT {
+    let mut child = build.spawn()?;
+    while child.try_wait()?.is_none() && begun.elapsed() < SILENT {
         std::thread::sleep(POLL);
     }
-    if child.try_wait().into_diagnostic()?.is_none() {
+    if child.try_wait()?.is_none() {
         terminal::note("building the programs beside `cars` first");
     }
 
-    let status = child.wait().into_diagnostic()?;
-    ensure!(status.success(), "the programs beside `cars` do not build");
+    let status = child.wait()?;
+    if !status.success() {
+        return Err("the programs beside `cars` do not build".into());
+    }
     Ok(())
 }
 

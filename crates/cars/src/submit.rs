@@ -9,9 +9,9 @@ use config::units::Time;
 use experiments::Plan;
 use experiments::submit::{Kubernetes, Parallel, Slurm, Tasks};
 use export::draft::unwritable;
-use miette::{IntoDiagnostic, WrapErr, miette};
 use record::folder::check_no_links;
 
+use crate::errors::{Context, Result, refusal};
 use crate::output;
 
 /// Folder of the scripts and of what they print, in that of the experiment.
@@ -95,9 +95,9 @@ impl EngineArgs {
     ///
     /// # Errors
     /// If an option is not one of the engine, or Slurm refuses the jobs.
-    pub(crate) fn submit(&self, plan: &Plan, folder: &Path) -> miette::Result<()> {
+    pub(crate) fn submit(&self, plan: &Plan, folder: &Path) -> Result<()> {
         self.check()?;
-        let folder = std::path::absolute(folder).into_diagnostic()?;
+        let folder = std::path::absolute(folder)?;
         let tasks = self.tasks(plan, &folder)?;
         let at_a_time = self.limit.map(NonZero::get);
 
@@ -125,7 +125,7 @@ impl EngineArgs {
     }
 
     /// Checks that every option is one of the engine.
-    fn check(&self) -> miette::Result<()> {
+    fn check(&self) -> Result<()> {
         let is_of_job = self.engine != Engine::Parallel;
         for (option, is_given, is_of_engine) in [
             ("--print", self.print, self.engine == Engine::Slurm),
@@ -159,18 +159,18 @@ impl EngineArgs {
             if is_given && !is_of_engine {
                 let engine = self.engine.to_possible_value();
                 let engine = engine.as_ref().map_or("", |value| value.get_name());
-                return Err(miette!("{option} has no meaning with --engine {engine}"));
+                return Err(refusal!("{option} has no meaning with --engine {engine}"));
             }
         }
 
         Ok(())
     }
 
-    fn tasks(&self, plan: &Plan, folder: &Path) -> miette::Result<Tasks> {
+    fn tasks(&self, plan: &Plan, folder: &Path) -> Result<Tasks> {
         let program = match (&self.program, self.engine) {
             (Some(program), _) => program.clone(),
             (None, Engine::Kubernetes) => PathBuf::from("cars"),
-            (None, _) => std::env::current_exe().into_diagnostic()?,
+            (None, _) => std::env::current_exe()?,
         };
         let per_task = self.units_per_task.map(NonZero::get);
 
@@ -185,7 +185,7 @@ impl EngineArgs {
     }
 
     /// Submits the jobs, or prints their scripts.
-    fn slurm(&self, tasks: &Tasks, folder: &Path) -> miette::Result<()> {
+    fn slurm(&self, tasks: &Tasks, folder: &Path) -> Result<()> {
         let slurm = Slurm {
             partition: self.partition.clone(),
             limit_min: self.time_limit.map(|limit| (limit.0 / 60.0).ceil() as u64),
@@ -208,7 +208,7 @@ impl EngineArgs {
         // Also if a task failed: the others have results.
         let after = format!("--dependency=afterany:{units}");
         let merge = sbatch(&scripts, &[&after, MERGE])
-            .wrap_err_with(|| format!("the units are submitted as job {units}"))?;
+            .context(format!("the units are submitted as job {units}"))?;
 
         let count = tasks.count();
         terminal::print_line(format_args!(
@@ -220,7 +220,7 @@ impl EngineArgs {
 }
 
 /// Submits a script of a folder and returns the number of its job.
-fn sbatch(folder: &Path, args: &[&str]) -> miette::Result<String> {
+fn sbatch(folder: &Path, args: &[&str]) -> Result<String> {
     let output = Command::new("sbatch")
         .current_dir(folder)
         .arg("--parsable")
@@ -228,14 +228,14 @@ fn sbatch(folder: &Path, args: &[&str]) -> miette::Result<String> {
         .stdin(Stdio::null())
         .output()
         .map_err(|error| {
-            miette!(
+            refusal!(
                 help = "submit on a machine that has Slurm, or print the scripts with --print",
                 "`sbatch` cannot be started: {error}"
             )
         })?;
     if !output.status.success() {
         let reason = String::from_utf8_lossy(&output.stderr);
-        return Err(miette!("`sbatch` refuses the job: {}", reason.trim()));
+        return Err(refusal!("`sbatch` refuses the job: {}", reason.trim()));
     }
 
     // The number, and where there are several clusters, `;` and the name of the cluster.
@@ -245,8 +245,8 @@ fn sbatch(folder: &Path, args: &[&str]) -> miette::Result<String> {
 }
 
 /// A path as a text of a script.
-fn text(path: &Path) -> miette::Result<String> {
+fn text(path: &Path) -> Result<String> {
     let text = path.to_str();
-    let text = text.ok_or_else(|| miette!("{}: this path is not UTF-8", path.display()))?;
+    let text = text.ok_or_else(|| refusal!("{}: this path is not UTF-8", path.display()))?;
     Ok(text.to_owned())
 }

@@ -12,12 +12,13 @@ use lab::folder::{find, recorded_epoch, recorded_epochs};
 use lab::scratch::Scratch;
 use lab::verify::{Verification, verify as verify_epoch};
 use launch::{Launch, LaunchOptions, RunOptions};
-use miette::{IntoDiagnostic, miette};
 use protocol::{Event, RobotName};
 use record::Record;
 use record::difference::Difference;
 use record::{EpochFiles, IfTaken, RunFolder};
 use terminal::OutputError;
+
+use crate::errors::{Result, refusal};
 
 /// How long a process may take to exit before it is killed, seconds.
 const GRACE_S: f64 = 3.0;
@@ -51,7 +52,7 @@ pub(crate) struct DiffArgs {
 }
 
 /// Executes a run again and compares it with its record.
-pub(crate) fn verify(args: &VerifyArgs) -> miette::Result<ExitCode> {
+pub(crate) fn verify(args: &VerifyArgs) -> Result<ExitCode> {
     let folder = find(&args.out, &args.run)?;
     let epochs = recorded_epochs(&folder)?;
     let last = epochs.len();
@@ -75,21 +76,21 @@ pub(crate) fn verify(args: &VerifyArgs) -> miette::Result<ExitCode> {
 }
 
 /// Launches a run once more, in a temporary folder, and compares.
-fn verify_processes(folder: &RunFolder, epochs: &[EpochFiles]) -> miette::Result<ExitCode> {
+fn verify_processes(folder: &RunFolder, epochs: &[EpochFiles]) -> Result<ExitCode> {
     let [files] = epochs else {
-        return Err(miette!(
+        return Err(refusal!(
             help = "`cars verify` without --processes executes each of them",
             "the run has several epochs, which were begun by hand"
         ));
     };
     if let Some(input) = input_of_chance(files)? {
-        return Err(miette!(
+        return Err(refusal!(
             help = "`cars verify` without --processes takes it from the record",
             "processes that are started again would not do the same: the run has {input}"
         ));
     }
 
-    let scratch = Scratch::new().into_diagnostic()?;
+    let scratch = Scratch::new()?;
     let mut launch = Launch::again(folder.path(), quiet_options(scratch.path()))?;
     let (outcome, again) = launch.play(|_| {})?;
     if let Some(failure) = &outcome.failure {
@@ -97,7 +98,7 @@ fn verify_processes(folder: &RunFolder, epochs: &[EpochFiles]) -> miette::Result
     }
     let [files_again] = recorded_epochs(&again)?
         .try_into()
-        .map_err(|_| miette!("the run has begun another epoch"))?;
+        .map_err(|_| refusal!("the run has begun another epoch"))?;
     let comparison = compare(files, &files_again)?;
     let text = if comparison.are_same() {
         format!("the same as processes, {} ticks", comparison.last[0])
@@ -108,7 +109,7 @@ fn verify_processes(folder: &RunFolder, epochs: &[EpochFiles]) -> miette::Result
 }
 
 /// Prints what came of a comparison. The exit status is that of the comparison also where its text is not read.
-fn conclude(text: &str, are_same: bool) -> miette::Result<ExitCode> {
+fn conclude(text: &str, are_same: bool) -> Result<ExitCode> {
     OutputError::unless_closed(terminal::print_line(text))?;
     if are_same {
         Ok(ExitCode::SUCCESS)
@@ -183,7 +184,7 @@ fn quiet_options(out: &Path) -> LaunchOptions {
 }
 
 /// Compares two runs.
-pub(crate) fn diff(args: &DiffArgs) -> miette::Result<ExitCode> {
+pub(crate) fn diff(args: &DiffArgs) -> Result<ExitCode> {
     let mut last = Vec::new();
     for run in [&args.one, &args.other] {
         let folder = find(&args.out, run)?;

@@ -4,6 +4,7 @@
 pub mod diagnostic;
 mod fixed_list;
 pub mod overrides;
+mod render;
 pub mod seed;
 pub mod shipped;
 pub mod speed;
@@ -12,4 +13,5 @@ pub mod units;
 pub use diagnostic::{FileError, Source};
 pub use fixed_list::FixedList;
 pub use overrides::{Changes, Override};
+pub use render::{render, render_plain};
 pub use speed::Speed;

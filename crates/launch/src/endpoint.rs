@@ -4,10 +4,16 @@ use std::net::{Ipv4Addr, TcpListener};
 
 use bus::endpoint::TLS;
 
+use super::error::LaunchError;
+
+/// What is reported where the loopback interface has no port left.
+pub(crate) const NO_PORT: &str = "no free port of the loopback interface";
+
 /// A port of the loopback interface that is free at this moment.
-pub(crate) fn free_port() -> std::io::Result<u16> {
-    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
-    Ok(listener.local_addr()?.port())
+pub(crate) fn free_port() -> Result<u16, LaunchError> {
+    let bound = TcpListener::bind((Ipv4Addr::LOCALHOST, 0));
+    let address = bound.and_then(|listener| listener.local_addr());
+    Ok(address.map_err(LaunchError::system(NO_PORT))?.port())
 }
 
 /// The endpoint of a port of the loopback interface.

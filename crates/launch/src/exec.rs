@@ -11,12 +11,12 @@ use std::sync::mpsc::{Receiver, sync_channel};
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
-use miette::IntoDiagnostic;
 use nix::sys::signal::{SigSet, Signal};
 use protocol::RobotName;
 use robot::{Host, HostError, HostOptions, Stopper};
 
 use crate::ending::code_of;
+use crate::error::LaunchError;
 use line::EndReason;
 use program::{ASKING, END_PATIENCE, Program, start_thread};
 use proxy::Proxy;
@@ -48,11 +48,13 @@ pub fn exec(
     options: HostOptions,
     command: &[OsString],
     silence: &str,
-) -> miette::Result<Ended> {
+) -> Result<Ended, LaunchError> {
     // All later threads inherit the mask, so only the thread in `listen` receives these signals. So does the program, until
     // `cars child` empties it.
     let asking: SigSet = ASKING.into_iter().collect();
-    asking.thread_block().into_diagnostic()?;
+    asking
+        .thread_block()
+        .map_err(LaunchError::system("signals cannot be received"))?;
 
     let stopper = Arc::new(OnceLock::new());
     let (program, events) = Program::start(name, command, stopper.clone())?;
@@ -112,7 +114,7 @@ fn listen(
     asking: SigSet,
     program: &Arc<Program>,
     stopper: Arc<OnceLock<Stopper>>,
-) -> miette::Result<Receiver<Signal>> {
+) -> Result<Receiver<Signal>, LaunchError> {
     let (sender, asked) = sync_channel(1);
     let program = program.clone();
     start_thread(move || {

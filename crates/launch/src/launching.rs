@@ -8,7 +8,6 @@ use bus::endpoint::connectable;
 use bus::{check_exposure, check_run};
 use config::units::Time;
 use config::{Changes, FileError, Source, Speed};
-use miette::{IntoDiagnostic, WrapErr, miette};
 use protocol::{RobotName, RunName};
 use record::names::{LOGS, SCENARIO};
 use record::{IfTaken, RunFolder, RunLock};
@@ -16,6 +15,7 @@ use scenario::{Scenario, roster};
 
 use super::compose;
 use super::endpoint;
+use super::error::LaunchError;
 use super::failure::{FAILED, Failure};
 use super::file::{self, LaunchFile};
 use super::launched::Launched;
@@ -116,7 +116,7 @@ impl Launch {
     ///
     /// # Errors
     /// [`FileError`] of the file or its scenario; a missing certificate of a secured run.
-    pub fn load(what: What, options: LaunchOptions) -> miette::Result<Self> {
+    pub fn load(what: What, options: LaunchOptions) -> Result<Self, LaunchError> {
         let (mut file, mut scenario) = what.load(&options.run.changes())?;
         file.check_robots(&scenario)?;
         let run = options.run.run_name(what.path())?;
@@ -134,11 +134,11 @@ impl Launch {
         scenario: Scenario,
         run: RunName,
         options: LaunchOptions,
-    ) -> miette::Result<Self> {
+    ) -> Result<Self, LaunchError> {
         check_texts(what.path(), &options)?;
         let secured = secured(&options, &file)?;
         if let Some(secured) = &secured {
-            check_run(&secured.config_of(file::SIMULATOR), &run).into_diagnostic()?;
+            check_run(&secured.config_of(file::SIMULATOR), &run)?;
         }
 
         Ok(Self {
@@ -158,7 +158,7 @@ impl Launch {
     /// # Errors
     /// [`FileError`] if it is not the folder of a run that was launched, or the run is in progress or has ended; a missing
     /// certificate of a secured run.
-    pub fn resume(folder: &Path, mut options: LaunchOptions) -> miette::Result<Self> {
+    pub fn resume(folder: &Path, mut options: LaunchOptions) -> Result<Self, LaunchError> {
         let folder = RunFolder::at(folder.to_owned()).resolved_to_write()?;
         // The simulator takes the lock and reads the record.
         folder.lock_of_launcher()?;
@@ -177,7 +177,7 @@ impl Launch {
     ///
     /// # Errors
     /// [`FileError`] if it is not the folder of a run that was launched; a missing certificate of a secured run.
-    pub fn again(folder: &Path, mut options: LaunchOptions) -> miette::Result<Self> {
+    pub fn again(folder: &Path, mut options: LaunchOptions) -> Result<Self, LaunchError> {
         let folder = RunFolder::at(folder.to_owned());
         let launched = Launched::read(&folder)?;
         let mut scenario = Scenario::load(&folder.file(SCENARIO), &Changes::default())?;
@@ -188,7 +188,8 @@ impl Launch {
         // A copy may have any name.
         let run = folder
             .name()
-            .or_else(|_| RunName::new(AGAIN).into_diagnostic())?;
+            .or_else(|_| RunName::new(AGAIN))
+            .map_err(|error| LaunchError::refused(error.to_string()))?;
         if options.run.speed.is_none() {
             options.run.speed = Some(Speed(launched.speed));
         }
@@ -206,7 +207,7 @@ impl Launch {
     ///
     /// # Errors
     /// As for [`Self::resume`].
-    pub fn resumed(&self, folder: &RunFolder) -> miette::Result<Self> {
+    pub fn resumed(&self, folder: &RunFolder) -> Result<Self, LaunchError> {
         let mut options = self.options.clone();
         // The page that asked for it is still open.
         options.opens_browser = false;
@@ -218,7 +219,7 @@ impl Launch {
     fn take_folder(
         &mut self,
         notice: &mut impl FnMut(&str),
-    ) -> miette::Result<(RunFolder, Option<RunLock>)> {
+    ) -> Result<(RunFolder, Option<RunLock>), LaunchError> {
         if self.is_resumed {
             let folder = RunFolder::new(&self.options.run.out, &self.run);
             let lock = folder.lock_of_launcher()?;
@@ -262,19 +263,17 @@ impl Launch {
     ///
     /// # Errors
     /// If the launch is secured, or is a roster.
-    pub fn export(&self) -> miette::Result<String> {
+    pub fn export(&self) -> Result<String, LaunchError> {
         if let What::Roster(roster) = &self.what {
             let help = "write a launch file, with a scenario that the containers can read";
-            return Err(miette!(
-                help = help,
-                "{} cannot be exported",
-                roster.display()
-            ));
+            let reason = format!("{} cannot be exported", roster.display());
+            return Err(LaunchError::refused_with_help(reason, help));
         }
 
         if self.secured.is_some() {
             let help = "export it without `secure`: the containers have a private network";
-            return Err(miette!(help = help, "a secured launch cannot be exported"));
+            let reason = "a secured launch cannot be exported";
+            return Err(LaunchError::refused_with_help(reason, help));
         }
 
         Ok(compose::export(
@@ -289,7 +288,7 @@ impl Launch {
     ///
     /// # Errors
     /// If there is no endpoint for the simulator, or a program is not found.
-    pub fn planned(&mut self) -> miette::Result<Vec<Planned>> {
+    pub fn planned(&mut self) -> Result<Vec<Planned>, LaunchError> {
         let options = &self.options.run;
         self.run = RunFolder::next_name(&options.out, &self.run, options.if_taken);
         Ok(self.plan(&self.endpoint()?)?)
@@ -324,20 +323,17 @@ impl Launch {
     }
 
     /// The endpoint at which the simulator will listen.
-    fn endpoint(&self) -> miette::Result<String> {
+    fn endpoint(&self) -> Result<String, LaunchError> {
         if let Some(endpoint) = &self.options.listen {
             let config = self.simulator_config();
-            check_exposure(endpoint, config.as_ref(), self.options.is_insecure)
-                .into_diagnostic()?;
+            check_exposure(endpoint, config.as_ref(), self.options.is_insecure)?;
             return Ok(endpoint.clone());
         }
 
         // Port 0 is any free one, as for other programs.
         let port = match self.options.connect_port.filter(|port| *port != 0) {
             Some(port) => port,
-            None => endpoint::free_port()
-                .into_diagnostic()
-                .wrap_err("no free port of the loopback interface")?,
+            None => endpoint::free_port()?,
         };
         Ok(endpoint::loopback(port, self.secured.is_some()))
     }
@@ -365,7 +361,10 @@ impl Launch {
     /// # Errors
     /// If the run's folder cannot be made, or the processes cannot be supervised. The failure of a process is part of the
     /// outcome.
-    pub fn play(&mut self, mut notice: impl FnMut(&str)) -> miette::Result<(Outcome, RunFolder)> {
+    pub fn play(
+        &mut self,
+        mut notice: impl FnMut(&str),
+    ) -> Result<(Outcome, RunFolder), LaunchError> {
         // A free port may be taken before the simulator binds it, if only by a connection that has ended since.
         let is_chosen = self.options.connect_port.is_some_and(|port| port != 0);
         let may_choose = self.options.listen.is_none() && !is_chosen;
@@ -418,7 +417,7 @@ impl Launch {
         mut planned: Vec<Planned>,
         endpoint: &str,
         folder: &RunFolder,
-    ) -> miette::Result<Outcome> {
+    ) -> Result<Outcome, LaunchError> {
         let leftovers = Leftovers::guarded();
         for process in planned.iter_mut().filter(|process| !process.is_extern) {
             if process.part == Part::Robots {
@@ -428,18 +427,16 @@ impl Launch {
         }
 
         let grace = Duration::try_from_secs_f64(self.options.grace.0)
-            .into_diagnostic()
-            .wrap_err("--grace")?;
+            .map_err(|error| LaunchError::refused(format!("--grace: {error}")))?;
         let names = planned.iter().map(|planned| planned.name.clone()).collect();
         let look = ScreenOptions::here(names, self.options.is_quiet);
         let wants_world = look.has_bar;
-        let screen = Screen::open(look)
-            .into_diagnostic()
-            .wrap_err("no thread for the terminal")?;
+        let screen =
+            Screen::open(look).map_err(LaunchError::system("no thread for the terminal"))?;
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_all()
             .build()
-            .into_diagnostic()?;
+            .map_err(LaunchError::system("processes cannot be supervised"))?;
 
         let (gone_sender, gone) = std::sync::mpsc::channel();
         let supervisor = Supervisor::new(
@@ -459,15 +456,14 @@ impl Launch {
             faults: supervisor.queue(),
             gone,
         };
-        let observer = Observer::start(watch)
-            .into_diagnostic()
-            .wrap_err("the run cannot be observed")?;
+        let observer =
+            Observer::start(watch).map_err(LaunchError::system("the run cannot be observed"))?;
         let outcome = runtime
             .block_on(async {
                 signals::listen(&supervisor.queue())?;
                 std::io::Result::Ok(supervisor.run().await)
             })
-            .into_diagnostic()?;
+            .map_err(LaunchError::system("signals cannot be received"))?;
 
         observer.finish();
         screen.finish();
@@ -502,7 +498,7 @@ fn check_not_overwritten(
 }
 
 /// The certificates of a secured launch: those of the command line, or of the file.
-fn secured(options: &LaunchOptions, file: &LaunchFile) -> miette::Result<Option<Secured>> {
+fn secured(options: &LaunchOptions, file: &LaunchFile) -> Result<Option<Secured>, LaunchError> {
     let Some(folder) = options.secure.as_ref().or(file.secure.as_ref()) else {
         return Ok(None);
     };
@@ -526,6 +522,7 @@ fn check_texts(file: &Path, options: &LaunchOptions) -> Result<(), FileError> {
         paths.push(absolute(secure)?);
     }
     paths.extend(options.replayed.values().cloned());
+
     match paths.iter().find(|path| path.to_str().is_none()) {
         None => Ok(()),
         Some(path) => {

@@ -6,6 +6,7 @@ pub mod child;
 mod compose;
 mod ending;
 mod endpoint;
+mod error;
 pub mod exec;
 mod failure;
 mod file;
@@ -29,6 +30,7 @@ mod supervise;
 mod tail;
 
 pub use ending::code_of;
+pub use error::LaunchError;
 pub use failure::Failure;
 pub use file::{LaunchFile, Process, is_launch_file, scenario_file};
 pub use launching::{Launch, LaunchOptions, What};

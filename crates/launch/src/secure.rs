@@ -12,7 +12,6 @@ use std::time::{Duration, SystemTime};
 
 use bus::check_key_file;
 use bus::secure::{Credentials, client_config, simulator_config};
-use miette::{IntoDiagnostic, WrapErr, miette};
 use protocol::access::{CONSOLE, RESERVED, SIMULATOR};
 use protocol::keys::Keys;
 use protocol::name::OPERATOR;
@@ -22,12 +21,16 @@ use rcgen::{
     KeyPair, KeyUsagePurpose,
 };
 
+use crate::error::LaunchError;
+
 /// The certificate of the authority, in the folder itself.
 const CA: &str = "ca.pem";
 /// Files of each participant, in a folder of its own.
 const CERTIFICATE: &str = "cert.pem";
 const KEY: &str = "key.pem";
 const CONFIG: &str = "zenoh.json5";
+/// What is reported where a key or a certificate cannot be made.
+const NO_CERTIFICATE: &str = "no certificate can be made";
 /// Hosts in every simulator's certificate.
 const LOCAL_HOSTS: [&str; 3] = ["localhost", "127.0.0.1", "::1"];
 const DAY: Duration = Duration::from_secs(86_400);
@@ -54,7 +57,7 @@ impl Certificates {
     ///
     /// # Errors
     /// If a name is taken, the folder has other content, or a file cannot be written.
-    pub fn make(&self) -> miette::Result<String> {
+    pub fn make(&self) -> Result<String, LaunchError> {
         self.check_names()?;
         self.make_folder()?;
         self.make_files()
@@ -74,7 +77,7 @@ impl Certificates {
             .chain([OPERATOR, CONSOLE])
     }
 
-    fn check_names(&self) -> miette::Result<()> {
+    fn check_names(&self) -> Result<(), LaunchError> {
         // Each name is that of a folder, and some file systems ignore case.
         let mut taken: BTreeSet<String> = RESERVED.iter().map(|name| (*name).to_owned()).collect();
         taken.insert(CA.to_owned());
@@ -82,14 +85,15 @@ impl Certificates {
         for robot in &self.robots {
             if !taken.insert(robot.as_str().to_lowercase()) {
                 let help = "each participant has a folder of its name, and some are not robots";
-                return Err(miette!(help = help, "the name {robot} is taken already"));
+                let reason = format!("the name {robot} is taken already");
+                return Err(LaunchError::refused_with_help(reason, help));
             }
         }
         Ok(())
     }
 
     /// Makes the folder, accessible only by its owner, and removes the files of an earlier call.
-    fn make_folder(&self) -> miette::Result<()> {
+    fn make_folder(&self) -> Result<(), LaunchError> {
         let folder = &self.folder;
         let has_ca = folder.join(CA).exists();
         let is_ours = has_ca || folder.join(SIMULATOR).join(CONFIG).exists();
@@ -102,8 +106,8 @@ impl Certificates {
             } else {
                 "it has other content: choose another folder"
             };
-            let folder = folder.display();
-            return Err(miette!(help = help, "{folder} is there already"));
+            let reason = format!("{} is there already", folder.display());
+            return Err(LaunchError::refused_with_help(reason, help));
         }
 
         make_private_folder(folder)?;
@@ -111,7 +115,7 @@ impl Certificates {
     }
 
     /// Makes all files. Returns the end of their validity as text.
-    fn make_files(&self) -> miette::Result<String> {
+    fn make_files(&self) -> Result<String, LaunchError> {
         let authority = Authority::new(self.days)?;
         let keys = self.run.as_ref().map_or_else(Keys::of_any_run, Keys::new);
         let mut hosts = LOCAL_HOSTS.map(str::to_owned).to_vec();
@@ -144,7 +148,7 @@ struct Authority {
 }
 
 impl Authority {
-    fn new(days: u32) -> miette::Result<Self> {
+    fn new(days: u32) -> Result<Self, LaunchError> {
         let now = SystemTime::now();
         // One hour ago, because the clocks of machines differ.
         let from = now - DAY / 24;
@@ -154,8 +158,9 @@ impl Authority {
         params.is_ca = IsCa::Ca(BasicConstraints::Constrained(0));
         params.key_usages = vec![KeyUsagePurpose::KeyCertSign];
         let validity = format!("{} (UTC)", params.not_after.date());
-        let key = KeyPair::generate().into_diagnostic()?;
-        let issuer = CertifiedIssuer::self_signed(params, key).into_diagnostic()?;
+        let key = KeyPair::generate().map_err(LaunchError::system(NO_CERTIFICATE))?;
+        let issuer = CertifiedIssuer::self_signed(params, key)
+            .map_err(LaunchError::system(NO_CERTIFICATE))?;
 
         Ok(Self {
             issuer,
@@ -173,9 +178,11 @@ impl Authority {
         name: &str,
         hosts: Vec<String>,
         config: impl FnOnce(&Credentials) -> String,
-    ) -> miette::Result<()> {
-        let key = KeyPair::generate().into_diagnostic()?;
-        let certificate = self.certificate(name, hosts, &key)?;
+    ) -> Result<(), LaunchError> {
+        let key = KeyPair::generate().map_err(LaunchError::system(NO_CERTIFICATE))?;
+        let certificate = self
+            .certificate(name, hosts, &key)
+            .map_err(LaunchError::system(NO_CERTIFICATE))?;
         let key = key.serialize_pem();
         let config = config(&Credentials {
             ca: &self.issuer.pem(),
@@ -192,19 +199,24 @@ impl Authority {
     }
 
     /// A signed certificate, in PEM.
-    fn certificate(&self, name: &str, hosts: Vec<String>, key: &KeyPair) -> miette::Result<String> {
+    fn certificate(
+        &self,
+        name: &str,
+        hosts: Vec<String>,
+        key: &KeyPair,
+    ) -> Result<String, rcgen::Error> {
         let usage = if hosts.is_empty() {
             ExtendedKeyUsagePurpose::ClientAuth
         } else {
             ExtendedKeyUsagePurpose::ServerAuth
         };
-        let with_hosts = CertificateParams::new(hosts).into_diagnostic()?;
+        let with_hosts = CertificateParams::new(hosts)?;
 
         let mut params = named(name, self.from, self.until);
         params.subject_alt_names = with_hosts.subject_alt_names;
         params.key_usages = vec![KeyUsagePurpose::DigitalSignature];
         params.extended_key_usages = vec![usage];
-        let certificate = params.signed_by(key, &self.issuer).into_diagnostic()?;
+        let certificate = params.signed_by(key, &self.issuer)?;
         Ok(certificate.pem())
     }
 }
@@ -217,33 +229,32 @@ fn named(name: &str, from: SystemTime, until: SystemTime) -> CertificateParams {
     params
 }
 
-fn make_private_folder(folder: &Path) -> miette::Result<()> {
+fn make_private_folder(folder: &Path) -> Result<(), LaunchError> {
     let made = std::fs::DirBuilder::new()
         .recursive(true)
         .mode(0o700)
         .create(folder);
     // An existing folder keeps its permissions, which may be wider.
     made.and_then(|()| std::fs::set_permissions(folder, Permissions::from_mode(0o700)))
-        .into_diagnostic()
-        .wrap_err_with(|| format!("cannot make the folder {}", folder.display()))
+        .map_err(LaunchError::path("make the folder", folder))
 }
 
 /// Writes a new file, which has its final permissions from the beginning.
-fn write_file(path: &Path, text: &str, mode: u32) -> miette::Result<()> {
+fn write_file(path: &Path, text: &str, mode: u32) -> Result<(), LaunchError> {
     let file = std::fs::OpenOptions::new()
         .write(true)
         .create_new(true)
         .mode(mode)
         .open(path);
-    let written = file.and_then(|mut file| file.write_all(text.as_bytes()));
-    written
-        .into_diagnostic()
-        .wrap_err_with(|| format!("cannot write {}", path.display()))
+    file.and_then(|mut file| file.write_all(text.as_bytes()))
+        .map_err(LaunchError::path("write", path))
 }
 
 /// Removes the files of an earlier call, and no other files.
-fn remove_earlier(folder: &Path) -> miette::Result<()> {
-    for entry in folder.read_dir().into_diagnostic()?.flatten() {
+fn remove_earlier(folder: &Path) -> Result<(), LaunchError> {
+    let entries = folder.read_dir();
+    let entries = entries.map_err(LaunchError::path("read the folder", folder))?;
+    for entry in entries.flatten() {
         let participant = entry.path();
         if !participant.join(CONFIG).exists() {
             continue;
@@ -260,14 +271,12 @@ fn remove_earlier(folder: &Path) -> miette::Result<()> {
 }
 
 /// Removes a file if it exists.
-fn remove(file: &Path) -> miette::Result<()> {
+fn remove(file: &Path) -> Result<(), LaunchError> {
     if !file.exists() {
         return Ok(());
     }
 
-    std::fs::remove_file(file)
-        .into_diagnostic()
-        .wrap_err_with(|| format!("cannot replace {}", file.display()))
+    std::fs::remove_file(file).map_err(LaunchError::path("replace", file))
 }
 
 /// The configuration file of a participant in a folder of certificates.
@@ -286,22 +295,19 @@ impl Secured {
     pub(crate) fn find<'a>(
         folder: &Path,
         names: impl Iterator<Item = &'a str>,
-    ) -> miette::Result<Self> {
-        let folder = std::path::absolute(folder).into_diagnostic()?;
+    ) -> Result<Self, LaunchError> {
+        let folder = std::path::absolute(folder).map_err(LaunchError::path("find", folder))?;
         let secured = Self { folder };
 
         for name in [SIMULATOR, OPERATOR].into_iter().chain(names) {
             let file = secured.config_of(name);
             if !file.is_file() {
                 let help = "`cars secure init FOLDER --robots NAME,NAME…` makes one for each of its robots";
-                let file = file.display();
-                return Err(miette!(
-                    help = help,
-                    "{name} has no certificate: there is no {file}"
-                ));
+                let reason = format!("{name} has no certificate: there is no {}", file.display());
+                return Err(LaunchError::refused_with_help(reason, help));
             }
             // The key by itself; each program checks its own configuration file.
-            check_key_file(&secured.folder.join(name).join(KEY)).into_diagnostic()?;
+            check_key_file(&secured.folder.join(name).join(KEY))?;
         }
 
         Ok(secured)
@@ -328,7 +334,7 @@ impl Secured {
 mod tests {
     use super::*;
 
-    fn init(folder: &Path, robots: &[&str], force: bool) -> miette::Result<()> {
+    fn init(folder: &Path, robots: &[&str], force: bool) -> Result<(), LaunchError> {
         let certificates = Certificates {
             folder: folder.to_owned(),
             robots: robots

@@ -4,7 +4,6 @@
 
 use std::path::Path;
 
-use miette::{GraphicalReportHandler, GraphicalTheme};
 use scenario::Scenario;
 use scenario::diagnostic::{FileError, Source};
 use scenario::{Changes, OnLate};
@@ -21,10 +20,7 @@ fn parse(text: &str) -> Result<Scenario, FileError> {
 
 /// The error as people see it, without colors.
 fn shown(error: &FileError) -> String {
-    let mut text = String::new();
-    let handler = GraphicalReportHandler::new_themed(GraphicalTheme::unicode_nocolor());
-    handler.render_report(&mut text, error).unwrap();
-    text
+    config::render_plain(error, None)
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! The program `cars-sim`: the simulator process of one run.
 
+use std::error::Error;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -7,8 +8,7 @@ use bus::endpoint::connectable;
 use bus::{Bus, DEFAULT_ENDPOINT, Role, check_exposure, check_run};
 use clap::{Parser, ValueEnum};
 use config::units::Time;
-use config::{Speed, shipped};
-use miette::IntoDiagnostic;
+use config::{FileError, Speed, shipped};
 use protocol::RunName;
 use protocol::messages::End;
 use record::names::{ENDPOINT, OPERATOR_CONFIG};
@@ -103,7 +103,7 @@ fn main() -> ExitCode {
     bus::runtime::use_router_threads();
     terminal::print_diagnostics("warn,zenoh=error");
 
-    terminal::conclude(run(&args))
+    terminal::conclude(run(&args), |error| config::render(error, None))
 }
 
 fn exit_code(summary: &Summary, no_verdict: bool) -> ExitCode {
@@ -116,7 +116,7 @@ fn exit_code(summary: &Summary, no_verdict: bool) -> ExitCode {
     }
 }
 
-fn run(args: &Args) -> miette::Result<ExitCode> {
+fn run(args: &Args) -> Result<ExitCode, Box<dyn Error + Send + Sync>> {
     let duration_s = args.duration.map(|duration| duration.0);
     let scenario = Scenario::load(
         &shipped::find(&args.scenario, &[shipped::SCENARIOS]),
@@ -128,9 +128,9 @@ fn run(args: &Args) -> miette::Result<ExitCode> {
     )?;
 
     // Before anything is made: a refusal leaves nothing behind.
-    check_exposure(&args.listen, args.zenoh_config.as_ref(), args.insecure).into_diagnostic()?;
+    check_exposure(&args.listen, args.zenoh_config.as_ref(), args.insecure)?;
     if let Some(config) = &args.zenoh_config {
-        check_run(config, &args.run).into_diagnostic()?;
+        check_run(config, &args.run)?;
     }
     let role = Role::Router {
         listen: args.listen.clone(),
@@ -141,7 +141,7 @@ fn run(args: &Args) -> miette::Result<ExitCode> {
             terminal::note(format_args!("Error: {error}"));
             return Ok(ExitCode::from(ADDRESS_TAKEN));
         }
-        bus => bus.into_diagnostic()?,
+        bus => bus?,
     };
     let folder = RunFolder::new(&args.out, &args.run);
     let (_lock, past) = open_folder(&folder, &scenario, args)?;
@@ -152,16 +152,16 @@ fn run(args: &Args) -> miette::Result<ExitCode> {
         stay: args.stay.map_or(Stay::Never, Stay::from),
         repeat_after: REPEAT_AFTER,
     };
-    let server = Server::open(bus, scenario, options, &folder, past).into_diagnostic()?;
-    ctrlc::set_handler(server.stopper()).into_diagnostic()?;
+    let server = Server::open(bus, scenario, options, &folder, past)?;
+    ctrlc::set_handler(server.stopper())?;
 
     if let Some(file) = &args.operator_config {
-        let path = std::path::absolute(file).into_diagnostic()?;
+        let path = std::path::absolute(file)?;
         folder.write_line(OPERATOR_CONFIG, &path.display().to_string())?;
     }
 
     folder.write_line(ENDPOINT, &connectable(&args.listen))?;
-    let summary = server.run().into_diagnostic();
+    let summary = server.run();
 
     for name in [ENDPOINT, OPERATOR_CONFIG]
         .map(|name| folder.file(name))
@@ -181,7 +181,7 @@ fn open_folder(
     folder: &RunFolder,
     scenario: &Scenario,
     args: &Args,
-) -> miette::Result<(RunLock, Option<ReplayLog>)> {
+) -> Result<(RunLock, Option<ReplayLog>), FileError> {
     if args.resume {
         let (lock, files) = folder.reopen()?;
         return Ok((lock, Some(ReplayLog::open(&files)?)));

@@ -8,7 +8,6 @@ use std::sync::Arc;
 
 use config::shipped;
 use lockstep::{Bulletin, Exchange, Outcome};
-use miette::{GraphicalReportHandler, GraphicalTheme};
 use proptest::prelude::*;
 use protocol::Tick;
 use protocol::messages::{CommandText, News, Report};
@@ -208,9 +207,7 @@ fn changed(text: &str, at: usize, change: &Change) -> String {
 
 /// Whether people are shown the file, a line and a caret.
 fn check_shown(error: &FileError) {
-    let mut shown = String::new();
-    let handler = GraphicalReportHandler::new_themed(GraphicalTheme::unicode_nocolor());
-    handler.render_report(&mut shown, error).unwrap();
+    let shown = config::render_plain(error, None);
     assert!(
         shown.contains("[odd.toml") && shown.contains('╰'),
         "{shown}"

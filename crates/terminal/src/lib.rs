@@ -5,6 +5,7 @@
 //! message for any other failure, such as a full disk. The standard error is written as far as possible: a run goes on when
 //! its terminal is closed. Text for people is escaped, because robots, files and other processes write parts of it.
 
+use std::error::Error;
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
 use std::path::Path;
@@ -26,8 +27,6 @@ pub const MAN_PAGE: &str = "--man-page";
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write to the standard output: {0}")]
 pub struct OutputError(std::io::Error);
-
-impl miette::Diagnostic for OutputError {}
 
 impl From<std::io::Error> for OutputError {
     fn from(error: std::io::Error) -> Self {
@@ -89,9 +88,12 @@ pub fn note(text: impl Display) {
     let _unwritable = std::io::stderr().write_all(text.as_bytes());
 }
 
-/// The exit status of a program, whose error is printed. A reader that has closed its pipe is not an error.
+/// The exit status of a program, whose error is printed as `render` shows it. A reader that has closed its pipe is not an error.
 #[must_use]
-pub fn conclude(result: miette::Result<ExitCode>) -> ExitCode {
+pub fn conclude(
+    result: Result<ExitCode, Box<dyn Error + Send + Sync>>,
+    render: impl FnOnce(&(dyn Error + 'static)) -> String,
+) -> ExitCode {
     let error = match result {
         Ok(code) => return code,
         Err(error) => error,
@@ -101,7 +103,7 @@ pub fn conclude(result: miette::Result<ExitCode>) -> ExitCode {
     if output.is_some_and(OutputError::is_closed_pipe) {
         return ExitCode::SUCCESS;
     }
-    note(format_args!("Error: {error:?}"));
+    note(format_args!("Error: {}", render(error.as_ref())));
     ExitCode::FAILURE
 }
 
@@ -111,12 +113,12 @@ pub fn conclude(result: miette::Result<ExitCode>) -> ExitCode {
 /// The exit status with which to end, after help, version, the manual page or a usage error has been printed.
 pub fn arguments<Args: Parser>() -> Result<Args, ExitCode> {
     if std::env::args_os().skip(1).eq([MAN_PAGE]) {
-        return Err(conclude(print_man_page(Args::command())));
+        return Err(conclude_printing(print_man_page(Args::command())));
     }
     Args::try_parse().map_err(|error| print_usage(&error))
 }
 
-fn print_man_page(command: Command) -> miette::Result<ExitCode> {
+fn print_man_page(command: Command) -> Result<(), OutputError> {
     let own = std::env::args_os().next().unwrap_or_default();
     let name = Path::new(&own).file_name().unwrap_or_default().display();
     let command = command
@@ -124,11 +126,13 @@ fn print_man_page(command: Command) -> miette::Result<ExitCode> {
         .bin_name(name.to_string());
 
     let mut page = Vec::new();
-    Man::new(command)
-        .render(&mut page)
-        .map_err(OutputError::from)?;
-    data(String::from_utf8_lossy(&page))?;
-    Ok(ExitCode::SUCCESS)
+    Man::new(command).render(&mut page)?;
+    data(String::from_utf8_lossy(&page))
+}
+
+fn conclude_printing(printed: Result<(), OutputError>) -> ExitCode {
+    let result = printed.map(|()| ExitCode::SUCCESS).map_err(Into::into);
+    conclude(result, |error| format!("  × {error}"))
 }
 
 fn print_usage(error: &UsageError) -> ExitCode {
@@ -138,10 +142,7 @@ fn print_usage(error: &UsageError) -> ExitCode {
     }
 
     let printed = printed.and_then(|()| std::io::stdout().flush());
-    match printed {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => conclude(Err(OutputError(error).into())),
-    }
+    conclude_printing(printed.map_err(OutputError))
 }
 
 /// Prints diagnostics to the standard error. `RUST_LOG` replaces the default filter.

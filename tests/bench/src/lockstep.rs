@@ -212,7 +212,7 @@ fn make_certificates(
         run: None,
         replaces: true,
     };
-    certificates.make()?;
+    certificates.make().into_diagnostic()?;
     Ok(certificates)
 }
 

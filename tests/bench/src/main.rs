@@ -97,7 +97,7 @@ fn main() -> ExitCode {
     };
     terminal::print_diagnostics("warn,zenoh=error");
 
-    terminal::conclude(match cli.process {
+    let result = match cli.process {
         None => bench(&cli.bench),
         Some(Process::Robot(args)) => robot::take_part(&args),
         Some(Process::Child { parent, command }) => {
@@ -107,6 +107,10 @@ fn main() -> ExitCode {
         Some(Process::Echo(args)) => tcp::echo(&args),
         Some(Process::Star(args)) => star::router(&args),
         Some(Process::StarClient(args)) => star::client(&args),
+    };
+    result.unwrap_or_else(|error| {
+        terminal::note(format_args!("Error: {error:?}"));
+        ExitCode::FAILURE
     })
 }
 
@@ -121,7 +125,7 @@ fn bench(args: &BenchArgs) -> miette::Result<ExitCode> {
     let outcome = measure_all(args, scratch.path());
     scratch.close().into_diagnostic()?;
 
-    table::print(&outcome?)?;
+    table::print(&outcome?).into_diagnostic()?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -181,7 +181,7 @@ pub(crate) fn router(args: &StarArgs) -> miette::Result<ExitCode> {
     bus.close();
 
     let rate = args.ticks as f64 / (ended - begun).as_secs_f64();
-    terminal::print_line(rate)?;
+    terminal::print_line(rate).into_diagnostic()?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -8,12 +8,12 @@ use experiments::{Plan, Robots, Store, write_launch};
 use lab::folder::read_summary;
 use lab::scratch::Scratch;
 use launch::RunOptions;
-use miette::{IntoDiagnostic, miette};
 use protocol::RunName;
 use record::{IfTaken, RunFolder, Summary};
 use scenario::Scenario;
 
 use super::launcher::launcher;
+use crate::errors::{Result, refusal};
 use crate::execution::if_taken;
 use crate::run::execute;
 use crate::table;
@@ -40,10 +40,10 @@ pub(super) struct ReplayArgs {
 }
 
 /// Plays a unit with everything recorded, and compares its digest with that of the unit as it was played before.
-pub(super) fn replay(args: ReplayArgs) -> miette::Result<ExitCode> {
+pub(super) fn replay(args: ReplayArgs) -> Result<ExitCode> {
     let plan = Plan::load(&args.folder)?;
     if args.unit >= plan.units() {
-        return Err(miette!(
+        return Err(refusal!(
             "there is no unit {}: the experiment in {} has the units 0 to {}",
             args.unit,
             args.folder.display(),
@@ -57,8 +57,7 @@ pub(super) fn replay(args: ReplayArgs) -> miette::Result<ExitCode> {
     let run = match args.run {
         Some(run) => run,
         None => RunName::new(&format!("{}-{}", plan.name(), unit.number))
-            .or_else(|_| RunName::new(&format!("unit-{}", unit.number)))
-            .into_diagnostic()?,
+            .or_else(|_| RunName::new(&format!("unit-{}", unit.number)))?,
     };
     let options = RunOptions {
         run: Some(run.clone()),
@@ -86,7 +85,7 @@ pub(super) fn replay(args: ReplayArgs) -> miette::Result<ExitCode> {
             }
             Ok(ExitCode::SUCCESS)
         }
-        Some(Ok(played)) => Err(miette!(
+        Some(Ok(played)) => Err(refusal!(
             help = "it was played by another program, or a robot is not reproducible",
             "{name} is another run: its digest is {digest} and was {}",
             played.digest
@@ -99,11 +98,7 @@ pub(super) fn replay(args: ReplayArgs) -> miette::Result<ExitCode> {
 }
 
 /// Records a run of this process.
-fn record(
-    scenario: Scenario,
-    run: &RunName,
-    options: &RunOptions,
-) -> miette::Result<(Summary, RunFolder)> {
+fn record(scenario: Scenario, run: &RunName, options: &RunOptions) -> Result<(Summary, RunFolder)> {
     let made = options.folder(run, &scenario)?;
     if let Some(notice) = &made.notice {
         terminal::note(notice);
@@ -118,8 +113,8 @@ fn launch(
     scenario: &Scenario,
     run: &RunName,
     options: &RunOptions,
-) -> miette::Result<(Summary, RunFolder)> {
-    let files = Scratch::new().into_diagnostic()?;
+) -> Result<(Summary, RunFolder)> {
+    let files = Scratch::new()?;
     let launch = match plan.robots() {
         Robots::Launched(launch) => Some(launch),
         Robots::InProcess | Robots::Programs => None,
@@ -142,13 +137,13 @@ fn launch(
         .arg(file)
         .args(options.to_args(&reserved.run));
     command.args(["--speed", "max", "--no-console", "--quiet"]);
-    let status = command.status().into_diagnostic()?;
+    let status = command.status()?;
 
     let folder = reserved.folder;
     let summary = read_summary(&folder)?;
     // Verdicts are exit statuses, too: the run is there.
     let summary = summary.filter(|summary| summary.end.is_some());
-    let summary = summary.ok_or_else(|| miette!("the launch failed: {status}"))?;
+    let summary = summary.ok_or_else(|| refusal!("the launch failed: {status}"))?;
 
     Ok((summary, folder))
 }

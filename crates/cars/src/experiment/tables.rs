@@ -3,17 +3,18 @@
 use experiments::{
     Cell, Contrast, Difference, Estimated, Experiment, Measure, Results, SHOWN_P, least_p_holm,
 };
-use miette::IntoDiagnostic;
 use tabled::builder::Builder;
 use tabled::settings::formatting::AlignmentStrategy;
 use tabled::settings::object::Columns;
 use tabled::settings::{Alignment, Style};
 
+use crate::errors::Result;
+
 /// Prints every run, every estimate and every difference as JSON.
 ///
 /// # Errors
 /// If the standard output cannot be written.
-pub(super) fn print_json(results: &Results) -> miette::Result<()> {
+pub(super) fn print_json(results: &Results) -> Result<()> {
     let all = serde_json::json!({
         "compared": results.plan.compared(),
         "runs": results.outcomes,
@@ -21,7 +22,7 @@ pub(super) fn print_json(results: &Results) -> miette::Result<()> {
         "estimates": results.estimates(),
         "contrasts": results.contrasts(),
     });
-    let all = serde_json::to_string_pretty(&all).into_diagnostic()?;
+    let all = serde_json::to_string_pretty(&all)?;
     terminal::data(format_args!("{all}\n"))?;
     Ok(())
 }
@@ -30,7 +31,7 @@ pub(super) fn print_json(results: &Results) -> miette::Result<()> {
 ///
 /// # Errors
 /// If the standard output cannot be written.
-pub(super) fn print(results: &Results) -> miette::Result<()> {
+pub(super) fn print(results: &Results) -> Result<()> {
     let experiment = &results.plan.experiment;
     let compared = results.plan.compared();
     let table = render(experiment, &results.estimates());

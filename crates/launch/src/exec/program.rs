@@ -7,7 +7,6 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
-use miette::{IntoDiagnostic, WrapErr, miette};
 use nix::sys::signal::Signal;
 use nix::sys::wait::{Id, WaitPidFlag, waitid};
 use nix::unistd::Pid;
@@ -17,6 +16,7 @@ use robot::Stopper;
 use super::line::{EndReason, ToProgram};
 use crate::child::{self, AtExit};
 use crate::ending::Ended;
+use crate::error::LaunchError;
 use crate::lines::Lines;
 use crate::tail::Tail;
 
@@ -67,11 +67,10 @@ impl Program {
         name: &RobotName,
         command: &[OsString],
         stopper: Arc<OnceLock<Stopper>>,
-    ) -> miette::Result<(Arc<Self>, Receiver<ProgramEvent>)> {
+    ) -> Result<(Arc<Self>, Receiver<ProgramEvent>), LaunchError> {
         let mut child = spawn(command)?;
-        let pid = i32::try_from(child.id())
-            .into_diagnostic()
-            .wrap_err("the system's process id")?;
+        let pid =
+            i32::try_from(child.id()).map_err(LaunchError::system("the system's process id"))?;
         let stdin = child.stdin.take();
         let stdout = child.stdout.take();
         let stderr = child.stderr.take();
@@ -237,12 +236,11 @@ impl Program {
 ///
 /// # Errors
 /// If the system starts no further one.
-pub(super) fn start_thread(work: impl FnOnce() + Send + 'static) -> miette::Result<()> {
+pub(super) fn start_thread(work: impl FnOnce() + Send + 'static) -> Result<(), LaunchError> {
     let started = std::thread::Builder::new().spawn(work);
     started
-        .into_diagnostic()
-        .wrap_err("no thread can be started")?;
-    Ok(())
+        .map(drop)
+        .map_err(LaunchError::system("no thread can be started"))
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -251,9 +249,9 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 /// Starts the program, which ends with this process, with all three standard streams as pipes.
-fn spawn(command: &[OsString]) -> miette::Result<Child> {
+fn spawn(command: &[OsString]) -> Result<Child, LaunchError> {
     let Some((program, arguments)) = command.split_first() else {
-        return Err(miette!("no program is given"));
+        return Err(LaunchError::refused("no program is given"));
     };
 
     child::command(AtExit::Kill, program)
@@ -262,8 +260,10 @@ fn spawn(command: &[OsString]) -> miette::Result<Child> {
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
-        .into_diagnostic()
-        .wrap_err("the program cannot be started")
+        .map_err(|source| LaunchError::NotStarted {
+            program: "the program".to_owned(),
+            source,
+        })
 }
 
 /// Queues the lines of the program's standard output until its end. The queue is closed only when this process ends.

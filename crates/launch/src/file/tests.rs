@@ -38,11 +38,7 @@ fn load(text: &str) -> Result<LaunchFile, FileError> {
 #[track_caller]
 fn refusal(text: &str) -> String {
     let error = load(text).expect_err("this file is to be refused");
-    let mut shown = String::new();
-    let handler =
-        miette::GraphicalReportHandler::new_themed(miette::GraphicalTheme::none()).with_width(200);
-    handler.render_report(&mut shown, &error).unwrap();
-    shown
+    config::render_plain(&error, None)
 }
 
 /// Every one of `words` is said about the file.

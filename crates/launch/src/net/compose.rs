@@ -5,12 +5,12 @@ use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use miette::{IntoDiagnostic, WrapErr, miette};
 use tempfile::NamedTempFile;
 
-use super::links::{Links, Start};
+use super::links::{Links, Start, own_path};
 use super::shape::{Flow, Shape};
 use crate::child::{self, AtExit};
+use crate::error::LaunchError;
 
 /// The network of the compose file that connects the processes.
 const NETWORK: &str = "cars";
@@ -34,33 +34,31 @@ struct Away {
 }
 
 impl Compose {
-    pub(super) fn new(start: &Start) -> miette::Result<Self> {
+    pub(super) fn new(start: &Start) -> Result<Self, LaunchError> {
         let is_unchanged = start.options.changes().is_empty();
         if !is_unchanged || start.options.out != Path::new("runs") || !start.more.is_empty() {
             let help = "containers read the scenario file itself: change it there; runs are kept in ./runs";
-            return Err(miette!(
-                help = help,
-                "with --via compose only --run and --speed can be chosen"
+            return Err(LaunchError::refused_with_help(
+                "with --via compose only --run and --speed can be chosen",
+                help,
             ));
         }
 
         let project = format!("carsnet{}", std::process::id());
-        let own = std::env::current_exe().into_diagnostic()?;
-        let mut export = Command::new(own);
+        let mut export = Command::new(own_path()?);
         export.args(start.args(&[])).args(["--export", "compose"]);
         let text = output(&mut export)?;
 
+        let temporary = std::env::temp_dir();
         // A new file with a random name: an existing symbolic link is not followed.
         let mut file = tempfile::Builder::new()
             .prefix(&project)
             .suffix(".yml")
             .tempfile()
-            .into_diagnostic()
-            .wrap_err("making a compose file")?;
+            .map_err(LaunchError::path("make a compose file in", &temporary))?;
 
         file.write_all(text.as_bytes())
-            .into_diagnostic()
-            .wrap_err_with(|| file.path().display().to_string())?;
+            .map_err(LaunchError::path("write", file.path()))?;
 
         Ok(Self {
             tool: tool()?,
@@ -83,7 +81,7 @@ impl Compose {
         command
     }
 
-    fn disconnect(&mut self, process: &str) -> miette::Result<()> {
+    fn disconnect(&mut self, process: &str) -> Result<(), LaunchError> {
         let network = self.network();
         let container = output(&mut self.compose(&["ps", "-q", &process.to_lowercase()]))?;
         let format = format!("{{{{(index .NetworkSettings.Networks {network:?}).IPAddress}}}}");
@@ -96,7 +94,7 @@ impl Compose {
     }
 
     /// Connects a container with the address that it had before.
-    fn connect(&mut self, process: &str) -> miette::Result<()> {
+    fn connect(&mut self, process: &str) -> Result<(), LaunchError> {
         let Some(Away { container, address }) = self.away.remove(process) else {
             return Ok(());
         };
@@ -118,7 +116,7 @@ impl Drop for Compose {
 }
 
 impl Links for Compose {
-    fn command(&self, _: &Start) -> miette::Result<Command> {
+    fn command(&self, _: &Start) -> Result<Command, LaunchError> {
         let up = self.compose(&["up", "--no-color", "--exit-code-from", "simulator"]);
 
         // It ends with this process, and the containers with it.
@@ -127,7 +125,7 @@ impl Links for Compose {
         Ok(command)
     }
 
-    fn set(&mut self, process: &str, shape: Shape) -> miette::Result<()> {
+    fn set(&mut self, process: &str, shape: Shape) -> Result<(), LaunchError> {
         if shape.flow == Flow::Open {
             self.connect(process)
         } else {
@@ -137,13 +135,13 @@ impl Links for Compose {
 }
 
 /// The command of compose on this machine.
-fn tool() -> miette::Result<&'static [&'static str]> {
+fn tool() -> Result<&'static [&'static str], LaunchError> {
     let tools: [&[&str]; 2] = [&["docker-compose"], &["docker", "compose"]];
     let found = tools.into_iter().find(|tool| is_installed(tool));
     found.ok_or_else(|| {
         let help =
             "install docker and docker-compose (Debian: apt install docker.io docker-compose)";
-        miette!(help = help, "docker-compose is not installed")
+        failed("docker-compose is not installed".to_owned(), Some(help))
     })
 }
 
@@ -157,24 +155,27 @@ fn is_installed(tool: &[&str]) -> bool {
     command.status().is_ok_and(|status| status.success())
 }
 
-fn docker_network(args: &[&str]) -> miette::Result<()> {
+fn docker_network(args: &[&str]) -> Result<(), LaunchError> {
     let mut command = Command::new("docker");
     command.arg("network").args(args);
     output(&mut command).map(drop)
 }
 
+fn failed(reason: String, help: Option<&'static str>) -> LaunchError {
+    LaunchError::Tool { reason, help }
+}
+
 /// Runs a command, which must succeed, and returns its output.
-fn output(command: &mut Command) -> miette::Result<String> {
+fn output(command: &mut Command) -> Result<String, LaunchError> {
     let line = format!("{command:?}");
     let output = command
         .stdin(Stdio::null())
         .output()
-        .into_diagnostic()
-        .wrap_err_with(|| line.clone())?;
+        .map_err(|error| failed(format!("{line}: {error}"), None))?;
 
     if !output.status.success() {
         let error = String::from_utf8_lossy(&output.stderr);
-        return Err(miette!("{line}: {}", error.trim()));
+        return Err(failed(format!("{line}: {}", error.trim()), None));
     }
     let text = String::from_utf8_lossy(&output.stdout);
     Ok(text.trim_end().to_owned())

@@ -1,12 +1,13 @@
 //! The interface of all kinds of links.
 
 use std::ffi::OsString;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use protocol::RunName;
 
 use super::shape::Shape;
+use crate::error::LaunchError;
 use crate::link::ProcessLink;
 use crate::options::RunOptions;
 
@@ -31,10 +32,15 @@ impl Start<'_> {
     }
 }
 
+/// The path of this program, for programs that start it.
+pub(super) fn own_path() -> Result<PathBuf, LaunchError> {
+    std::env::current_exe().map_err(LaunchError::system("the path of this program is not known"))
+}
+
 /// The links of a launch, one for each process. They are removed on drop.
 pub(super) trait Links {
     /// The command that starts the launch over these links.
-    fn command(&self, start: &Start) -> miette::Result<Command>;
+    fn command(&self, start: &Start) -> Result<Command, LaunchError>;
     /// Changes the shape of a process's link.
-    fn set(&mut self, process: &str, shape: Shape) -> miette::Result<()>;
+    fn set(&mut self, process: &str, shape: Shape) -> Result<(), LaunchError>;
 }

@@ -13,13 +13,13 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use miette::{IntoDiagnostic, WrapErr, miette};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 
-use super::links::{Links, Start};
+use super::links::{Links, Start, own_path};
 use super::shape::{Flow, Shape};
 use crate::child::{self, AtExit};
+use crate::error::LaunchError;
 use crate::file::Process;
 use crate::link::ProcessLink;
 
@@ -49,11 +49,11 @@ pub(super) struct Namespaces {
 }
 
 impl Namespaces {
-    pub(super) fn new(processes: &[Process]) -> miette::Result<Self> {
+    pub(super) fn new(processes: &[Process]) -> Result<Self, LaunchError> {
         if processes.len() > MAX_PROCESSES {
-            return Err(miette!(
+            return Err(LaunchError::refused(format!(
                 "more than {MAX_PROCESSES} processes do not fit into one network"
-            ));
+            )));
         }
 
         let names = processes.iter().map(|process| process.name.clone());
@@ -63,11 +63,9 @@ impl Namespaces {
             prefix: format!("{PREFIX}{}-", std::process::id()),
             processes: names.collect(),
         };
-        namespaces.make().map_err(|error| {
-            miette!(
-                help = "network namespaces need root and `ip` (Debian: apt install iproute2)",
-                "{error}"
-            )
+        namespaces.make().map_err(|reason| LaunchError::Tool {
+            reason,
+            help: Some("network namespaces need root and `ip` (Debian: apt install iproute2)"),
         })?;
 
         Ok(namespaces)
@@ -128,7 +126,7 @@ impl Drop for Namespaces {
 }
 
 impl Links for Namespaces {
-    fn command(&self, start: &Start) -> miette::Result<Command> {
+    fn command(&self, start: &Start) -> Result<Command, LaunchError> {
         let endpoint = format!("tcp/{}:{PORT}", address(0));
         let mut links = Vec::new();
         for (index, process) in self.processes.iter().enumerate() {
@@ -139,13 +137,10 @@ impl Links for Namespaces {
             });
         }
 
-        let own = std::env::current_exe()
-            .into_diagnostic()
-            .wrap_err("the path of this program is not known")?;
         let mut command = child::command(AtExit::Terminate, "ip");
         command
             .args(["netns", "exec", &self.host(0)])
-            .arg(own)
+            .arg(own_path()?)
             .args(start.args(&links))
             .arg(format!("--listen={endpoint}"))
             // Only this launch is in the network.
@@ -158,9 +153,9 @@ impl Links for Namespaces {
         Ok(command)
     }
 
-    fn set(&mut self, process: &str, shape: Shape) -> miette::Result<()> {
+    fn set(&mut self, process: &str, shape: Shape) -> Result<(), LaunchError> {
         let index = self.processes.iter().position(|name| name == process);
-        let index = index.ok_or_else(|| miette!("no link of {process}"))?;
+        let index = index.ok_or_else(|| LaunchError::refused(format!("no link of {process}")))?;
         let switch = self.switch();
         let port = port(index + 1);
         let state = match shape.flow {
@@ -170,7 +165,7 @@ impl Links for Namespaces {
 
         ip(&format!("-n {switch} link set {port} {state}"))
             .map(drop)
-            .map_err(|error| miette!("{error}"))
+            .map_err(|reason| LaunchError::Tool { reason, help: None })
     }
 }
 

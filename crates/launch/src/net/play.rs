@@ -1,7 +1,6 @@
 //! Launches over links of its own and plays a plan of faults on them.
 
 use bus::endpoint::is_tls;
-use miette::{IntoDiagnostic, WrapErr, miette};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use protocol::RobotName;
@@ -26,12 +25,15 @@ use super::proxy::{self, Proxy};
 use super::shape::Shape;
 use crate::child::{self, AtExit};
 use crate::endpoint;
+use crate::error::LaunchError;
 use crate::file::LaunchFile;
 use crate::link::ProcessLink;
 use crate::options::RunOptions;
 
 /// Number of bytes at the end of a record in which its last line is searched.
 const TAIL_BYTES: u64 = 16 * 1024;
+/// What is reported where the process of the launch cannot be waited for.
+const LOST: &str = "the state of the launch is not known";
 /// How often to check for the first tick.
 const LOOK_AGAIN: Duration = Duration::from_millis(5);
 
@@ -69,12 +71,12 @@ struct Proxies {
 
 impl Proxies {
     /// Starts a proxy for each process. TLS passes a proxy unchanged.
-    fn new(file: &LaunchFile) -> miette::Result<Self> {
-        let port = endpoint::free_port().into_diagnostic()?;
+    fn new(file: &LaunchFile) -> Result<Self, LaunchError> {
+        let port = endpoint::free_port()?;
         let endpoint = endpoint::loopback(port, file.secure.is_some());
         let mut proxies = BTreeMap::new();
         for process in &file.processes {
-            let proxy = proxy::on_loopback(&endpoint)?;
+            let proxy = proxy::on_loopback(port)?;
             proxies.insert(process.name.clone(), proxy);
         }
         Ok(Self { endpoint, proxies })
@@ -82,7 +84,7 @@ impl Proxies {
 }
 
 impl Links for Proxies {
-    fn command(&self, start: &Start) -> miette::Result<Command> {
+    fn command(&self, start: &Start) -> Result<Command, LaunchError> {
         let is_secured = is_tls(&self.endpoint);
         let mut links = Vec::new();
         for (process, proxy) in &self.proxies {
@@ -101,9 +103,9 @@ impl Links for Proxies {
         Ok(command)
     }
 
-    fn set(&mut self, process: &str, shape: Shape) -> miette::Result<()> {
+    fn set(&mut self, process: &str, shape: Shape) -> Result<(), LaunchError> {
         let proxy = self.proxies.get(process);
-        let proxy = proxy.ok_or_else(|| miette!("no link of {process}"))?;
+        let proxy = proxy.ok_or_else(|| LaunchError::refused(format!("no link of {process}")))?;
         proxy.set(shape);
         Ok(())
     }
@@ -114,7 +116,7 @@ impl Links for Proxies {
 ///
 /// # Errors
 /// If a file cannot be used, the links cannot be made, or a fault cannot be played.
-pub fn play(play: &Play, mut report: impl FnMut(String)) -> miette::Result<u8> {
+pub fn play(play: &Play, mut report: impl FnMut(String)) -> Result<u8, LaunchError> {
     let file = LaunchFile::load(&play.file)?;
     let run = play.options.run_name(&play.file)?;
     let process_of = process_of(&file);
@@ -127,9 +129,7 @@ pub fn play(play: &Play, mut report: impl FnMut(String)) -> miette::Result<u8> {
     // Containers read the scenario file itself.
     if play.plan.is_none() && play.via != Via::Compose {
         let change = WITHOUT_PARTITIONS.parse();
-        options
-            .set
-            .push(change.map_err(|error| miette!("{error}"))?);
+        options.set.push(change.map_err(LaunchError::refused)?);
     }
 
     // The launch takes this folder, and this process has to know it.
@@ -165,7 +165,7 @@ pub fn play(play: &Play, mut report: impl FnMut(String)) -> miette::Result<u8> {
         signals.end();
     }
 
-    let status = launch.wait().into_diagnostic()?;
+    let status = launch.wait().map_err(LaunchError::system(LOST))?;
     played.map(|()| exit_code(status))
 }
 
@@ -186,7 +186,7 @@ fn make_links(
     plan: &Plan,
     start: &Start,
     report: &mut dyn FnMut(String),
-) -> miette::Result<Box<dyn Links>> {
+) -> Result<Box<dyn Links>, LaunchError> {
     match via {
         Via::Proxy => Ok(Box::new(Proxies::new(file)?)),
         Via::Namespaces => {
@@ -204,15 +204,15 @@ fn make_links(
 }
 
 /// Refuses secured launches: the addresses of these links are not in the certificate of the simulator.
-fn check_not_secured(file: &LaunchFile) -> miette::Result<()> {
+fn check_not_secured(file: &LaunchFile) -> Result<(), LaunchError> {
     if file.secure.is_none() {
         return Ok(());
     }
 
     let help = "play it --via proxy, or leave out `secure`: the network of these links is private";
-    Err(miette!(
-        help = help,
-        "certificates do not have the addresses of these links"
+    Err(LaunchError::refused_with_help(
+        "certificates do not have the addresses of these links",
+        help,
     ))
 }
 
@@ -220,25 +220,26 @@ fn check_not_secured(file: &LaunchFile) -> miette::Result<()> {
 const WITHOUT_PARTITIONS: &str = "network.partition=[]";
 
 /// The partitions of the scenario, as faults of real links.
-fn partitions(file: &LaunchFile, options: &RunOptions) -> miette::Result<Plan> {
+fn partitions(file: &LaunchFile, options: &RunOptions) -> Result<Plan, LaunchError> {
     let scenario = file.load_scenario(&options.changes())?;
     let Some(speed) = options.speed.or(file.speed).and_then(|speed| speed.0) else {
-        return Err(miette!(
-            help = "for example --speed 20",
-            "without a speed, partitions have no time on the wall clock"
+        return Err(LaunchError::refused_with_help(
+            "without a speed, partitions have no time on the wall clock",
+            "for example --speed 20",
         ));
     };
     Ok(Plan::of_partitions(&scenario, speed)?)
 }
 
 /// Waits until the first tick is in the record. Returns `false` if the launch ends before.
-fn wait_for_clock(launch: &mut Child, events: &Path) -> miette::Result<bool> {
+fn wait_for_clock(launch: &mut Child, events: &Path) -> Result<bool, LaunchError> {
     loop {
         if last_tick(events).is_some_and(|tick| tick > 0) {
             return Ok(true);
         }
 
-        if launch.try_wait().into_diagnostic()?.is_some() {
+        let status = launch.try_wait().map_err(LaunchError::system(LOST))?;
+        if status.is_some() {
             return Ok(false);
         }
         std::thread::sleep(LOOK_AGAIN);
@@ -285,12 +286,10 @@ impl LinkPlayer<'_> {
         links: &mut dyn Links,
         launch: &mut Child,
         mut report: impl FnMut(String),
-    ) -> miette::Result<()> {
+    ) -> Result<(), LaunchError> {
         let begun = Instant::now();
         let path = self.folder.file(LINKS);
-        let mut record = File::create_new(&path)
-            .into_diagnostic()
-            .wrap_err_with(|| path.display().to_string())?;
+        let mut record = File::create_new(&path).map_err(LaunchError::path("make", &path))?;
 
         let apply = |robot: &RobotName, shape: Shape, _| {
             links.set(&self.process_of[robot], shape)?;
@@ -303,10 +302,9 @@ impl LinkPlayer<'_> {
             };
             let time_s = entry.time_s;
             report(format!("{time_s:.3} s: the link of {robot} is {shape}"));
-            let line = serde_json::to_string(&entry).into_diagnostic()?;
-            writeln!(record, "{line}")
-                .into_diagnostic()
-                .wrap_err_with(|| path.display().to_string())
+            let line = serde_json::to_string(&entry).map_err(std::io::Error::from);
+            line.and_then(|line| writeln!(record, "{line}"))
+                .map_err(LaunchError::path("write", &path))
         };
         // If the state of the launch cannot be read, it is over.
         let is_over = || !matches!(launch.try_wait(), Ok(None));
@@ -328,7 +326,7 @@ struct Signals {
 }
 
 impl Signals {
-    fn forward() -> miette::Result<Self> {
+    fn forward() -> Result<Self, LaunchError> {
         let signals = Self {
             launch: Arc::default(),
             is_asked: Arc::default(),
@@ -343,20 +341,23 @@ impl Signals {
             };
             ask(launch.load(Ordering::SeqCst), signal);
         })
-        .into_diagnostic()?;
+        .map_err(LaunchError::system("signals cannot be received"))?;
 
         Ok(signals)
     }
 
-    fn spawn(&self, mut command: Command) -> miette::Result<Child> {
+    fn spawn(&self, mut command: Command) -> Result<Child, LaunchError> {
         // In a process group of its own it receives Ctrl-C only through this process.
         let program = command.get_program().to_owned();
         let child = command
             .process_group(0)
             .spawn()
-            .into_diagnostic()
-            .wrap_err_with(|| format!("starting {}", program.display()))?;
-        let pid = i32::try_from(child.id()).into_diagnostic()?;
+            .map_err(|source| LaunchError::NotStarted {
+                program: program.display().to_string(),
+                source,
+            })?;
+        let pid =
+            i32::try_from(child.id()).map_err(LaunchError::system("the system's process id"))?;
         self.launch.store(pid, Ordering::SeqCst);
 
         // A signal may have come before the process id was stored.

@@ -3,20 +3,21 @@
 
 use std::collections::BTreeMap;
 use std::io::{Read, Write};
-use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
+use std::net::{Ipv4Addr, Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, Instant};
 
 use bus::endpoint::TLS;
-use miette::{IntoDiagnostic, WrapErr};
 use protocol::RobotName;
 use protocol::random::{stream, unit};
 
 use super::gate::{Gate, Pace};
 use super::plan::Plan;
 use super::shape::{Flow, Shape};
+use crate::endpoint::NO_PORT;
+use crate::error::LaunchError;
 
 /// Most connections at the same time; further ones are closed. A robot needs one, and makes one a second during a cut.
 const MAX_CONNECTIONS: usize = 256;
@@ -53,6 +54,7 @@ pub fn address(endpoint: &str) -> Result<SocketAddr, AddressError> {
             Err(_) => Err(bad()),
         };
     }
+
     let (protocol, address) = endpoint.split_once('/').ok_or_else(bad)?;
     if !["tcp", TLS].contains(&protocol) {
         return Err(bad());
@@ -286,12 +288,10 @@ fn sleep_until(due: Instant) {
     std::thread::sleep(due.saturating_duration_since(Instant::now()));
 }
 
-/// Starts a proxy on a free port of the loopback interface.
-pub(super) fn on_loopback(to: &str) -> miette::Result<Proxy> {
-    let to = address(to).into_diagnostic()?;
-    Proxy::start(SocketAddr::from(([127, 0, 0, 1], 0)), to)
-        .into_diagnostic()
-        .wrap_err("no free port of the loopback interface")
+/// Starts a proxy on a free port of the loopback interface, on to another port of it.
+pub(super) fn on_loopback(to_port: u16) -> Result<Proxy, LaunchError> {
+    let on_port = |port| SocketAddr::from((Ipv4Addr::LOCALHOST, port));
+    Proxy::start(on_port(0), on_port(to_port)).map_err(LaunchError::system(NO_PORT))
 }
 
 #[cfg(test)]

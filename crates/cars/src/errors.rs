@@ -1,0 +1,77 @@
+//! Why a command fails, and how it is shown: the one place where errors of the libraries become text for people.
+
+use std::error::Error;
+use std::iter::successors;
+
+use launch::LaunchError;
+
+/// The result of a command. `?` takes the errors of all libraries.
+pub(crate) type Result<T, E = Box<dyn Error + Send + Sync>> = std::result::Result<T, E>;
+
+/// What the command line itself refuses, or what it was about when a library failed.
+#[derive(Debug, Default, thiserror::Error)]
+#[error("{reason}")]
+pub(crate) struct Refusal {
+    pub(crate) reason: String,
+    pub(crate) help: Option<String>,
+    pub(crate) source: Option<Box<dyn Error + Send + Sync>>,
+}
+
+/// An error of the command line: a text as for `format!`, after `help = …,` if something can be done about it.
+macro_rules! refusal {
+    (help = $help:expr, $($reason:tt)+) => {
+        Box::<dyn std::error::Error + Send + Sync>::from($crate::errors::Refusal {
+            reason: format!($($reason)+),
+            help: Some($help.to_string()),
+            source: None,
+        })
+    };
+    ($($reason:tt)+) => {
+        Box::<dyn std::error::Error + Send + Sync>::from(format!($($reason)+))
+    };
+}
+pub(crate) use refusal;
+
+/// Says what an error was about.
+pub(crate) trait Context<T> {
+    /// The result, whose error gets a line above it.
+    fn context(self, reason: impl Into<String>) -> Result<T>;
+}
+
+impl<T, E: Into<Box<dyn Error + Send + Sync>>> Context<T> for Result<T, E> {
+    fn context(self, reason: impl Into<String>) -> Result<T> {
+        self.map_err(|source| {
+            let refusal = Refusal {
+                reason: reason.into(),
+                help: None,
+                source: Some(source.into()),
+            };
+            refusal.into()
+        })
+    }
+}
+
+/// An error as people see it: the message, its causes, what helps, and the place in a file.
+pub(crate) fn render(error: &(dyn Error + 'static)) -> String {
+    // Until `lab` and `export` have errors of their own, theirs are reports, which their `Debug` shows.
+    let report = format!("{error:?}");
+    if report.starts_with("  ") {
+        return report;
+    }
+
+    let error: &(dyn Error + 'static) = match error.downcast_ref() {
+        Some(LaunchError::File(error)) => error,
+        _ => error,
+    };
+    let help = successors(Some(error), |&error| error.source()).find_map(help_of);
+    config::render(error, help)
+}
+
+/// The help of one error, without those of its causes. A [`config::FileError`] shows its own.
+fn help_of<'a>(error: &'a (dyn Error + 'static)) -> Option<&'a str> {
+    let refusal = error.downcast_ref::<Refusal>();
+    let launch = error.downcast_ref::<LaunchError>();
+    refusal
+        .and_then(|error| error.help.as_deref())
+        .or_else(|| launch.and_then(LaunchError::help))
+}
