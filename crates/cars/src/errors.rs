@@ -3,6 +3,9 @@
 use std::error::Error;
 use std::iter::successors;
 
+use config::FileError;
+use export::ExportError;
+use lab::LabError;
 use launch::LaunchError;
 
 /// The result of a command. `?` takes the errors of all libraries.
@@ -53,25 +56,31 @@ impl<T, E: Into<Box<dyn Error + Send + Sync>>> Context<T> for Result<T, E> {
 
 /// An error as people see it: the message, its causes, what helps, and the place in a file.
 pub(crate) fn render(error: &(dyn Error + 'static)) -> String {
-    // Until `lab` and `export` have errors of their own, theirs are reports, which their `Debug` shows.
-    let report = format!("{error:?}");
-    if report.starts_with("  ") {
-        return report;
+    if let Some(file) = file_of(error) {
+        return config::render(file, None);
     }
-
-    let error: &(dyn Error + 'static) = match error.downcast_ref() {
-        Some(LaunchError::File(error)) => error,
-        _ => error,
-    };
     let help = successors(Some(error), |&error| error.source()).find_map(help_of);
     config::render(error, help)
+}
+
+/// The file that an error of a library is about.
+fn file_of<'a>(error: &'a (dyn Error + 'static)) -> Option<&'a FileError> {
+    if let Some(error) = error.downcast_ref::<LabError>() {
+        return error.file();
+    }
+    match (error.downcast_ref(), error.downcast_ref()) {
+        (Some(LaunchError::File(file)), _) | (_, Some(ExportError::Read(file))) => Some(file),
+        _ => None,
+    }
 }
 
 /// The help of one error, without those of its causes. A [`config::FileError`] shows its own.
 fn help_of<'a>(error: &'a (dyn Error + 'static)) -> Option<&'a str> {
     let refusal = error.downcast_ref::<Refusal>();
     let launch = error.downcast_ref::<LaunchError>();
+    let lab = error.downcast_ref::<LabError>();
     refusal
         .and_then(|error| error.help.as_deref())
         .or_else(|| launch.and_then(LaunchError::help))
+        .or_else(|| lab.and_then(LabError::help))
 }

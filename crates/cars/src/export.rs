@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use export::{ExportError, emotionml, shiviz, tables, trace};
+use lab::LabError;
 use lab::folder::{find, recorded_epoch, recorded_epochs, recording, run_name};
 use protocol::{Epoch, RobotName, Tick};
 use record::names::LATEST;
@@ -73,14 +74,19 @@ pub(crate) fn export(args: &ExportArgs) -> Result<ExitCode> {
 
     let path = args.output.as_deref();
     let mut output = Output::create(path)?;
-    let notes = match args.write(&folder, &mut output) {
+    let written = args.write(&folder, &mut output);
+    let failure = written
+        .as_ref()
+        .err()
+        .and_then(|error| error.downcast_ref());
+    if let Some(ExportError::Write(error)) = failure {
         // The reader has closed its end of the pipe, as `head` does.
-        Err(ExportError::Write(error)) if error.kind() == ErrorKind::BrokenPipe => {
+        if error.kind() == ErrorKind::BrokenPipe {
             return Ok(ExitCode::SUCCESS);
         }
-        Err(ExportError::Write(error)) => return Err(cannot_write(path, &error)),
-        written => written?,
-    };
+        return Err(cannot_write(path, error));
+    }
+    let notes = written?;
     output.finish()?;
     // The output may be on its way to another program, so the notes go to the standard error.
     for note in notes {
@@ -113,7 +119,7 @@ fn write_tables(epochs: &[EpochFiles], into: &Path) -> Result<ExitCode> {
 
 impl ExportArgs {
     /// Writes any format but the tables. Returns what it leaves out, a sentence each.
-    fn write(&self, folder: &RunFolder, out: &mut Output) -> Result<Vec<String>, ExportError> {
+    fn write(&self, folder: &RunFolder, out: &mut Output) -> Result<Vec<String>> {
         if self.format.shiviz {
             shiviz::write(&self.epochs(folder)?, out)?;
             return Ok(Vec::new());
@@ -121,13 +127,14 @@ impl ExportArgs {
 
         let files = recorded_epoch(folder, self.epoch)?;
         if self.format.trace {
-            return trace::write(&recording(&files)?, self.from, self.to, out);
+            return Ok(trace::write(&recording(&files)?, self.from, self.to, out)?);
         }
         let run = run_name(folder);
-        emotionml::write(&files, &run, self.robot.as_ref(), self.standard, out)
+        let robot = self.robot.as_ref();
+        Ok(emotionml::write(&files, &run, robot, self.standard, out)?)
     }
 
-    fn epochs(&self, folder: &RunFolder) -> Result<Vec<EpochFiles>, config::FileError> {
+    fn epochs(&self, folder: &RunFolder) -> Result<Vec<EpochFiles>, LabError> {
         match self.epoch {
             Some(_) => Ok(vec![recorded_epoch(folder, self.epoch)?]),
             None => recorded_epochs(folder),

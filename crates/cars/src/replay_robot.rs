@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use config::FileError;
+use lab::LabError;
 use lab::folder::recorded_epoch;
 use lab::replayed::Replayed;
 use record::RunFolder;
@@ -36,8 +36,8 @@ pub(crate) fn take_part(args: &ReplayRobotArgs) -> Result<ExitCode> {
 /// A robot from the last epoch of a recorded run.
 ///
 /// # Errors
-/// [`FileError`] if the folder is not that of a run, or the record has no reports of the robot.
-pub(crate) fn open(folder: &Path, robot: &RobotName) -> Result<Replayed, FileError> {
+/// If the folder is not that of a run, or the record has no reports of the robot.
+pub(crate) fn open(folder: &Path, robot: &RobotName) -> Result<Replayed, LabError> {
     let files = recorded_epoch(&RunFolder::at(folder.to_owned()), None)?;
     Replayed::open(files, robot.clone())
 }

@@ -13,11 +13,11 @@ pub fn render(error: &(dyn Error + 'static), help: Option<&str>) -> String {
     rendered(error, help, &MietteHandler::default())
 }
 
-/// An error without colors, whatever the terminal, in lines of up to 200 columns.
+/// An error without colors and links, whatever the terminal, in lines of this width.
 #[must_use]
-pub fn render_plain(error: &(dyn Error + 'static), help: Option<&str>) -> String {
+pub fn render_plain(error: &(dyn Error + 'static), help: Option<&str>, columns: usize) -> String {
     let look = GraphicalReportHandler::new_themed(GraphicalTheme::unicode_nocolor());
-    rendered(error, help, &look)
+    rendered(error, help, &look.with_links(false).with_width(columns))
 }
 
 fn rendered(
@@ -98,8 +98,8 @@ mod tests {
     #[test]
     fn a_wrong_file_is_shown_with_its_place_also_as_a_cause() {
         for shown in [
-            render_plain(&wrong_file(), None),
-            render_plain(&Outer(wrong_file()), None),
+            render_plain(&wrong_file(), None, 80),
+            render_plain(&Outer(wrong_file()), None, 80),
         ] {
             for words in ["[hall.toml:1:8]", "╰── a tick has a length", "tick = 0"] {
                 assert!(shown.contains(words), "{words:?} is not in:\n{shown}");
@@ -110,7 +110,7 @@ mod tests {
     #[test]
     fn any_error_is_shown_with_its_causes_and_its_help() {
         let outer = Outer(FileError::new("no file"));
-        let shown = render_plain(&outer, Some("look elsewhere"));
+        let shown = render_plain(&outer, Some("look elsewhere"), 80);
         let expected = "  × the unit cannot be played\n  ╰─▶ no file\n  help: look elsewhere\n";
         assert_eq!(shown, expected);
     }

@@ -5,13 +5,13 @@
 
 #![expect(clippy::print_stdout, reason = "a measurement prints its figures")]
 
+use std::error::Error;
 use std::path::Path;
 
 use config::Changes;
 use experiments::engine::{self, Options, Queue};
 use experiments::{Experiment, Plan, Request, Robots, Store};
 use lab::run::Local;
-use miette::{IntoDiagnostic, miette};
 use protocol::RunName;
 use scenario::Scenario;
 use statistics::Estimate;
@@ -21,11 +21,11 @@ const RUNS: u64 = 24;
 /// Rounds, unless the command line names another number.
 const ROUNDS: usize = 20;
 
-fn main() -> miette::Result<()> {
+fn main() -> Result<(), Box<dyn Error>> {
     let rounds = std::env::args()
         .nth(1)
         .map_or(Ok(ROUNDS), |text| text.parse());
-    let rounds: usize = rounds.into_diagnostic()?;
+    let rounds: usize = rounds?;
     let mut experiment = Experiment::find(Path::new("deadlock"))?;
     experiment.seeds = (1..=RUNS).collect();
     let scenario = experiment.scenario.clone();
@@ -66,20 +66,20 @@ fn main() -> miette::Result<()> {
 }
 
 /// Processor time of this process so far, also of threads that have ended, seconds.
-fn processor_s() -> miette::Result<f64> {
-    let stat = std::fs::read_to_string("/proc/self/stat").into_diagnostic()?;
+fn processor_s() -> Result<f64, Box<dyn Error>> {
+    let stat = std::fs::read_to_string("/proc/self/stat")?;
     let fields = stat.rsplit_once(')').map_or("", |(_, fields)| fields);
     // proc(5): utime and stime are fields 14 and 15, in clock ticks of 10 ms; the first one here is the third.
     let mut ticks = 0.0;
     for field in fields.split_whitespace().skip(11).take(2) {
-        ticks += field.parse::<f64>().into_diagnostic()?;
+        ticks += field.parse::<f64>()?;
     }
     Ok(ticks / 100.0)
 }
 
 /// Seconds for the runs in a loop without anything else: the arm "emotions" without loss.
-fn play_bare(scenario: &std::path::Path) -> miette::Result<f64> {
-    let run = RunName::new("bare").into_diagnostic()?;
+fn play_bare(scenario: &std::path::Path) -> Result<f64, Box<dyn Error>> {
+    let run = RunName::new("bare")?;
     let begun_s = processor_s()?;
     for seed in 1..=RUNS {
         let mut set = Vec::new();
@@ -89,7 +89,7 @@ fn play_bare(scenario: &std::path::Path) -> miette::Result<f64> {
             "robot.Butler.params.resend=on",
             "network.commands={ loss = 0.0 }",
         ] {
-            set.push(change.parse().map_err(|reason| miette!("{reason}"))?);
+            set.push(change.parse()?);
         }
         let changes = Changes {
             seed: Some(seed),
@@ -97,17 +97,17 @@ fn play_bare(scenario: &std::path::Path) -> miette::Result<f64> {
             set,
         };
         let mut local = Local::new(Scenario::load(scenario, &changes)?, &run)?;
-        local.simulation.init(&mut local.robots).into_diagnostic()?;
+        local.simulation.init(&mut local.robots)?;
         while local.simulation.tick() < local.simulation.scenario().ticks {
-            local.simulation.step(&mut local.robots).into_diagnostic()?;
+            local.simulation.step(&mut local.robots)?;
         }
     }
     Ok(processor_s()? - begun_s)
 }
 
 /// Seconds for the same runs as the first units of an experiment, from an empty folder to the last line.
-fn play(plan: &Plan) -> miette::Result<f64> {
-    let folder = tempfile::tempdir().into_diagnostic()?;
+fn play(plan: &Plan) -> Result<f64, Box<dyn Error>> {
+    let folder = tempfile::tempdir()?;
     let options = Options {
         units: 0..RUNS as usize,
         jobs: 1,

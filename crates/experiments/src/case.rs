@@ -1,7 +1,7 @@
 //! An arm under a condition, and which of its changes is at fault where the scenario or a robot refuses them.
 
 use config::{Changes, FileError, Override};
-use miette::miette;
+use lab::LabError;
 use scenario::Scenario;
 
 use super::condition::Condition;
@@ -28,10 +28,10 @@ impl<'a> Case<'a> {
         options: &[Override],
         condition: &Condition,
         arm: &Arm,
-    ) -> miette::Result<Self> {
+    ) -> Result<Self, LabError> {
         let duration = format!("duration=\"{} s\"", experiment.duration_s);
         let mut settings = vec![Setting {
-            change: duration.parse().map_err(|reason| miette!("{reason}"))?,
+            change: duration.parse().map_err(LabError::refused)?,
             span: experiment.duration_span.clone(),
         }];
         for option in options {

@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use config::FileError;
-use miette::miette;
+use lab::LabError;
 use record::folder::check_no_links;
 use xxhash_rust::xxh3::xxh3_64;
 
@@ -18,7 +18,7 @@ use super::processes::Launcher;
 use super::provenance::PROVENANCE;
 use super::results::{RESULTS, RUNS};
 use super::store::Store;
-use super::unit::{self, Played};
+use super::unit::{Played, UnitResult};
 use export::draft::unwritable;
 
 /// Name of the threads that play units.
@@ -120,7 +120,7 @@ pub fn play(
     options: &Options,
     launcher: Launcher<'_>,
     done: &(impl Fn() + Sync),
-) -> miette::Result<()> {
+) -> Result<(), LabError> {
     let _first = first(folder, queue)?;
     try_arms(plan, store, queue, launcher, done)?;
     let shared = Shared {
@@ -139,12 +139,16 @@ pub fn play(
         for _ in 0..options.jobs.min(shared.queue.units.len()) {
             let worker = std::thread::Builder::new().name(WORKER.to_owned());
             let worker = worker.spawn_scoped(scope, || shared.work(done));
-            workers.push(worker.map_err(|error| miette!("no thread can be started: {error}"))?);
+            workers.push(
+                worker.map_err(|error| {
+                    LabError::failed(format!("no thread can be started: {error}"))
+                })?,
+            );
         }
         for worker in workers {
             if worker.join().is_err() {
-                return Err(miette!(
-                    "a worker panicked; the message of the panic is above"
+                return Err(LabError::failed(
+                    "a worker panicked; the message of the panic is above",
                 ));
             }
         }
@@ -168,7 +172,7 @@ fn try_arms(
     queue: &mut Queue,
     launcher: Launcher<'_>,
     done: &impl Fn(),
-) -> miette::Result<()> {
+) -> Result<(), LabError> {
     if *plan.robots() == Robots::InProcess || queue.units.len() < plan.units() {
         return Ok(());
     }
@@ -204,11 +208,12 @@ fn try_arms(
     queue.units.retain(|number| !tried.contains(number));
     let played: Vec<&Played> = played.iter().collect();
     if let Some(first) = plan.missing_in_all(&played).first() {
-        return Err(miette!(
-            help = "a robot of a run that is recorded with `cars run` shows what it publishes: `cars export`",
-            "{first}, in no arm; {} of {} units have been played",
-            tried.len(),
-            plan.units()
+        let (tried, all) = (tried.len(), plan.units());
+        return Err(LabError::refused(format!(
+            "{first}, in no arm; {tried} of {all} units have been played"
+        ))
+        .with_help(
+            "a robot of a run that is recorded with `cars run` shows what it publishes: `cars export`",
         ));
     }
     Ok(())
@@ -277,7 +282,7 @@ impl Shared<'_> {
         Some(is_open(current.store, unit, self.retries_failed))
     }
 
-    fn note(&self, unit: &Unit<'_>, result: unit::Result) {
+    fn note(&self, unit: &Unit<'_>, result: UnitResult) {
         let mut current = self.store.lock().unwrap_or_else(PoisonError::into_inner);
         if let Err(error) = current.store.add(unit.key, result) {
             current.error.get_or_insert(error);

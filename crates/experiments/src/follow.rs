@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use miette::IntoDiagnostic;
+use lab::LabError;
 use observe::Observation;
 use record::Summary;
 
@@ -27,14 +27,14 @@ impl Ended {
     ///
     /// # Errors
     /// If a number of the summary is not finite.
-    pub(super) fn of(summary: &Summary) -> miette::Result<Self> {
+    pub(super) fn of(summary: &Summary) -> Result<Self, LabError> {
         let mut verdicts = BTreeMap::new();
         for (name, judged) in &summary.expectations {
             verdicts.insert(name.clone(), judged.verdict.name().to_owned());
         }
         Ok(Self {
             digest: summary.digest.clone(),
-            summary: serde_json::to_value(summary).into_diagnostic()?,
+            summary: serde_json::to_value(summary).map_err(LabError::failed)?,
             verdicts,
         })
     }

@@ -19,7 +19,8 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use miette::{IntoDiagnostic, WrapErr, miette};
+use config::FileError;
+use lab::LabError;
 use protocol::Tick;
 use protocol::random::{stream, unit};
 use protocol::time::time_s;
@@ -157,7 +158,7 @@ pub fn hunt(
     subject: &Subject,
     options: &Options<'_>,
     progress: &mut dyn FnMut(Progress<'_>),
-) -> miette::Result<Report> {
+) -> Result<Report, LabError> {
     let baseline = subject.play(&Case::default(), &BTreeSet::new())?;
     let wanted = wanted(subject, &baseline, &options.expect)?;
     let ground = Ground::new(
@@ -167,22 +168,23 @@ pub fn hunt(
         options.longest_s,
     );
     if ground.kinds().is_empty() {
-        return Err(miette!(
-            help = "allow further kinds by --kinds",
+        return Err(LabError::refused(format!(
             "{}: none of these kinds of faults can occur in this scenario",
             subject.file.display()
-        ));
+        ))
+        .with_help("allow further kinds by --kinds"));
     }
     if options.out.is_symlink() {
         let place = options.out.display();
-        return Err(miette!(
-            help = "name the folder to which it leads",
+        return Err(LabError::refused(format!(
             "{place} is a link, and nothing is written through one"
-        ));
+        ))
+        .with_help("name the folder to which it leads"));
     }
-    std::fs::create_dir_all(&options.out)
-        .into_diagnostic()
-        .wrap_err_with(|| format!("cannot make the folder {}", options.out.display()))?;
+    std::fs::create_dir_all(&options.out).map_err(|error| {
+        let place = options.out.display();
+        FileError::new(format!("cannot make the folder {place}: {error}"))
+    })?;
 
     let mut hunt = Hunt {
         subject,
@@ -212,14 +214,14 @@ fn wanted(
     subject: &Subject,
     baseline: &Played,
     expect: &BTreeSet<String>,
-) -> miette::Result<BTreeSet<String>> {
+) -> Result<BTreeSet<String>, LabError> {
     let file = subject.file.display();
     let names: Vec<&str> = baseline.expectations.iter().map(String::as_str).collect();
     if let Some(unknown) = expect.difference(&baseline.expectations).next() {
-        return Err(miette!(
-            help = format!("there are: {}", names.join("; ")),
-            "{file} has no expectation \"{unknown}\""
-        ));
+        return Err(
+            LabError::refused(format!("{file} has no expectation \"{unknown}\""))
+                .with_help(format!("there are: {}", names.join("; "))),
+        );
     }
 
     let wanted = if expect.is_empty() {
@@ -234,21 +236,21 @@ fn wanted(
                 .filter(|other| !baseline.failed.contains_key(*other))
                 .map(|other| format!("--expect {other:?}"))
                 .collect();
-            return Err(miette!(
-                help = format!(
-                    "a hunt looks for faults under which a run fails that passes without them. Hunt for the others: {}",
-                    others.join(" ")
-                ),
+            return Err(LabError::refused(format!(
                 "{file} fails without any fault: \"{name}\", {}",
                 failure.because
-            ));
+            ))
+            .with_help(format!(
+                "a hunt looks for faults under which a run fails that passes without them. Hunt for the others: {}",
+                others.join(" ")
+            )));
         }
     }
     Ok(wanted)
 }
 
 impl Hunt<'_> {
-    fn go(&mut self, progress: &mut dyn FnMut(Progress<'_>)) -> miette::Result<()> {
+    fn go(&mut self, progress: &mut dyn FnMut(Progress<'_>)) -> Result<(), LabError> {
         let begun = Instant::now();
         while !self.is_stopped() {
             let first = self.report.plans;
@@ -304,7 +306,7 @@ impl Hunt<'_> {
         &mut self,
         first: u64,
         cases: Vec<Case>,
-        results: Vec<Option<miette::Result<Played>>>,
+        results: Vec<Option<Result<Played, LabError>>>,
     ) -> Vec<(u64, Case, Played)> {
         let mut failures = Vec::new();
         for (index, (case, result)) in cases.into_iter().zip(results).enumerate() {
@@ -340,7 +342,7 @@ impl Hunt<'_> {
         case: &Case,
         played: &Played,
         progress: &mut dyn FnMut(Progress<'_>),
-    ) -> miette::Result<()> {
+    ) -> Result<(), LabError> {
         let signs = Cause::of_plan(case, played);
         for name in played.failed.keys() {
             if !self.wanted.contains(name) {
@@ -373,7 +375,7 @@ impl Hunt<'_> {
         case: &Case,
         played: &Played,
         progress: &mut dyn FnMut(Progress<'_>),
-    ) -> miette::Result<()> {
+    ) -> Result<(), LabError> {
         let mut drawn = self.finding(name, plan, case, played);
         drawn.file = file::reserve(&drawn.file)?;
         self.write(&drawn, played, "It is not shrunk.")?;
@@ -394,7 +396,7 @@ impl Hunt<'_> {
         let mut finding = self.finding(name, plan, &shrunk.case, &shrunk.played);
         if let Some(known) = self.known(name, &finding.cause) {
             known.plans += 1;
-            return std::fs::remove_file(&drawn.file).into_diagnostic();
+            return std::fs::remove_file(&drawn.file).map_err(LabError::failed);
         }
         let named = std::mem::replace(&mut finding.file, drawn.file);
         finding.drawn = drawn.drawn;
@@ -436,7 +438,7 @@ impl Hunt<'_> {
         }
     }
 
-    fn write(&self, finding: &Finding, played: &Played, shrunk: &str) -> miette::Result<()> {
+    fn write(&self, finding: &Finding, played: &Played, shrunk: &str) -> Result<(), LabError> {
         let heading = Heading {
             expectation: &finding.expectation,
             seed: self.options.seed,
@@ -447,17 +449,17 @@ impl Hunt<'_> {
     }
 
     /// Plays the file of a finding as written.
-    fn check_file(&self, finding: &Finding) -> miette::Result<()> {
+    fn check_file(&self, finding: &Finding) -> Result<(), LabError> {
         let name = &finding.expectation;
         let written = self.subject.of_file(&finding.file)?;
         let played = written.play(&Case::default(), &BTreeSet::from([name.clone()]))?;
         if played.failed.contains_key(name) {
             return Ok(());
         }
-        Err(miette!(
+        Err(LabError::failed(format!(
             "\"{name}\" fails under plan {}, and does not fail in the file {}: this is a defect of the hunt",
             finding.plan,
             finding.file.display()
-        ))
+        )))
     }
 }

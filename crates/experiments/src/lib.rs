@@ -41,4 +41,4 @@ pub use provenance::{Machine, Provenance};
 pub use results::{Judged, Results};
 pub use setting::Setting;
 pub use store::Store;
-pub use unit::{Played, Result};
+pub use unit::{Played, UnitResult};

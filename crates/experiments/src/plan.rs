@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use config::{Changes, FileError, Override, Source};
-use miette::{IntoDiagnostic, WrapErr, miette};
+use lab::LabError;
 use record::folder::check_no_links;
 use scenario::Scenario;
 use serde::{Deserialize, Serialize};
@@ -169,7 +169,7 @@ impl WrittenPlan {
     }
 
     /// Checks that a new plan is one of the same experiment file: the file may have been edited, or moved, but not both.
-    fn check_same_file(&self, new: &Self, folder: &Path) -> miette::Result<()> {
+    fn check_same_file(&self, new: &Self, folder: &Path) -> Result<(), LabError> {
         let (Some(before), Some(now)) = (&self.origin, &new.origin) else {
             return Ok(());
         };
@@ -178,11 +178,11 @@ impl WrittenPlan {
         if before == now || has_same_content {
             return Ok(());
         }
-        Err(miette!(
-            help = "choose another folder with -o",
+        Err(LabError::refused(format!(
             "{} is the folder of another experiment, that of {before}",
             folder.display()
         ))
+        .with_help("choose another folder with -o"))
     }
 }
 
@@ -248,7 +248,7 @@ impl Plan {
     ///
     /// # Errors
     /// If a condition cannot be played, two of the changes set the same value, or a scenario cannot be used.
-    pub fn new(request: &Request) -> miette::Result<Self> {
+    pub fn new(request: &Request) -> Result<Self, LabError> {
         let experiment = &request.experiment;
         check_own_options(&request.set)?;
         let conditions = list_conditions(experiment)?;
@@ -290,17 +290,17 @@ impl Plan {
     ///
     /// # Errors
     /// If there is none, it cannot be read, or it was made by a program that measures otherwise.
-    pub fn load(folder: &Path) -> miette::Result<Self> {
+    pub fn load(folder: &Path) -> Result<Self, LabError> {
         let Some(written) = read(folder)? else {
             let help = match has_units(folder) {
                 true => again(folder),
                 false => "make one with `cars experiment run`".to_owned(),
             };
-            return Err(miette!(
-                help = help,
+            return Err(LabError::record(format!(
                 "{} is not the folder of an experiment: it has no {PLAN}",
                 folder.display()
-            ));
+            ))
+            .with_help(help));
         };
 
         let path = folder.join(PLAN);
@@ -311,15 +311,16 @@ impl Plan {
         let mut experiment = Experiment::parse(&source, Path::new(""))?;
         experiment.duration_s = written.duration_s;
         experiment.seeds.clone_from(&written.seeds);
-        Self::of(written, experiment).wrap_err_with(|| format!("{}", path.display()))
+        Self::of(written, experiment)
+            .map_err(|error| LabError::record(format!("{}: {error}", path.display())))
     }
 
-    fn of(written: WrittenPlan, experiment: Experiment) -> miette::Result<Self> {
+    fn of(written: WrittenPlan, experiment: Experiment) -> Result<Self, LabError> {
         let conditions = list_conditions(&experiment)?;
         let arms = &experiment.arms;
         let are_all_there = written.cells.len() == conditions.len() * arms.len();
         if !are_all_there || written.units != written.cells.len() * written.seeds.len() {
-            return Err(miette!("the plan is not that of its experiment"));
+            return Err(LabError::record("the plan is not that of its experiment"));
         }
 
         let mut cells = Vec::new();
@@ -327,7 +328,7 @@ impl Plan {
             let condition = &conditions[index / arms.len()];
             let arm = &arms[index % arms.len()];
             if cell.condition != condition.name || cell.arm != arm.name {
-                return Err(miette!("the plan is not that of its experiment"));
+                return Err(LabError::record("the plan is not that of its experiment"));
             }
 
             let mut content = Xxh3::new();
@@ -341,7 +342,7 @@ impl Plan {
             let mut yoked_to = None;
             if let Some(other) = &arm.yoked_to {
                 let arm = arms.iter().position(|arm| arm.name == *other);
-                let arm = arm.ok_or_else(|| miette!("the arm of the yoke is missing"))?;
+                let arm = arm.ok_or_else(|| LabError::record("the arm of the yoke is missing"))?;
                 let other = index / arms.len() * arms.len() + arm;
                 add_text(&mut content, &written.cells[other].scenario);
                 yoked_to = Some(other);
@@ -364,14 +365,14 @@ impl Plan {
     ///
     /// # Errors
     /// If it is another program.
-    pub fn check_program(&self) -> miette::Result<()> {
+    pub fn check_program(&self) -> Result<(), LabError> {
         let this = Program::this();
         if this != self.written.program {
-            return Err(miette!(
-                help = "plan it again with `cars experiment run`",
+            return Err(LabError::refused(format!(
                 "the experiment was planned by cars {}, and this is cars {this}",
                 self.written.program
-            ));
+            ))
+            .with_help("plan it again with `cars experiment run`"));
         }
         Ok(())
     }
@@ -380,13 +381,13 @@ impl Plan {
     ///
     /// # Errors
     /// If the folder has other content, or a file cannot be written.
-    pub fn save(&self, folder: &Path) -> miette::Result<()> {
+    pub fn save(&self, folder: &Path) -> Result<(), LabError> {
         if !folder.join(PLAN).exists() && has_files(folder) && !has_units(folder) {
-            return Err(miette!(
-                help = "choose another folder with -o, or move it away",
+            return Err(LabError::refused(format!(
                 "{} is there and is not the folder of an experiment",
                 folder.display()
-            ));
+            ))
+            .with_help("choose another folder with -o, or move it away"));
         }
 
         check_no_links(folder)?;
@@ -400,7 +401,7 @@ impl Plan {
             plan: self.written.clone(),
             seal: self.written.seal()?,
         };
-        let mut text = serde_json::to_string_pretty(&sealed).into_diagnostic()?;
+        let mut text = serde_json::to_string_pretty(&sealed).map_err(LabError::failed)?;
         text.push('\n');
         write(&folder.join(PLAN), &text)?;
         write(&folder.join(FILE), &self.written.file)?;
@@ -411,7 +412,7 @@ impl Plan {
     ///
     /// # Errors
     /// If the plan that is there cannot be read.
-    pub fn is_in(&self, folder: &Path) -> miette::Result<bool> {
+    pub fn is_in(&self, folder: &Path) -> Result<bool, LabError> {
         Ok(read(folder)?.is_some_and(|there| there.is_same(&self.written)))
     }
 
@@ -581,11 +582,11 @@ impl Plan {
     ///
     /// # Errors
     /// If its changes cannot be written into a scenario.
-    pub(super) fn case(&self, cell: usize) -> miette::Result<Case<'_>> {
+    pub(super) fn case(&self, cell: usize) -> Result<Case<'_>, LabError> {
         let mut options = Vec::new();
         for change in &self.written.set {
             let change = change.parse::<Override>();
-            options.push(change.map_err(|reason| miette!("{reason}"))?);
+            options.push(change.map_err(LabError::refused)?);
         }
 
         let arms = &self.experiment.arms;
@@ -683,13 +684,15 @@ fn again(folder: &Path) -> String {
 }
 
 /// Reads the plan of a folder; `None` if it has none.
-fn read(folder: &Path) -> miette::Result<Option<WrittenPlan>> {
+fn read(folder: &Path) -> Result<Option<WrittenPlan>, LabError> {
     let path = folder.join(PLAN);
     if !path.exists() {
         return Ok(None);
     }
 
-    let refused = |reason: &str| miette!(help = again(folder), "{} {reason}", path.display());
+    let refused = |reason: &str| {
+        LabError::record(format!("{} {reason}", path.display())).with_help(again(folder))
+    };
     let text = std::fs::read(&path).map_err(|error| FileError::unreadable(&path, &error))?;
     let value: serde_json::Value = match serde_json::from_slice(&text) {
         Ok(value) => value,
@@ -711,8 +714,8 @@ fn read(folder: &Path) -> miette::Result<Option<WrittenPlan>> {
 
 impl WrittenPlan {
     /// Digest of all that the plan has.
-    fn seal(&self) -> miette::Result<String> {
-        let text = serde_json::to_vec(self).into_diagnostic()?;
+    fn seal(&self) -> Result<String, LabError> {
+        let text = serde_json::to_vec(self).map_err(LabError::failed)?;
         let mut hash = Xxh3::new();
         hash.update(&text);
         Ok(format!("{:032x}", hash.digest128()))
@@ -729,26 +732,26 @@ pub(super) fn write(path: &Path, text: &str) -> Result<(), FileError> {
     Ok(())
 }
 
-fn list_conditions(experiment: &Experiment) -> miette::Result<Vec<Condition>> {
+fn list_conditions(experiment: &Experiment) -> Result<Vec<Condition>, LabError> {
     let conditions = experiment.list_conditions();
-    conditions.map_err(|error| miette!("{error}"))
+    conditions.map_err(LabError::refused)
 }
 
-fn check_own_options(set: &[Override]) -> miette::Result<()> {
+fn check_own_options(set: &[Override]) -> Result<(), LabError> {
     for change in set {
         let option = change.top();
         if OWN_OPTIONS.contains(&option) {
-            return Err(miette!(
-                help = "use --seeds and --duration",
+            return Err(LabError::refused(format!(
                 "--set {change} would have no effect: the {option} of a run is the experiment's"
-            ));
+            ))
+            .with_help("use --seeds and --duration"));
         }
     }
     Ok(())
 }
 
 /// The scenario of an arm under a condition, without a seed.
-fn scenario_of(request: &Request, condition: &Condition, arm: &Arm) -> miette::Result<String> {
+fn scenario_of(request: &Request, condition: &Condition, arm: &Arm) -> Result<String, LabError> {
     let experiment = &request.experiment;
     let sources = [
         ("the option --set".to_owned(), request.set.clone()),
@@ -766,7 +769,7 @@ fn scenario_of(request: &Request, condition: &Condition, arm: &Arm) -> miette::R
     if arm.yoked_to.is_some() {
         let mut yoke = Vec::new();
         for robot in scenario.robots.keys() {
-            yoke.push(script::change(robot, "[]").map_err(|reason| miette!("{reason}"))?);
+            yoke.push(script::change(robot, "[]").map_err(LabError::refused)?);
         }
         let yoke = (format!("the yoke of \"{}\"", arm.name), yoke);
         for source in sources {
@@ -774,9 +777,9 @@ fn scenario_of(request: &Request, condition: &Condition, arm: &Arm) -> miette::R
         }
     }
 
-    let mut table: toml::Table = toml::from_str(&scenario.to_toml()?).into_diagnostic()?;
+    let mut table: toml::Table = toml::from_str(&scenario.to_toml()?).map_err(LabError::failed)?;
     table.remove("seed");
-    toml::to_string(&table).into_diagnostic()
+    toml::to_string(&table).map_err(LabError::failed)
 }
 
 fn changes_of(settings: &[Setting]) -> Vec<Override> {
@@ -788,15 +791,15 @@ fn changes_of(settings: &[Setting]) -> Vec<Override> {
 }
 
 /// Checks that no two of these sources set the same value: one would silently override the other.
-fn check_overlaps(sources: &[(String, Vec<Override>)]) -> miette::Result<()> {
+fn check_overlaps(sources: &[(String, Vec<Override>)]) -> Result<(), LabError> {
     for (index, (name, changes)) in sources.iter().enumerate() {
         for (other, others) in &sources[index + 1..] {
             for change in changes {
                 if let Some(overridden) = others.iter().find(|own| own.overlaps(change)) {
-                    return Err(miette!(
-                        help = "an experiment sets each value in one place",
+                    return Err(LabError::refused(format!(
                         "{name} sets {change}, and {other} sets {overridden}"
-                    ));
+                    ))
+                    .with_help("an experiment sets each value in one place"));
                 }
             }
         }

@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
 use config::FileError;
-use miette::{IntoDiagnostic, miette};
 use observe::Observation;
 use protocol::Event;
 use protocol::messages::End;
@@ -17,6 +16,7 @@ use toml::{Table, Value};
 use super::follow::{Ended, Follow};
 use super::plan::LaunchText;
 use export::draft::unwritable;
+use lab::LabError;
 use lab::folder::read_summary;
 use lab::scratch::Scratch;
 use lab::states::LastStates;
@@ -38,8 +38,8 @@ pub(super) fn follow(
     launch: Option<&LaunchText>,
     launcher: Launcher<'_>,
     follower: &mut impl Follow,
-) -> miette::Result<Ended> {
-    let folder = Scratch::new().into_diagnostic()?;
+) -> Result<Ended, LabError> {
+    let folder = Scratch::new().map_err(LabError::failed)?;
     scenario.record.frames = true;
     scenario.record.panels = false;
     scenario.record.log = false;
@@ -53,7 +53,7 @@ pub(super) fn follow(
         .arg(folder.path())
         .args(["--run", RUN, "--speed", "max", "--no-console", "--quiet"])
         .stdin(Stdio::null());
-    let output = command.output().into_diagnostic()?;
+    let output = command.output().map_err(LabError::failed)?;
     let run = RunFolder::at(folder.path().join(RUN));
     // A launch that failed says why, and its record, which may be damaged, does not. Verdicts are exit statuses, too, and say
     // nothing against it.
@@ -71,7 +71,7 @@ pub(super) fn follow(
 }
 
 /// The failure of a launch, with what it printed.
-fn failed(output: &Output, folder: &Path) -> miette::Report {
+fn failed(output: &Output, folder: &Path) -> LabError {
     let printed = String::from_utf8_lossy(&output.stderr);
     // The name of the folder is drawn at random.
     let printed = printed.replace(&folder.display().to_string(), "");
@@ -79,7 +79,7 @@ fn failed(output: &Output, folder: &Path) -> miette::Report {
     while !printed.is_char_boundary(end) {
         end -= 1;
     }
-    miette!("the launch failed: {}", printed[..end].trim())
+    LabError::failed(format!("the launch failed: {}", printed[..end].trim()))
 }
 
 /// Writes the scenario and a launch file for it; returns the launch file.
@@ -90,7 +90,7 @@ pub fn write_launch(
     scenario: &Scenario,
     launch: Option<&LaunchText>,
     folder: &Path,
-) -> miette::Result<PathBuf> {
+) -> Result<PathBuf, LabError> {
     let path = folder.join("scenario.toml");
     write(&path, &scenario.to_toml()?)?;
 
@@ -100,7 +100,7 @@ pub fn write_launch(
     };
     table.insert("scenario".to_owned(), text(&path));
     let path = folder.join("launch.toml");
-    write(&path, &toml::to_string(&table).into_diagnostic()?)?;
+    write(&path, &toml::to_string(&table).map_err(LabError::failed)?)?;
     Ok(path)
 }
 
@@ -118,8 +118,8 @@ fn programs_of(scenario: &Scenario) -> Table {
 }
 
 /// A launch file whose relative paths hold in another folder.
-fn relocated(launch: &LaunchText) -> miette::Result<Table> {
-    let mut table: Table = toml::from_str(&launch.text).into_diagnostic()?;
+fn relocated(launch: &LaunchText) -> Result<Table, LabError> {
+    let mut table: Table = toml::from_str(&launch.text).map_err(LabError::failed)?;
 
     if let Some(Value::String(secure)) = table.get_mut("secure") {
         *secure = launch.folder.join(&*secure).display().to_string();
@@ -170,11 +170,11 @@ fn write(path: &Path, text: &str) -> Result<(), FileError> {
 }
 
 /// Shows a recorded run to a follower.
-fn read(scenario: &Scenario, run: &RunFolder, follower: &mut impl Follow) -> miette::Result<()> {
-    let recording = Recording::open(&run.file(RECORDING)).into_diagnostic()?;
+fn read(scenario: &Scenario, run: &RunFolder, follower: &mut impl Follow) -> Result<(), LabError> {
+    let recording = Recording::open(&run.file(RECORDING))?;
     let mut ticks = Ticks::of(recording);
     let mut states = LastStates::default();
-    while let Some(tick) = ticks.next_tick().into_diagnostic()? {
+    while let Some(tick) = ticks.next_tick()? {
         let number = tick.tick();
         let mut events = tick.events;
         // The end of the run is observed by itself, as it is where robots run in this process.
@@ -197,5 +197,5 @@ fn read(scenario: &Scenario, run: &RunFolder, follower: &mut impl Follow) -> mie
             return Ok(());
         }
     }
-    Err(miette!("the record of the run has no end"))
+    Err(LabError::record("the record of the run has no end"))
 }

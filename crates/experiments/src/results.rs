@@ -7,7 +7,7 @@ use std::path::Path;
 use config::FileError;
 use export::csv::{Table, Value};
 use export::draft::{Draft, unwritable};
-use miette::IntoDiagnostic;
+use lab::LabError;
 use protocol::messages::Verdict;
 use serde::Serialize;
 
@@ -92,7 +92,7 @@ impl Results {
     ///
     /// # Errors
     /// If it is not the folder of an experiment, or a file cannot be read.
-    pub fn load(folder: &Path) -> miette::Result<Self> {
+    pub fn load(folder: &Path) -> Result<Self, LabError> {
         let plan = Plan::load(folder)?;
         let store = Store::open(folder)?;
         Ok(Self::of(plan, &store))
@@ -198,7 +198,7 @@ impl Results {
     ///
     /// # Errors
     /// If a file cannot be written.
-    pub fn write(&self, folder: &Path) -> miette::Result<()> {
+    pub fn write(&self, folder: &Path) -> Result<(), LabError> {
         let table = self.table(&folder.join(RUNS))?;
         let path = folder.join(RESULTS);
         let mut draft = Draft::create(&path)?;
@@ -212,7 +212,7 @@ impl Results {
             estimates: self.estimates(),
             contrasts: self.contrasts(),
         };
-        let text = serde_json::to_string_pretty(&written).into_diagnostic()?;
+        let text = serde_json::to_string_pretty(&written).map_err(LabError::failed)?;
         writeln!(draft, "{text}").map_err(|error| unwritable(&path, &error))?;
 
         table.publish()?;

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh3::xxh3_64;
 
 use super::plan::{Key, Plan, UNITS, UNITS_ENDING};
-use super::unit::{self, Played};
+use super::unit::{Played, UnitResult};
 use export::draft::unwritable;
 
 /// What a seal begins with, in the last field of a line.
@@ -33,7 +33,7 @@ pub struct Store {
     folder: PathBuf,
     /// How far each file has been read.
     read: BTreeMap<PathBuf, ReadUpTo>,
-    units: BTreeMap<Key, unit::Result>,
+    units: BTreeMap<Key, UnitResult>,
     damages: Vec<Damage>,
     conflicts: Vec<Key>,
     /// The file of this process; none before its first unit.
@@ -152,7 +152,7 @@ impl Store {
 
     /// Whether a unit has been played, and how.
     #[must_use]
-    pub fn get(&self, key: Key) -> Option<&unit::Result> {
+    pub fn get(&self, key: Key) -> Option<&UnitResult> {
         self.units.get(&key)
     }
 
@@ -192,7 +192,7 @@ impl Store {
     ///
     /// # Errors
     /// [`FileError`] if it cannot be written.
-    pub fn add(&mut self, key: Key, result: unit::Result) -> Result<(), FileError> {
+    pub fn add(&mut self, key: Key, result: UnitResult) -> Result<(), FileError> {
         let line = encode(key, &result);
         if self.own.is_none() {
             self.own = Some(self.create()?);
@@ -223,7 +223,7 @@ impl Store {
 
     /// Notes how a unit was played. A unit that failed once and was played another time was played; of two different runs the
     /// one that is written first in order is kept, so that the order of reading does not matter.
-    fn insert(&mut self, key: Key, result: unit::Result) {
+    fn insert(&mut self, key: Key, result: UnitResult) {
         let Some(known) = self.units.get_mut(&key) else {
             self.units.insert(key, result);
             return;
@@ -245,7 +245,7 @@ impl Store {
 }
 
 /// The line of a unit, with its end.
-fn encode(key: Key, result: &unit::Result) -> Vec<u8> {
+fn encode(key: Key, result: &UnitResult) -> Vec<u8> {
     let content = match result {
         Ok(played) => Content::Played(played.clone()),
         Err(reason) => Content::Failed {
@@ -268,7 +268,7 @@ fn encode(key: Key, result: &unit::Result) -> Vec<u8> {
 }
 
 /// The unit of a line, which is given without its end; `None` if the line is damaged.
-fn decode(line: &[u8]) -> Option<(Key, unit::Result)> {
+fn decode(line: &[u8]) -> Option<(Key, UnitResult)> {
     let tail = SEAL.len() + DIGITS + b"\"}".len();
     let (body, tail) = line.split_at_checked(line.len().checked_sub(tail)?)?;
     let seal = tail.strip_prefix(SEAL)?.strip_suffix(b"\"}")?;
@@ -300,7 +300,7 @@ mod tests {
         Key::from_str(&format!("{number:032x}")).unwrap()
     }
 
-    fn played(value: f64) -> unit::Result {
+    fn played(value: f64) -> UnitResult {
         let measured = Measured::Value { value };
         Ok(Played {
             digest: "d".to_owned(),

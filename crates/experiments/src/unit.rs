@@ -1,10 +1,11 @@
 //! Plays one unit of an experiment and takes its measures.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::error::Error;
+use std::iter::successors;
 use std::panic::AssertUnwindSafe;
 
 use config::Override;
-use miette::{IntoDiagnostic, miette};
 use observe::words::{Unheard, Words};
 use observe::{Measured, Observation, Probe};
 use protocol::{RobotName, RunName};
@@ -15,13 +16,11 @@ use super::follow::{Ended, Follow};
 use super::plan::{Plan, Robots, Unit};
 use super::processes::{self, Launcher};
 use super::script::Script;
+use lab::LabError;
 use lab::run::{Local, check_faults, make_robots, play};
 
-/// The run of a unit, of which nothing is recorded.
-const RUN: &str = "experiment";
-
 /// What a unit gives: its measures, or the reason why it has none.
-pub type Result = std::result::Result<Played, String>;
+pub type UnitResult = Result<Played, String>;
 
 /// What was measured in a unit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -50,7 +49,7 @@ impl Plan {
     ///
     /// # Errors
     /// If a scenario has robots or faults that need processes, and there are none.
-    pub fn check(&self) -> miette::Result<()> {
+    pub fn check(&self) -> Result<(), LabError> {
         match self.needs_processes()? {
             Some(reason) => Err(reason),
             None => Ok(()),
@@ -61,7 +60,7 @@ impl Plan {
     ///
     /// # Errors
     /// If a scenario cannot be used.
-    pub fn needs_processes(&self) -> miette::Result<Option<miette::Report>> {
+    pub fn needs_processes(&self) -> Result<Option<LabError>, LabError> {
         if *self.robots() != Robots::InProcess {
             return Ok(None);
         }
@@ -84,16 +83,16 @@ impl Plan {
     /// # Errors
     /// If a robot does not begin, at the place of the change that it refuses, with the arm and the condition; or at a measure
     /// of a variable that it has in no arm.
-    pub fn check_begins(&self) -> miette::Result<()> {
+    pub fn check_begins(&self) -> Result<(), LabError> {
         if *self.robots() != Robots::InProcess {
             return Ok(());
         }
 
-        let run = RunName::new(RUN).into_diagnostic()?;
+        let run = RunName::unknown();
         let begin = |scenario: Scenario| {
             caught(|| {
                 let mut local = Local::new(scenario, &run)?;
-                local.simulation.init(&mut local.robots).into_diagnostic()?;
+                local.simulation.init(&mut local.robots)?;
                 Ok(local)
             })
         };
@@ -147,7 +146,7 @@ impl Plan {
     ///
     /// # Errors
     /// The reason why the unit cannot be played to its end, for people.
-    pub fn play(&self, unit: &Unit<'_>, launcher: Launcher<'_>) -> Result {
+    pub fn play(&self, unit: &Unit<'_>, launcher: Launcher<'_>) -> UnitResult {
         caught(|| self.measure(unit, launcher))
     }
 
@@ -156,7 +155,11 @@ impl Plan {
     ///
     /// # Errors
     /// If the scenario cannot be used, or that run cannot be played.
-    pub fn scenario_of(&self, unit: &Unit<'_>, launcher: Launcher<'_>) -> miette::Result<Scenario> {
+    pub fn scenario_of(
+        &self,
+        unit: &Unit<'_>,
+        launcher: Launcher<'_>,
+    ) -> Result<Scenario, LabError> {
         let Some((cell, seed)) = unit.yoke else {
             return Ok(self.scenario(unit.cell, unit.seed, Vec::new())?);
         };
@@ -164,11 +167,11 @@ impl Plan {
         let other = self.scenario(cell, seed, Vec::new())?;
         let mut script = Script::default();
         self.follow(other, launcher, &mut script)?;
-        let script: Vec<Override> = script.changes().map_err(|reason| miette!("{reason}"))?;
+        let script: Vec<Override> = script.changes().map_err(LabError::refused)?;
         Ok(self.scenario(unit.cell, unit.seed, script)?)
     }
 
-    fn measure(&self, unit: &Unit<'_>, launcher: Launcher<'_>) -> miette::Result<Played> {
+    fn measure(&self, unit: &Unit<'_>, launcher: Launcher<'_>) -> Result<Played, LabError> {
         let condition_s = unit.condition.time_s;
         // Where it lasts for the whole run there is no time after it, not even the last tick.
         let condition_s = condition_s.unwrap_or((0.0, f64::INFINITY));
@@ -202,7 +205,7 @@ impl Plan {
         scenario: Scenario,
         launcher: Launcher<'_>,
         follower: &mut impl Follow,
-    ) -> miette::Result<Ended> {
+    ) -> Result<Ended, LabError> {
         match self.robots() {
             Robots::InProcess => follow_in_process(scenario, follower),
             Robots::Programs => processes::follow(scenario, None, launcher, follower),
@@ -228,8 +231,8 @@ fn add_variables(published: &mut BTreeMap<RobotName, BTreeSet<String>>, local: &
     }
 }
 
-fn follow_in_process(scenario: Scenario, follower: &mut impl Follow) -> miette::Result<Ended> {
-    let run = RunName::new(RUN).into_diagnostic()?;
+fn follow_in_process(scenario: Scenario, follower: &mut impl Follow) -> Result<Ended, LabError> {
+    let run = RunName::unknown();
     let mut summary = None;
     let simulation = play(scenario, &run, |simulation, record| {
         let summary = summary.get_or_insert_with(|| simulation.begin_summary(&run));
@@ -245,7 +248,7 @@ fn follow_in_process(scenario: Scenario, follower: &mut impl Follow) -> miette::
         Ok(())
     })?;
 
-    let mut summary = summary.ok_or_else(|| miette!("the run has not begun"))?;
+    let mut summary = summary.ok_or_else(|| LabError::failed("the run has not begun"))?;
     simulation.finish_summary(&mut summary);
     Ended::of(&summary)
 }
@@ -260,7 +263,7 @@ impl Follow for Gauge<'_> {
 }
 
 /// What comes of a unit, whose robots may panic.
-fn caught<T>(measure: impl FnOnce() -> miette::Result<T>) -> std::result::Result<T, String> {
+fn caught<T>(measure: impl FnOnce() -> Result<T, LabError>) -> Result<T, String> {
     // Nothing that it has changed is used after a panic.
     match std::panic::catch_unwind(AssertUnwindSafe(measure)) {
         Ok(Ok(done)) => Ok(done),
@@ -270,9 +273,9 @@ fn caught<T>(measure: impl FnOnce() -> miette::Result<T>) -> std::result::Result
 }
 
 /// An error as one line, with its causes.
-fn in_words(error: &miette::Report) -> String {
+fn in_words(error: &(dyn Error + 'static)) -> String {
     let mut causes = Vec::new();
-    for cause in error.chain() {
+    for cause in successors(Some(error), |&cause| cause.source()) {
         causes.push(cause.to_string());
     }
     causes.join(": ")
@@ -303,7 +306,12 @@ mod tests {
             caught::<()>(|| panic!("{number} ways out")),
             Err("a robot panicked: 7 ways out".to_owned())
         );
-        let error = miette!("inner").wrap_err("outer");
-        assert_eq!(caught::<()>(|| Err(error)), Err("outer: inner".to_owned()));
+
+        #[derive(Debug, thiserror::Error)]
+        #[error("outer")]
+        struct Outer(#[source] std::fmt::Error);
+        let words = format!("outer: {}", std::fmt::Error);
+        let error = LabError::failed(Outer(std::fmt::Error));
+        assert_eq!(caught::<()>(|| Err(error)), Err(words));
     }
 }

@@ -87,9 +87,12 @@ pub fn write(
     let mut record = Record::open(files)?;
     let path = files.events.display();
     let first = record.next_entry()?;
-    let first = first.ok_or_else(|| FileError::new(format!("{path} has no complete tick")))?;
+    let first =
+        first.ok_or_else(|| FileError::new(format!("{path} has no complete tick")).of_record())?;
     let Some(Event::Init { seed, tick_s, .. }) = first.events.first() else {
-        return Err(FileError::new(format!("{path} does not begin with `init`")).into());
+        return Err(FileError::new(format!("{path} does not begin with `init`"))
+            .of_record()
+            .into());
     };
     let mut timeline = Timeline::default();
     timeline.tick(0, &first.events);
@@ -97,7 +100,7 @@ pub fn write(
     if let Some(only) = only.filter(|only| !robots.contains(&only.as_str())) {
         let robots = robots.join(", ");
         let reason = format!("no robot of this run is called {only}; there are {robots}");
-        return Err(FileError::new(reason).into());
+        return Err(FileError::new(reason).of_record().into());
     }
 
     let is_recorded = record.recording().is_some();

@@ -13,11 +13,10 @@ use config::FileError;
 use recording::RecordingError;
 
 /// Why an export is incomplete. What was written of it is of no use.
-#[derive(Debug, thiserror::Error, miette::Diagnostic)]
+#[derive(Debug, thiserror::Error)]
 pub enum ExportError {
     /// The record of the run cannot be read.
     #[error(transparent)]
-    #[diagnostic(transparent)]
     Read(#[from] FileError),
     /// The output cannot be written.
     #[error("the export cannot be written: {0}")]
@@ -26,6 +25,6 @@ pub enum ExportError {
 
 impl From<RecordingError> for ExportError {
     fn from(error: RecordingError) -> Self {
-        Self::Read(FileError::new(error.to_string()))
+        Self::Read(FileError::new(error.to_string()).of_record())
     }
 }

@@ -195,7 +195,7 @@ fn add_events(table: &mut Table, files: &EpochFiles) -> Result<Option<Entry>, Fi
         Some(Event::Init { tick_s, .. }) => *tick_s,
         Some(_) => {
             let path = files.events.display();
-            return Err(FileError::new(format!("{path} does not begin with `init`")));
+            return Err(FileError::new(format!("{path} does not begin with `init`")).of_record());
         }
     };
 
@@ -224,7 +224,7 @@ fn is_last(files: &EpochFiles) -> bool {
 /// The damage of a recording; an error if the recording could not be read at all, whatever is in it.
 fn damage(error: RecordingError) -> Result<RecordingError, FileError> {
     match error {
-        RecordingError::Unreadable { .. } => Err(FileError::new(error.to_string())),
+        RecordingError::Unreadable { .. } => Err(FileError::new(error.to_string()).of_record()),
         RecordingError::Damaged { .. }
         | RecordingError::Headless { .. }
         | RecordingError::NoSuchTick { .. } => Ok(error),

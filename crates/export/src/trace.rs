@@ -51,7 +51,7 @@ pub fn write(
                 len - 1
             ),
         };
-        return Err(FileError::new(reason).into());
+        return Err(FileError::new(reason).of_record().into());
     }
 
     let header = recording.header();

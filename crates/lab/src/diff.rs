@@ -2,12 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use config::FileError;
 use protocol::{Event, Tick};
 use record::EpochFiles;
 use record::difference::{Difference, between};
 use record::{Entry, Record};
 use serde::Serialize;
+
+use crate::error::LabError;
 
 /// What came of a comparison.
 #[derive(Debug, Default, Serialize)]
@@ -35,8 +36,8 @@ impl Comparison {
 /// Compares two epochs.
 ///
 /// # Errors
-/// [`FileError`] if a record cannot be read.
-pub fn compare(a: &EpochFiles, b: &EpochFiles) -> Result<Comparison, FileError> {
+/// If a record cannot be read.
+pub fn compare(a: &EpochFiles, b: &EpochFiles) -> Result<Comparison, LabError> {
     let mut records = [Record::open(a)?, Record::open(b)?];
     let mut comparison = Comparison::default();
     loop {

@@ -3,17 +3,22 @@
 use std::path::{Path, PathBuf};
 
 use config::FileError;
-use miette::{IntoDiagnostic, WrapErr, miette};
 use protocol::{Epoch, RunName};
 use record::names::{LATEST, SUMMARY};
 use record::{EpochFiles, RunFolder, Summary};
 use recording::Recording;
 
+use crate::error::LabError;
+
+/// Why a run may have no recording.
+pub(crate) const NOT_RECORDED: &str =
+    "a run is recorded unless its scenario has `frames = false` under [record]";
+
 /// Finds the folder of a run by the name of the run under `out`, or by the path of the folder.
 ///
 /// # Errors
 /// If there is none.
-pub fn find(out: &Path, run: &Path) -> miette::Result<RunFolder> {
+pub fn find(out: &Path, run: &Path) -> Result<RunFolder, LabError> {
     let candidates: [PathBuf; 2] = [out.join(run), run.to_owned()];
     if let Some(found) = candidates.into_iter().find(|path| path.is_dir()) {
         return Ok(RunFolder::at(found));
@@ -21,30 +26,28 @@ pub fn find(out: &Path, run: &Path) -> miette::Result<RunFolder> {
 
     let out = out.display();
     if run == Path::new(LATEST) {
-        return Err(miette!(
-            help = "name one, or start one with `cars run`",
-            "there is no run in {out}"
-        ));
+        return Err(LabError::record(format!("there is no run in {out}"))
+            .with_help("name one, or start one with `cars run`"));
     }
-    Err(miette!(
-        help = "give a run's name, with --out where its folder is elsewhere, or its folder",
+    Err(LabError::record(format!(
         "there is no run {}, neither in {out} nor as a folder",
         run.display()
     ))
+    .with_help("give a run's name, with --out where its folder is elsewhere, or its folder"))
 }
 
 /// The records of a run's epochs, the first epoch first.
 ///
 /// # Errors
 /// If the folder is not that of a run.
-pub fn recorded_epochs(folder: &RunFolder) -> Result<Vec<EpochFiles>, FileError> {
+pub fn recorded_epochs(folder: &RunFolder) -> Result<Vec<EpochFiles>, LabError> {
     let mut epochs = folder.epochs();
     // A simulator that was killed while an epoch began has written no events of it yet.
     epochs.retain(|files| files.events.exists());
     if epochs.is_empty() {
         let place = folder.path().display();
         return Err(
-            FileError::new(format!("{place} is not the folder of a run"))
+            LabError::record(format!("{place} is not the folder of a run"))
                 .with_help("name a folder with an events.jsonl, such as runs/latest"),
         );
     }
@@ -55,7 +58,7 @@ pub fn recorded_epochs(folder: &RunFolder) -> Result<Vec<EpochFiles>, FileError>
 ///
 /// # Errors
 /// If the folder is not that of a run, or the run has no such epoch.
-pub fn recorded_epoch(folder: &RunFolder, number: Option<Epoch>) -> Result<EpochFiles, FileError> {
+pub fn recorded_epoch(folder: &RunFolder, number: Option<Epoch>) -> Result<EpochFiles, LabError> {
     let mut epochs = recorded_epochs(folder)?;
     let last = epochs.len();
     let chosen = match number {
@@ -64,7 +67,7 @@ pub fn recorded_epoch(folder: &RunFolder, number: Option<Epoch>) -> Result<Epoch
     };
 
     chosen.ok_or_else(|| {
-        FileError::new(format!(
+        LabError::record(format!(
             "{} has no epoch {}, the last one is {last}",
             folder.path().display(),
             number.unwrap_or_default()
@@ -92,15 +95,15 @@ pub fn run_name(folder: &RunFolder) -> RunName {
 /// The recording of an epoch.
 ///
 /// # Errors
-/// [`FileError`] if there is none, or it cannot be read.
-pub fn recording(files: &EpochFiles) -> Result<Recording, FileError> {
+/// If there is none, or it cannot be read.
+pub fn recording(files: &EpochFiles) -> Result<Recording, LabError> {
     let opened = Recording::open(&files.recording);
     opened.map_err(|error| {
-        let error = FileError::new(error.to_string());
+        let error = LabError::from(error);
         if files.recording.exists() {
             return error;
         }
-        error.with_help("a run is recorded unless its scenario has `frames = false` under [record]")
+        error.with_help(NOT_RECORDED)
     })
 }
 
@@ -108,7 +111,7 @@ pub fn recording(files: &EpochFiles) -> Result<Recording, FileError> {
 ///
 /// # Errors
 /// If the file cannot be read or decoded.
-pub fn read_summary(folder: &RunFolder) -> miette::Result<Option<Summary>> {
+pub fn read_summary(folder: &RunFolder) -> Result<Option<Summary>, LabError> {
     let path = folder.file(SUMMARY);
     if !path.exists() {
         return Ok(None);
@@ -116,8 +119,11 @@ pub fn read_summary(folder: &RunFolder) -> miette::Result<Option<Summary>> {
 
     let text =
         std::fs::read_to_string(&path).map_err(|error| FileError::unreadable(&path, &error))?;
-    let summary = serde_json::from_str(&text)
-        .into_diagnostic()
-        .wrap_err_with(|| format!("{} is not a summary", path.display()))?;
+    let summary = serde_json::from_str(&text).map_err(|error| not_a_summary(&path, &error))?;
     Ok(Some(summary))
+}
+
+/// The error of a file that has not the content of a summary.
+pub(crate) fn not_a_summary(path: &Path, error: &serde_json::Error) -> LabError {
+    LabError::record(format!("{} is not a summary: {error}", path.display()))
 }

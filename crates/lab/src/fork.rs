@@ -2,8 +2,7 @@
 
 use std::time::Instant;
 
-use config::{Changes, FileError, Override, Source};
-use miette::{IntoDiagnostic, miette};
+use config::{Changes, Override, Source};
 use protocol::{Event, RunName, Tick};
 use record::difference::between;
 use record::{Entry, Record};
@@ -12,6 +11,7 @@ use scenario::Parent;
 use scenario::Scenario;
 use simulator::Recorder;
 
+use crate::error::LabError;
 use crate::reexecution::{Reexecution, cannot_go_on};
 use crate::run::{check_faults, check_parameters, go_on, observe};
 
@@ -38,7 +38,7 @@ impl Fork<'_> {
     ///
     /// # Errors
     /// If the record has no such tick, or a change cannot be made.
-    pub fn scenario(&self) -> miette::Result<Scenario> {
+    pub fn scenario(&self) -> Result<Scenario, LabError> {
         let parent = Parent {
             run: self.parent.clone(),
             tick: self.tick,
@@ -67,18 +67,17 @@ impl Fork<'_> {
         }
         let source = Source {
             name: format!("{} (forked)", self.files.scenario.display()),
-            text: toml::to_string(&content).into_diagnostic()?,
+            text: toml::to_string(&content).map_err(LabError::failed)?,
         };
         let folder = self.files.scenario.parent().unwrap_or("".as_ref());
         let scenario = Scenario::parse(&source, folder)?;
 
         if scenario.ticks <= self.tick {
-            return Err(miette!(
-                help = "fork it earlier, or give a longer --duration",
+            return Err(LabError::refused(format!(
                 "the run ends at tick {}: nothing is left after tick {}",
-                scenario.ticks,
-                self.tick
-            ));
+                scenario.ticks, self.tick
+            ))
+            .with_help("fork it earlier, or give a longer --duration"));
         }
         check_faults(&scenario, self.tick)?;
         check_parameters(&scenario, self.tick)?;
@@ -86,7 +85,7 @@ impl Fork<'_> {
     }
 
     /// Digest of the recorded run at the tick.
-    fn digest(&self) -> miette::Result<String> {
+    fn digest(&self) -> Result<String, LabError> {
         let mut record = Record::of_events(&self.files.events)?;
         let mut last = None;
         while let Some(entry) = record.next_entry()? {
@@ -100,8 +99,11 @@ impl Fork<'_> {
 
         let events = self.files.events.display();
         Err(match last {
-            Some(last) => miette!("{events} ends at tick {last}, before tick {}", self.tick),
-            None => miette!("{events} has no complete tick"),
+            Some(last) => LabError::record(format!(
+                "{events} ends at tick {last}, before tick {}",
+                self.tick
+            )),
+            None => LabError::record(format!("{events} has no complete tick")),
         })
     }
 
@@ -115,14 +117,15 @@ impl Fork<'_> {
         scenario: Scenario,
         run: &RunName,
         folder: &RunFolder,
-    ) -> miette::Result<Summary> {
+    ) -> Result<Summary, LabError> {
         let mut record = Record::open(self.files)?;
         let mut again = Reexecution::new(scenario, 1)?;
         let mut recorder = Recorder::begin(folder, run, &again.local.simulation)?;
         loop {
             let opened = Instant::now();
             let recorded = record.next_entry()?;
-            let recorded = recorded.ok_or_else(|| miette!("the record has become shorter"))?;
+            let recorded =
+                recorded.ok_or_else(|| LabError::record("the record has become shorter"))?;
             let executed = again.play(&recorded)?;
             observe(&mut recorder, &again.local, &executed.record, opened);
             recorder.write(&again.local.simulation, &executed.record)?;
@@ -164,12 +167,12 @@ fn add_change(content: &mut toml::Table, at_s: f64, set: Vec<toml::Value>) {
     }
 }
 
-fn check_same(recorded: &Entry, executed: &Entry) -> Result<(), FileError> {
+fn check_same(recorded: &Entry, executed: &Entry) -> Result<(), LabError> {
     let Some(difference) = between(recorded, executed) else {
         return Ok(());
     };
 
-    Err(FileError::new(format!(
+    Err(LabError::record(format!(
         "the run cannot be forked: executed again, it differs from its record at {difference} (recorded: {}; executed: {})",
         difference.value(0),
         difference.value(1)

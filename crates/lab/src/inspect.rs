@@ -4,7 +4,6 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use config::{Changes, FileError};
-use miette::{IntoDiagnostic, WrapErr, miette};
 use protocol::Event;
 use protocol::event::log_line;
 use protocol::messages::LogRecord;
@@ -19,7 +18,8 @@ use scenario::Scenario;
 use simulator::Simulation;
 use simulator::recorder;
 
-use crate::folder::recorded_epochs;
+use crate::error::LabError;
+use crate::folder::{not_a_summary, recorded_epochs};
 use crate::verify::check_scenario;
 
 /// Ticks of a recording that are read at a time.
@@ -35,14 +35,14 @@ pub struct Inspection {
     /// The events of each epoch that are not damaged.
     pub epochs: Vec<Checked>,
     /// What is damaged, part by part.
-    pub damages: Vec<miette::Report>,
+    pub damages: Vec<LabError>,
 }
 
 /// Reads everything in the folder of a run.
 ///
 /// # Errors
 /// If it is not the folder of a run. Damage is part of what is returned.
-pub fn inspect(folder: &RunFolder) -> Result<Inspection, FileError> {
+pub fn inspect(folder: &RunFolder) -> Result<Inspection, LabError> {
     let mut inspection = Inspection::default();
     // Reading a pipe would wait for ever.
     check_files(folder.path())?;
@@ -74,7 +74,7 @@ pub fn inspect(folder: &RunFolder) -> Result<Inspection, FileError> {
 }
 
 impl Inspection {
-    fn note(&mut self, found: miette::Result<()>) {
+    fn note(&mut self, found: Result<(), LabError>) {
         self.damages.extend(found.err());
     }
 }
@@ -84,31 +84,35 @@ fn inspect_recording(
     files: &EpochFiles,
     events: Option<&Checked>,
     is_over: bool,
-) -> miette::Result<()> {
+) -> Result<(), LabError> {
     let scenario = Scenario::load(&files.scenario, &Changes::default())?;
     if !files.recording.exists() {
         if scenario.record.frames && is_over {
             let place = files.recording.display();
-            return Err(miette!("the run was recorded, and {place} is not there"));
+            return Err(LabError::record(format!(
+                "the run was recorded, and {place} is not there"
+            )));
         }
         return Ok(());
     }
 
-    let recording = Recording::open(&files.recording).into_diagnostic()?;
-    recording.check().into_diagnostic()?;
+    let recording = Recording::open(&files.recording)?;
+    recording.check()?;
     if !has_begun(files)? {
         // It ended while robots were awaited: it has no tick.
         return Ok(());
     }
     for from in (0..recording.len()).step_by(PART as usize) {
-        recording.read(from, from + PART).into_diagnostic()?;
+        recording.read(from, from + PART)?;
     }
     check_scenario(files, &recording)?;
     let header = recording.header();
-    let simulation = Simulation::new(scenario, files.epoch).into_diagnostic()?;
+    let simulation = Simulation::new(scenario, files.epoch).map_err(LabError::refused)?;
     if let Some(difference) = between_headers(header, &recorder::header(&header.run, &simulation)) {
         let place = files.recording.display();
-        return Err(miette!("{place} is not of its scenario: {difference}"));
+        return Err(LabError::record(format!(
+            "{place} is not of its scenario: {difference}"
+        )));
     }
     match events {
         Some(events) => compare_events(files, &recording, events),
@@ -121,33 +125,33 @@ fn compare_events(
     files: &EpochFiles,
     recording: &Recording,
     events: &Checked,
-) -> miette::Result<()> {
+) -> Result<(), LabError> {
     let mut record = Record::open(files)?;
     while let Some(entry) = record.next_entry()? {
         if let Some(difference) = in_recording(&entry, &entry) {
-            return Err(miette!(
+            return Err(LabError::record(format!(
                 "{} differs from {}: {difference}",
                 files.recording.display(),
                 files.events.display()
-            ));
+            )));
         }
     }
 
     let ticks = recording.len();
     let is_short = events.end.is_some() && (!recording.is_finished() || ticks != events.tick + 1);
     if is_short || ticks > events.tick + 1 {
-        return Err(miette!(
+        return Err(LabError::record(format!(
             "{} has {ticks} complete ticks, and {} goes to tick {}",
             files.recording.display(),
             files.events.display(),
             events.tick
-        ));
+        )));
     }
     Ok(())
 }
 
 /// Whether an epoch has a first tick.
-fn has_begun(files: &EpochFiles) -> miette::Result<bool> {
+fn has_begun(files: &EpochFiles) -> Result<bool, LabError> {
     let first = Record::of_events(&files.events)?.next_entry()?;
     let mut events = first.iter().flat_map(|entry| &entry.events);
     Ok(events.any(|event| matches!(event, Event::Init { .. })))
@@ -173,44 +177,46 @@ fn check_files(folder: &Path) -> Result<(), FileError> {
 }
 
 /// Compares the summary with its seal, and with the end of the run. What it counts is compared by [`crate::verify`].
-fn inspect_summary(folder: &RunFolder, events: Option<&Checked>) -> miette::Result<()> {
+fn inspect_summary(folder: &RunFolder, events: Option<&Checked>) -> Result<(), LabError> {
     let path = folder.file(SUMMARY);
     if !path.exists() {
         if has_ended(events) {
-            return Err(miette!(
+            return Err(LabError::record(format!(
                 "the run has ended, and {} is not there",
                 path.display()
-            ));
+            )));
         }
         return Ok(());
     }
 
     let text = read(&path)?;
-    let summary: Summary = serde_json::from_str(&text)
-        .into_diagnostic()
-        .wrap_err_with(|| format!("{} is not a summary", path.display()))?;
+    let summary: Summary =
+        serde_json::from_str(&text).map_err(|error| not_a_summary(&path, &error))?;
     if summary.is_as_written(&text) == Some(false) {
         return Err(damaged(&path, &"it is not what was written"));
     }
     match events {
-        Some(events) if summary.end != events.end || summary.ticks != events.tick => Err(miette!(
-            "{} is not that of the run: it goes to tick {}, and the events go to tick {}",
-            path.display(),
-            summary.ticks,
-            events.tick
-        )),
+        Some(events) if summary.end != events.end || summary.ticks != events.tick => {
+            Err(LabError::record(format!(
+                "{} is not that of the run: it goes to tick {}, and the events go to tick {}",
+                path.display(),
+                summary.ticks,
+                events.tick
+            )))
+        }
         Some(Checked {
             digest: Some(digest),
             ..
-        }) if *digest != summary.digest => {
-            Err(miette!("{} is that of another run", path.display()))
-        }
+        }) if *digest != summary.digest => Err(LabError::record(format!(
+            "{} is that of another run",
+            path.display()
+        ))),
         _ => Ok(()),
     }
 }
 
 /// Compares how the run was launched with its seal.
-fn inspect_launched(folder: &RunFolder) -> miette::Result<()> {
+fn inspect_launched(folder: &RunFolder) -> Result<(), LabError> {
     let path = folder.file(LAUNCHED);
     if !path.exists() {
         return Ok(());
@@ -227,7 +233,7 @@ fn inspect_log(
     folder: &RunFolder,
     epochs: &[EpochFiles],
     events: Option<&Checked>,
-) -> miette::Result<()> {
+) -> Result<(), LabError> {
     let path = folder.log();
     if !path.exists() {
         let last = epochs
@@ -237,10 +243,10 @@ fn inspect_log(
             .transpose()?
             .is_some_and(|scenario| scenario.record.log);
         if is_logged && has_ended(events) {
-            return Err(miette!(
+            return Err(LabError::record(format!(
                 "the run was logged, and {} is not there",
                 path.display()
-            ));
+            )));
         }
         return Ok(());
     }
@@ -301,7 +307,7 @@ fn is_line_of(line: &str, expected: &LogRecord) -> bool {
 }
 
 /// Reads every file of a folder to its end.
-fn read_all(folder: &Path) -> miette::Result<()> {
+fn read_all(folder: &Path) -> Result<(), LabError> {
     let unreadable = |error: io::Error| FileError::unreadable(folder, &error);
     let entries = match std::fs::read_dir(folder) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
@@ -318,11 +324,11 @@ fn read_all(folder: &Path) -> miette::Result<()> {
     Ok(())
 }
 
-fn read(path: &Path) -> miette::Result<String> {
+fn read(path: &Path) -> Result<String, LabError> {
     let bytes = std::fs::read(path).map_err(|error| FileError::unreadable(path, &error))?;
     String::from_utf8(bytes).map_err(|_| damaged(path, &"it is not UTF-8"))
 }
 
-fn damaged(path: &Path, reason: &dyn std::fmt::Display) -> miette::Report {
-    miette!("{} is damaged: {reason}", path.display())
+fn damaged(path: &Path, reason: &dyn std::fmt::Display) -> LabError {
+    LabError::record(format!("{} is damaged: {reason}", path.display()))
 }

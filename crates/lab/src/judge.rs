@@ -2,8 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use config::FileError;
-use miette::miette;
 use observe::{Expectation, Monitors, Observation};
 use protocol::messages::End;
 use protocol::{Event, Tick};
@@ -13,6 +11,8 @@ use record::{Entry, Record};
 use recording::{Recording, Ticks};
 use scenario::Scenario;
 
+use crate::error::LabError;
+use crate::folder::NOT_RECORDED;
 use crate::states::LastStates;
 
 /// What came of a recorded run.
@@ -34,7 +34,7 @@ pub fn judge(
     files: &EpochFiles,
     scenario: &Scenario,
     expectations: &[Expectation],
-) -> miette::Result<Verdicts> {
+) -> Result<Verdicts, LabError> {
     let mut record = Record::of_events(&files.events)?;
     let mut recorded = LastReports::open(files, expectations)?;
     let roster = scenario.roster();
@@ -103,21 +103,21 @@ struct LastReports {
 
 impl LastReports {
     /// Opens the recording, if the expectations need it.
-    fn open(files: &EpochFiles, expectations: &[Expectation]) -> miette::Result<Option<Self>> {
+    fn open(files: &EpochFiles, expectations: &[Expectation]) -> Result<Option<Self>, LabError> {
         let mut needing = expectations.iter().filter(|one| one.needs_states());
         let Some(first) = needing.next() else {
             return Ok(None);
         };
         if !files.recording.exists() {
-            return Err(miette!(
-                help = "a run is recorded unless its scenario has `frames = false` under [record]",
+            return Err(LabError::record(format!(
                 "{} is not there, and \"{}\" depends on what robots reported",
                 files.recording.display(),
                 first.name
-            ));
+            ))
+            .with_help(NOT_RECORDED));
         }
 
-        let recording = Recording::open(&files.recording).map_err(|error| unreadable(&error))?;
+        let recording = Recording::open(&files.recording)?;
         Ok(Some(Self {
             ticks: Ticks::of(recording),
             last: LastStates::default(),
@@ -125,17 +125,12 @@ impl LastReports {
     }
 
     /// Goes on to the next tick. Returns whether the recording has it.
-    fn advance(&mut self) -> miette::Result<bool> {
-        let next = self.ticks.next_tick();
-        let Some(tick) = next.map_err(|error| unreadable(&error))? else {
+    fn advance(&mut self) -> Result<bool, LabError> {
+        let Some(tick) = self.ticks.next_tick()? else {
             return Ok(false);
         };
 
         self.last.note(tick.reports, tick.frame.robots);
         Ok(true)
     }
-}
-
-fn unreadable(error: &recording::RecordingError) -> FileError {
-    FileError::new(error.to_string())
 }

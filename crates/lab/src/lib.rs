@@ -3,6 +3,7 @@
 //! ([`judge`]), playing single robots from their records ([`replayed`]), and reading records to find damage ([`inspect`]).
 
 pub mod diff;
+mod error;
 pub mod folder;
 pub mod fork;
 pub mod inspect;
@@ -16,5 +17,6 @@ pub mod scratch;
 pub mod states;
 pub mod verify;
 
+pub use error::LabError;
 pub use performance::{Performance, performances};
 pub use reexecution::{digest_from, first_difference};

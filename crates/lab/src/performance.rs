@@ -1,12 +1,12 @@
 //! States and commands of the robots of a scenario, from a run in this process.
 
-use miette::IntoDiagnostic;
 use protocol::messages::PublicState;
 use protocol::{Event, RobotName, RunName, Tick};
 use scenario::Scenario;
 use simulator::{Simulation, TickRecord};
 use std::collections::BTreeMap;
 
+use crate::error::LabError;
 use crate::run::play;
 
 /// States and received commands of one robot.
@@ -26,7 +26,7 @@ pub struct Performance {
 pub fn performances(
     mut scenario: Scenario,
     ticks: Tick,
-) -> miette::Result<Option<BTreeMap<RobotName, Performance>>> {
+) -> Result<Option<BTreeMap<RobotName, Performance>>, LabError> {
     let mut performances = BTreeMap::new();
     for (name, spec) in &scenario.robots {
         if robots::make(&spec.class).is_none() {
@@ -38,7 +38,7 @@ pub fn performances(
     // What robots do while all processes run.
     scenario.faults.clear();
     scenario.changes.clear();
-    let run = RunName::new("conform").into_diagnostic()?;
+    let run = RunName::unknown();
     play(scenario, &run, |simulation, record| {
         add_commands(&mut performances, record);
         if record.tick <= ticks {

@@ -8,7 +8,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use lockstep::{Bulletin, Exchange, Outcome};
-use miette::{IntoDiagnostic, miette};
 use protocol::messages::{CommandText, FaultKind, News, Report};
 use protocol::{Epoch, Event, RobotName, RunName, Tick};
 use record::Entry;
@@ -18,6 +17,8 @@ use robot::{Action, BadParameters, Cars, LocalHost, Robot, RobotError};
 use scenario::Scenario;
 use simulator::TickRecord;
 
+use crate::error::LabError;
+use crate::folder::NOT_RECORDED;
 use crate::replayed::action;
 use crate::run::{Local, go_on};
 
@@ -62,9 +63,9 @@ impl Reexecution {
     ///
     /// # Errors
     /// If the scenario cannot be set up.
-    pub(crate) fn new(scenario: Scenario, epoch: Epoch) -> miette::Result<Self> {
+    pub(crate) fn new(scenario: Scenario, epoch: Epoch) -> Result<Self, LabError> {
         // Robots learn the name of the run, and nothing of the record depends on it.
-        let run = RunName::new("verify").into_diagnostic()?;
+        let run = RunName::unknown();
         let script = RecordedReports::default();
         let mut scripted = BTreeSet::new();
         let mut from_record = BTreeMap::new();
@@ -92,7 +93,7 @@ impl Reexecution {
     ///
     /// # Errors
     /// If a robot ends the run, or is to be taken from the record and the record has no reports.
-    pub(crate) fn play(&mut self, recorded: &Entry) -> miette::Result<Executed> {
+    pub(crate) fn play(&mut self, recorded: &Entry) -> Result<Executed, LabError> {
         if let Some(Event::End {
             reason, waited_for, ..
         }) = recorded.events.last()
@@ -125,7 +126,7 @@ impl Reexecution {
         } else {
             simulation.step(&mut exchange)
         };
-        let record = record.into_diagnostic()?;
+        let record = record?;
         let frame = recorded.frame.is_some();
         Ok(Executed {
             frame: frame.then(|| simulator::recorder::frame(simulation, &record)),
@@ -136,14 +137,14 @@ impl Reexecution {
 
     /// What the simulation was given between this tick and the one before: what was changed by hand, faults that were due, the
     /// operator's commands, and answers that came too late.
-    fn repeat_inputs(&mut self, recorded: &Entry) -> miette::Result<()> {
+    fn repeat_inputs(&mut self, recorded: &Entry) -> Result<(), LabError> {
         let simulation = &mut self.local.simulation;
         let changes = recorded.changes_by_hand();
         simulation.repeat_changes(&changes).map_err(|reason| {
-            miette!(
+            LabError::record(format!(
                 "what was changed by hand before tick {} cannot be changed again: {reason}",
                 recorded.tick
-            )
+            ))
         })?;
         let orders = simulation.faults_due();
         let lateness = simulation.scenario().lateness_at(recorded.tick).clone();
@@ -239,18 +240,18 @@ impl Reexecution {
     }
 
     /// Checks that the record has what robots that are not executed have reported.
-    fn check_script(&self, recorded: &Entry) -> miette::Result<()> {
+    fn check_script(&self, recorded: &Entry) -> Result<(), LabError> {
         for name in &self.scripted {
             let report = recorded
                 .reports
                 .as_ref()
                 .and_then(|reports| reports.get(name));
             if report.is_none() && !recorded.has_missed(name) {
-                return Err(miette!(
-                    help = "a run is recorded with reports unless its scenario has `frames = false` under [record]",
+                return Err(LabError::record(format!(
                     "{name} cannot be executed in this process, and the record has no report of it for tick {}",
                     recorded.tick
-                ));
+                ))
+                .with_help(NOT_RECORDED));
             }
         }
 
@@ -266,7 +267,7 @@ pub fn first_difference(
     scenario: Scenario,
     epoch: Epoch,
     recorded: &[Entry],
-) -> miette::Result<Option<Difference>> {
+) -> Result<Option<Difference>, LabError> {
     let mut again = Reexecution::new(scenario, epoch)?;
     for entry in recorded {
         let executed = again.play(entry)?.into_entry();
@@ -282,7 +283,11 @@ pub fn first_difference(
 ///
 /// # Errors
 /// As [`first_difference`], and if a robot cannot go on.
-pub fn digest_from(scenario: Scenario, epoch: Epoch, recorded: &[Entry]) -> miette::Result<String> {
+pub fn digest_from(
+    scenario: Scenario,
+    epoch: Epoch,
+    recorded: &[Entry],
+) -> Result<String, LabError> {
     let mut again = Reexecution::new(scenario, epoch)?;
     for entry in recorded {
         again.play(entry)?;
@@ -295,11 +300,13 @@ pub fn digest_from(scenario: Scenario, epoch: Epoch, recorded: &[Entry]) -> miet
 }
 
 /// Why a run cannot go on from its record.
-pub(crate) fn cannot_go_on(robot: &RobotName) -> miette::Report {
-    miette!(
-        help = "a run is forked in one process; robots in other languages, and robots that went on after a tick that they had \
-                missed, have a state that only their processes knew",
+pub(crate) fn cannot_go_on(robot: &RobotName) -> LabError {
+    LabError::refused(format!(
         "{robot} cannot go on: it cannot be executed in this process"
+    ))
+    .with_help(
+        "a run is forked in one process; robots in other languages, and robots that went on after a tick that they had \
+         missed, have a state that only their processes knew",
     )
 }
 

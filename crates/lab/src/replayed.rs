@@ -9,6 +9,9 @@ use record::EpochFiles;
 use record::{Entry, Record};
 use robot::{Action, BadParameters, Cars, Robot};
 
+use crate::error::LabError;
+use crate::folder::NOT_RECORDED;
+
 /// A robot that repeats, tick by tick, what a robot of a recorded run reported, sent and logged. It perceives nothing. Where the
 /// record has nothing of it, and after the end of the record, it stays where it is and publishes what it published last.
 pub struct Replayed {
@@ -25,8 +28,8 @@ impl Replayed {
     /// The robot of a record.
     ///
     /// # Errors
-    /// [`FileError`] if the record cannot be read, or has no reports of this robot.
-    pub fn open(files: EpochFiles, name: RobotName) -> Result<Self, FileError> {
+    /// If the record cannot be read, or has no reports of this robot.
+    pub fn open(files: EpochFiles, name: RobotName) -> Result<Self, LabError> {
         let record = Record::open(&files)?;
         let recording = record.recording();
         let is_known = recording.is_some_and(|file| file.header().robots.contains(&name));
@@ -121,20 +124,20 @@ pub(crate) fn action(report: &Report) -> Action {
     }
 }
 
-fn no_reports(recording: &Path, name: &RobotName, robots: Option<&[RobotName]>) -> FileError {
+fn no_reports(recording: &Path, name: &RobotName, robots: Option<&[RobotName]>) -> LabError {
     let place = recording.display();
     match robots {
-        None => FileError::new(format!(
+        None => LabError::record(format!(
             "{place} is not there: what {name} reported is unknown"
         ))
-        .with_help("a run is recorded unless its scenario has `frames = false` under [record]"),
+        .with_help(NOT_RECORDED),
         Some(robots) => {
             let mut names = Vec::new();
             for robot in robots {
                 names.push(robot.as_str());
             }
 
-            FileError::new(format!("{place} has no robot {name}"))
+            LabError::record(format!("{place} has no robot {name}"))
                 .with_help(format!("its robots are {}", names.join(", ")))
         }
     }

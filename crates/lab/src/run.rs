@@ -4,15 +4,16 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use miette::{IntoDiagnostic, miette};
 use protocol::messages::{End, FaultKind, OnLate};
 use protocol::{Epoch, Event, RobotName, RunName, Tick};
 use record::{RunFolder, Summary};
 use recording::panel_ticks;
-use robot::{LocalHost, Robot, Welcome};
+use robot::{BadParameters, LocalHost, Robot, RobotError, Welcome};
 use scenario::FaultEnd;
 use scenario::Scenario;
 use simulator::{Recorder, Simulation, TickRecord};
+
+use crate::error::LabError;
 
 /// Longest sleep of a run that is not as fast as possible, before it looks whether it is to go on.
 const NAP: Duration = Duration::from_millis(50);
@@ -27,7 +28,7 @@ pub fn execute(
     run: &RunName,
     folder: &RunFolder,
     speed: Option<f64>,
-) -> miette::Result<Summary> {
+) -> Result<Summary, LabError> {
     execute_with(scenario, run, folder, speed, &of_class, || Ok(()))
 }
 
@@ -42,8 +43,8 @@ pub fn execute_with(
     folder: &RunFolder,
     speed: Option<f64>,
     make: Make<'_>,
-    mut goes_on: impl FnMut() -> miette::Result<()>,
-) -> miette::Result<Summary> {
+    mut goes_on: impl FnMut() -> Result<(), LabError>,
+) -> Result<Summary, LabError> {
     let mut recorder = None;
     let begun = Instant::now();
     let simulation = play_with_robots(scenario, run, make, |local, record, opened| {
@@ -62,7 +63,7 @@ pub fn execute_with(
         Ok(())
     })?;
 
-    let mut recorder = recorder.ok_or_else(|| miette!("the run has not begun"))?;
+    let mut recorder = recorder.ok_or_else(|| LabError::failed("the run has not begun"))?;
 
     Ok(recorder.finish(&simulation)?)
 }
@@ -101,8 +102,8 @@ fn has_changed(name: &RobotName, record: &TickRecord) -> bool {
 fn wait_until(
     begun: Instant,
     due_s: f64,
-    goes_on: &mut impl FnMut() -> miette::Result<()>,
-) -> miette::Result<()> {
+    goes_on: &mut impl FnMut() -> Result<(), LabError>,
+) -> Result<(), LabError> {
     let due = Duration::try_from_secs_f64(due_s).unwrap_or(Duration::MAX);
     loop {
         let left = due.saturating_sub(begun.elapsed());
@@ -123,8 +124,8 @@ fn wait_until(
 pub fn play(
     scenario: Scenario,
     run: &RunName,
-    mut each: impl FnMut(&Simulation, &TickRecord) -> miette::Result<()>,
-) -> miette::Result<Simulation> {
+    mut each: impl FnMut(&Simulation, &TickRecord) -> Result<(), LabError>,
+) -> Result<Simulation, LabError> {
     play_with_robots(scenario, run, &of_class, |local, record, _| {
         each(&local.simulation, record)
     })
@@ -135,13 +136,13 @@ fn play_with_robots(
     scenario: Scenario,
     run: &RunName,
     make: Make<'_>,
-    mut each: impl FnMut(&Local, &TickRecord, Instant) -> miette::Result<()>,
-) -> miette::Result<Simulation> {
+    mut each: impl FnMut(&Local, &TickRecord, Instant) -> Result<(), LabError>,
+) -> Result<Simulation, LabError> {
     check_faults(&scenario, 0)?;
     let robots = make_robots_with(&scenario, Path::new("the scenario"), make)?;
     let mut local = Local::with_robots(scenario, 1, run, robots)?;
     let opened = Instant::now();
-    let record = local.simulation.init(&mut local.robots).into_diagnostic()?;
+    let record = local.simulation.init(&mut local.robots)?;
     each(&local, &record, opened)?;
 
     go_on_with(&mut local, run, make, each)?;
@@ -155,8 +156,8 @@ fn play_with_robots(
 pub(crate) fn go_on(
     local: &mut Local,
     run: &RunName,
-    each: impl FnMut(&Local, &TickRecord, Instant) -> miette::Result<()>,
-) -> miette::Result<()> {
+    each: impl FnMut(&Local, &TickRecord, Instant) -> Result<(), LabError>,
+) -> Result<(), LabError> {
     go_on_with(local, run, &of_class, each)
 }
 
@@ -164,12 +165,12 @@ fn go_on_with(
     local: &mut Local,
     run: &RunName,
     make: Make<'_>,
-    mut each: impl FnMut(&Local, &TickRecord, Instant) -> miette::Result<()>,
-) -> miette::Result<()> {
+    mut each: impl FnMut(&Local, &TickRecord, Instant) -> Result<(), LabError>,
+) -> Result<(), LabError> {
     while local.simulation.tick() < local.simulation.scenario().ticks {
         let opened = Instant::now();
         local.carry_out_faults_with(run, make)?;
-        let record = local.simulation.step(&mut local.robots).into_diagnostic()?;
+        let record = local.simulation.step(&mut local.robots)?;
         each(local, &record, opened)?;
     }
 
@@ -192,7 +193,7 @@ impl Local {
     ///
     /// # Errors
     /// If the scenario cannot be set up, or a class of robots cannot run in this process.
-    pub fn new(scenario: Scenario, run: &RunName) -> miette::Result<Self> {
+    pub fn new(scenario: Scenario, run: &RunName) -> Result<Self, LabError> {
         let robots = make_robots(&scenario, Path::new("the scenario"))?;
         Self::with_robots(scenario, 1, run, robots)
     }
@@ -206,7 +207,7 @@ impl Local {
         epoch: Epoch,
         run: &RunName,
         robots: BTreeMap<RobotName, Box<dyn Robot>>,
-    ) -> miette::Result<Self> {
+    ) -> Result<Self, LabError> {
         Self::with_runners(scenario, epoch, |simulation| {
             runners(simulation, run, robots)
         })
@@ -221,7 +222,7 @@ impl Local {
         epoch: Epoch,
         run: &RunName,
         robots: BTreeMap<RobotName, Box<dyn Robot>>,
-    ) -> miette::Result<Self> {
+    ) -> Result<Self, LabError> {
         Self::with_runners(scenario, epoch, |simulation| {
             let mut runners = runners(simulation, run, robots);
             for (_, welcome) in &mut runners {
@@ -235,8 +236,8 @@ impl Local {
         scenario: Scenario,
         epoch: Epoch,
         runners: impl FnOnce(&mut Simulation) -> Vec<(Box<dyn Robot>, Welcome)>,
-    ) -> miette::Result<Self> {
-        let mut simulation = Simulation::new(scenario, epoch).into_diagnostic()?;
+    ) -> Result<Self, LabError> {
+        let mut simulation = Simulation::new(scenario, epoch).map_err(LabError::refused)?;
         let runners = runners(&mut simulation);
         Ok(Self {
             simulation,
@@ -248,7 +249,7 @@ impl Local {
     ///
     /// # Errors
     /// If a robot that comes back is of a class that cannot run in this process.
-    pub fn carry_out_faults(&mut self, run: &RunName) -> miette::Result<()> {
+    pub fn carry_out_faults(&mut self, run: &RunName) -> Result<(), LabError> {
         self.carry_out_faults_with(run, &of_class)
     }
 
@@ -256,7 +257,7 @@ impl Local {
     ///
     /// # Errors
     /// As [`Self::carry_out_faults`].
-    pub fn carry_out_faults_with(&mut self, run: &RunName, make: Make<'_>) -> miette::Result<()> {
+    pub fn carry_out_faults_with(&mut self, run: &RunName, make: Make<'_>) -> Result<(), LabError> {
         let orders = self.simulation.faults_due();
         let next = self.simulation.tick() + 1;
         let lateness = self.simulation.scenario().lateness_at(next).clone();
@@ -286,7 +287,7 @@ impl Local {
     }
 
     /// Starts a robot that is stopped, as a further incarnation.
-    fn start(&mut self, name: &RobotName, run: &RunName, make: Make<'_>) -> miette::Result<()> {
+    fn start(&mut self, name: &RobotName, run: &RunName, make: Make<'_>) -> Result<(), LabError> {
         let scenario = self.simulation.scenario();
         let mut robots = make_robots_with(scenario, Path::new("the scenario"), make)?;
         if let Some(robot) = robots.remove(name) {
@@ -319,11 +320,16 @@ fn runners(
 ///
 /// # Errors
 /// If a robot refuses them.
-pub fn check_parameters(scenario: &Scenario, after: Tick) -> miette::Result<()> {
+pub fn check_parameters(scenario: &Scenario, after: Tick) -> Result<(), LabError> {
     for (name, parameters) in scenario.parameters_from(after + 1) {
         let robot = robots::make(&scenario.robots[&name].class);
         if let Some(check) = robot.and_then(|robot| robot.parameters_check()) {
-            check(&parameters).map_err(|reason| miette!("parameters of {name}: {reason}"))?;
+            check(&parameters).map_err(|reason| {
+                RobotError::from(BadParameters {
+                    robot: name.clone(),
+                    reason,
+                })
+            })?;
         }
     }
     Ok(())
@@ -334,7 +340,7 @@ pub fn check_parameters(scenario: &Scenario, after: Tick) -> miette::Result<()> 
 ///
 /// # Errors
 /// If there is another fault.
-pub fn check_faults(scenario: &Scenario, after: Tick) -> miette::Result<()> {
+pub fn check_faults(scenario: &Scenario, after: Tick) -> Result<(), LabError> {
     let changed = scenario.changes.iter().flat_map(|change| &change.faults);
     for fault in scenario.faults.iter().chain(changed) {
         let is_simulated = !matches!(fault.end, FaultEnd::After(_));
@@ -347,12 +353,13 @@ pub fn check_faults(scenario: &Scenario, after: Tick) -> miette::Result<()> {
             OnLate::Abort => false,
         };
         if fault.at > after && !is_played {
-            return Err(miette!(
-                help = "play it with `cars launch`, or leave faults out with --set 'fault=[]'; a crash or hang can be played without a \
-                        process with `until` under on_late = \"continue\", and with `for` under on_late = \"wait\"",
+            return Err(LabError::refused(format!(
                 "the fault of {} at tick {} needs a process of its own",
-                fault.robot,
-                fault.at
+                fault.robot, fault.at
+            ))
+            .with_help(
+                "play it with `cars launch`, or leave faults out with --set 'fault=[]'; a crash or hang can be played without a \
+                 process with `until` under on_late = \"continue\", and with `for` under on_late = \"wait\"",
             ));
         }
     }
@@ -375,7 +382,7 @@ fn of_class(_: &RobotName, class: &str) -> Option<Box<dyn Robot>> {
 pub fn make_robots(
     scenario: &Scenario,
     file: &Path,
-) -> miette::Result<BTreeMap<RobotName, Box<dyn Robot>>> {
+) -> Result<BTreeMap<RobotName, Box<dyn Robot>>, LabError> {
     make_robots_with(scenario, file, &of_class)
 }
 
@@ -387,16 +394,18 @@ pub fn make_robots_with(
     scenario: &Scenario,
     file: &Path,
     make: Make<'_>,
-) -> miette::Result<BTreeMap<RobotName, Box<dyn Robot>>> {
+) -> Result<BTreeMap<RobotName, Box<dyn Robot>>, LabError> {
     let mut robots = BTreeMap::new();
     for (name, spec) in &scenario.robots {
         let robot = make(name, &spec.class).ok_or_else(|| {
-            miette!(
-                help = "a robot of another kind runs as a process of its own: name it in a launch file and use `cars launch`",
+            LabError::refused(format!(
                 "{}: robot {name} is of class {:?}, and only {} can run in this process",
                 file.display(),
                 spec.class,
                 robots::CLASSES.join(", ")
+            ))
+            .with_help(
+                "a robot of another kind runs as a process of its own: name it in a launch file and use `cars launch`",
             )
         })?;
         robots.insert(name.clone(), robot);

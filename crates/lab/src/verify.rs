@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use config::{Changes, FileError};
-use miette::{IntoDiagnostic, WrapErr, miette};
 use protocol::{RobotName, RunName, Tick};
 use record::Record;
 use record::difference::{Difference, between, between_headers, between_summaries, in_recording};
@@ -16,6 +15,8 @@ use serde_json::Value;
 use simulator::Simulation;
 use simulator::recorder;
 
+use crate::error::LabError;
+use crate::folder::not_a_summary;
 use crate::reexecution::Reexecution;
 
 /// What came of a verification.
@@ -40,7 +41,7 @@ pub struct Verification {
 /// # Errors
 /// If the record cannot be read or is damaged where nothing differs, the scenario cannot be set up, or a robot is to be taken
 /// from the record and the record has no reports.
-pub fn verify(files: &EpochFiles) -> miette::Result<Verification> {
+pub fn verify(files: &EpochFiles) -> Result<Verification, LabError> {
     let mut record = Record::open(files)?;
     let scenario = Scenario::load(&files.scenario, &Changes::default())?;
     let has_recording = scenario.record.frames;
@@ -65,7 +66,7 @@ pub fn verify(files: &EpochFiles) -> miette::Result<Verification> {
     let mut next = record.next_entry()?;
     if next.is_none() {
         let events = files.events.display();
-        return Err(miette!("{events} has no complete tick"));
+        return Err(LabError::record(format!("{events} has no complete tick")));
     }
     while let Some(recorded) = next {
         let executed = again.play(&recorded)?;
@@ -93,7 +94,7 @@ pub fn verify(files: &EpochFiles) -> miette::Result<Verification> {
         // What nothing depends on may be damaged, too.
         seal::check(&files.events)?;
         if let Some(recording) = record.recording() {
-            recording.check().into_diagnostic()?;
+            recording.check()?;
         }
         check_end(files, &record, &verification, has_recording)?;
         if verification.has_end && is_last(files) {
@@ -122,12 +123,15 @@ fn summary_difference(
     files: &EpochFiles,
     record: &Record,
     executed: &Summary,
-) -> miette::Result<Option<Difference>> {
+) -> Result<Option<Difference>, LabError> {
     let Some((path, mut written)) = read_summary(files)? else {
         return Ok(None);
     };
     if written.get("wall").is_none_or(|wall| !wall.is_object()) {
-        return Err(miette!("{} is not a summary", path.display()));
+        return Err(LabError::record(format!(
+            "{} is not a summary",
+            path.display()
+        )));
     }
     // Another version counts other things.
     let version = match record.recording() {
@@ -143,9 +147,9 @@ fn summary_difference(
             let recorded = &mut written["robots"][name.as_str()];
             if recorded.is_object() {
                 recorded["emotions_s"] =
-                    serde_json::to_value(&robot.emotions_s).into_diagnostic()?;
+                    serde_json::to_value(&robot.emotions_s).map_err(LabError::failed)?;
                 recorded["behaviors_s"] =
-                    serde_json::to_value(&robot.behaviors_s).into_diagnostic()?;
+                    serde_json::to_value(&robot.behaviors_s).map_err(LabError::failed)?;
             }
         }
     }
@@ -153,7 +157,7 @@ fn summary_difference(
 }
 
 /// Checks that a summary names the run and the version of the recording beside it.
-fn check_run(files: &EpochFiles, record: &Record) -> miette::Result<()> {
+fn check_run(files: &EpochFiles, record: &Record) -> Result<(), LabError> {
     let (Some((path, written)), Some(recording)) = (read_summary(files)?, record.recording())
     else {
         return Ok(());
@@ -162,13 +166,15 @@ fn check_run(files: &EpochFiles, record: &Record) -> miette::Result<()> {
     let header = recording.header();
     if written["run"] != header.run.as_str() || written["version"] != header.version.as_str() {
         let place = path.display();
-        return Err(miette!("{place} is that of another run than the recording"));
+        return Err(LabError::record(format!(
+            "{place} is that of another run than the recording"
+        )));
     }
     Ok(())
 }
 
 /// The summary beside the record of an epoch, if there is one.
-fn read_summary(files: &EpochFiles) -> miette::Result<Option<(PathBuf, Value)>> {
+fn read_summary(files: &EpochFiles) -> Result<Option<(PathBuf, Value)>, LabError> {
     let path = files.events.with_file_name(SUMMARY);
     if !path.exists() {
         return Ok(None);
@@ -176,9 +182,7 @@ fn read_summary(files: &EpochFiles) -> miette::Result<Option<(PathBuf, Value)>> 
 
     let text =
         std::fs::read_to_string(&path).map_err(|error| FileError::unreadable(&path, &error))?;
-    let written = serde_json::from_str(&text)
-        .into_diagnostic()
-        .wrap_err_with(|| format!("{} is not a summary", path.display()))?;
+    let written = serde_json::from_str(&text).map_err(|error| not_a_summary(&path, &error))?;
     Ok(Some((path, written)))
 }
 
@@ -189,16 +193,17 @@ fn header_difference(record: &Record, simulation: &Simulation) -> Option<Differe
 }
 
 /// Checks that the scenario beside the record is the one that the recording contains.
-pub(crate) fn check_scenario(files: &EpochFiles, recording: &Recording) -> miette::Result<()> {
-    let recorded = recording.scenario().into_diagnostic()?;
+pub(crate) fn check_scenario(files: &EpochFiles, recording: &Recording) -> Result<(), LabError> {
+    let recorded = recording.scenario()?;
     let scenario = std::fs::read_to_string(&files.scenario)
         .map_err(|error| FileError::unreadable(&files.scenario, &error))?;
     if scenario != recorded {
-        return Err(miette!(
-            help =
-                "the recording contains the scenario of the run, as the attachment scenario.toml",
+        return Err(LabError::record(format!(
             "{} was changed since the run",
             files.scenario.display()
+        ))
+        .with_help(
+            "the recording contains the scenario of the run, as the attachment scenario.toml",
         ));
     }
     Ok(())
@@ -210,37 +215,37 @@ fn check_end(
     record: &Record,
     verification: &Verification,
     has_recording: bool,
-) -> miette::Result<()> {
+) -> Result<(), LabError> {
     let events = files.events.display();
     let recording = files.recording.display();
     let last = verification.ticks;
 
     let summary = files.events.with_file_name(SUMMARY);
     if !verification.has_end && is_last(files) && summary.exists() {
-        return Err(miette!(
+        return Err(LabError::record(format!(
             "{events} ends at tick {last} without an end of the run, and the run has ended: it has a summary"
-        ));
+        )));
     }
     match record.recording() {
-        None if has_recording && verification.has_end => Err(miette!(
+        None if has_recording && verification.has_end => Err(LabError::record(format!(
             "the run was recorded, and {recording} is not there"
-        )),
+        ))),
         Some(file) if verification.has_end && !file.is_finished() && file.len() == last + 1 => {
-            Err(miette!(
-                help = "`mcap recover` writes the end of the file, which has the index",
+            Err(LabError::record(format!(
                 "{recording} is unfinished: it has all ticks, and its end is missing"
             ))
+            .with_help("`mcap recover` writes the end of the file, which has the index"))
         }
         Some(file) if verification.has_end && (!file.is_finished() || file.len() != last + 1) => {
-            Err(miette!(
+            Err(LabError::record(format!(
                 "{recording} is not whole: it has {} complete ticks, and the events go to the end at tick {last}",
                 file.len()
-            ))
+            )))
         }
-        Some(file) if file.len() > last + 1 => Err(miette!(
+        Some(file) if file.len() > last + 1 => Err(LabError::record(format!(
             "{events} ends at tick {last}, and {recording} has {} ticks",
             file.len()
-        )),
+        ))),
         _ => Ok(()),
     }
 }

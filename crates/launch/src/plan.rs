@@ -404,7 +404,7 @@ mod tests {
 
         let text = text.replace("\"--\", \"./sh\"", "\"--\", \"./none\"");
         let wrong = located(&parse(&text)).unwrap_err();
-        let wrong = config::render_plain(&wrong, None);
+        let wrong = config::render_plain(&wrong, None, 200);
         assert!(wrong.contains("there is no program ./none"), "{wrong}");
     }
 

@@ -3,31 +3,39 @@
 use std::fmt::Display;
 use std::str::FromStr;
 
-use miette::{MietteHandlerOpts, Report};
+use config::render_plain;
+use lab::LabError;
 use pyo3::{PyErr, PyResult, import_exception};
 
 import_exception!(cars._errors, Error);
 import_exception!(cars._errors, BadArgument);
+import_exception!(cars._errors, FileError);
+import_exception!(cars._errors, RecordError);
+import_exception!(cars._errors, RefusedError);
+import_exception!(cars._errors, RobotError);
 import_exception!(cars._errors, HostError);
 import_exception!(cars._errors, UnknownRobot);
 import_exception!(cars._errors, Unreachable);
 import_exception!(cars._errors, TooEarly);
 import_exception!(cars._errors, Interrupted);
 
-/// Has errors written as on the command line where its standard error is a file: no colors, no links.
-pub(crate) fn print_without_colors() {
-    let hook = miette::set_hook(Box::new(|_| {
-        let handler = MietteHandlerOpts::new().color(false).terminal_links(false);
-        Box::new(handler.build())
-    }));
-    // Set before by an earlier import in the same process, with the same effect.
-    drop(hook);
-}
+/// Columns of an error: those of the command line where its standard error is a file.
+const COLUMNS: usize = 80;
 
-/// The exception of an error with file, line and caret.
-pub(crate) fn reported(error: impl Into<Report>) -> PyErr {
-    let report: Report = error.into();
-    Error::new_err(format!("{report:?}"))
+/// The exception of an error of the libraries, with its causes, its help, and the place in a file with line and caret.
+pub(crate) fn reported(error: impl Into<LabError>) -> PyErr {
+    let error = error.into();
+    let text = match error.file() {
+        Some(file) => render_plain(file, None, COLUMNS),
+        None => render_plain(&error, error.help(), COLUMNS),
+    };
+    match error {
+        LabError::File(_) => FileError::new_err(text),
+        LabError::Record(_) => RecordError::new_err(text),
+        LabError::Robot(_) => RobotError::new_err(text),
+        LabError::Refused { .. } => RefusedError::new_err(text),
+        LabError::Failed(_) | LabError::Interrupted => Error::new_err(text),
+    }
 }
 
 /// The exception of an error in words.

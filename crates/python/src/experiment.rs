@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use config::units::Time;
 use experiments::engine::{self, Options, Queue};
 use experiments::{Experiment, Plan, Provenance, Request, Results, Robots, Store};
-use miette::miette;
+use lab::LabError;
 use protocol::random::MAX_SEED;
 use pyo3::prelude::*;
 
@@ -99,7 +99,7 @@ fn play(
     jobs: usize,
     retries_failed: bool,
     stopper: &Mutex<Option<Arc<AtomicBool>>>,
-) -> miette::Result<()> {
+) -> Result<(), LabError> {
     let plan = Plan::new(request)?;
     plan.check()?;
     plan.check_begins()?;
@@ -125,10 +125,10 @@ fn play(
         &|| {},
     )?;
     if !plan.is_in(folder)? {
-        return Err(miette!(
+        return Err(LabError::refused(format!(
             "another process has written another plan to {}",
             folder.display()
-        ));
+        )));
     }
     Results::of(plan, &store).write(folder)?;
     Provenance::here().write(folder)?;

@@ -20,8 +20,6 @@ use pyo3::prelude::*;
 /// What the package `cars` is made of.
 #[pymodule]
 fn _cars(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    error::print_without_colors();
-
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<cars::Cars>()?;
     module.add_class::<stream::Stream>()?;

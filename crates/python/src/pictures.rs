@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use experiments::PLAN;
+use lab::LabError;
 use lab::folder::{recorded_epoch, recorded_epochs};
 use lab::moment::Moment;
 use pictures::Page;
@@ -27,7 +28,7 @@ pub(crate) fn figures(py: Python<'_>, folders: Vec<PathBuf>) -> PyResult<Vec<Str
         .map_err(reported)
 }
 
-fn page(folders: Vec<PathBuf>) -> miette::Result<Page> {
+fn page(folders: Vec<PathBuf>) -> Result<Page, LabError> {
     if let [folder] = &folders[..]
         && folder.join(PLAN).exists()
     {
@@ -52,7 +53,7 @@ pub(crate) fn diagram(
         to: to.map(str::parse::<Moment>).transpose().map_err(plain)?,
     };
 
-    let drawn = py.detach(|| -> miette::Result<_> {
+    let drawn = py.detach(|| -> Result<_, LabError> {
         let folder = RunFolder::at(run);
         let files = recorded_epoch(&folder, None)?;
         let mut title = folder.title();

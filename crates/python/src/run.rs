@@ -8,10 +8,10 @@ use ::export::tables;
 use config::shipped::{self, LAUNCHES, SCENARIOS};
 use config::units::Time;
 use config::{Override, Speed, seed};
+use lab::LabError;
 use lab::folder::{find as find_folder, read_summary, recorded_epochs};
 use lab::run::{check_faults, execute_with};
 use launch::{RunOptions, scenario_file};
-use miette::{IntoDiagnostic, miette};
 use pyo3::prelude::*;
 use record::{IfTaken, RunFolder};
 use scenario::Scenario;
@@ -87,7 +87,7 @@ fn play(
     let goes_on = || {
         watch.borrow_mut().look().map_err(|error| {
             failure.set(error);
-            miette!("interrupted")
+            LabError::Interrupted
         })
     };
     let make = |name: &_, class: &_| makers.make(name, class);
@@ -122,9 +122,9 @@ pub(crate) fn find(out: PathBuf, run: PathBuf) -> PyResult<(PathBuf, Option<Stri
 /// Writes the tables of a run to a folder, as CSV. Returns what they leave out, a sentence each.
 #[pyfunction]
 pub(crate) fn export(py: Python<'_>, run: PathBuf, into: PathBuf) -> PyResult<Vec<String>> {
-    let exported = py.detach(|| -> miette::Result<_> {
-        let epochs = recorded_epochs(&RunFolder::at(run)).into_diagnostic()?;
-        Ok(tables::write(&epochs, &into)?)
+    let exported = py.detach(|| {
+        let epochs = recorded_epochs(&RunFolder::at(run))?;
+        Ok::<_, LabError>(tables::write(&epochs, &into)?)
     });
     let mut exported = exported.map_err(reported)?;
     exported.notes.append(&mut exported.damage);

@@ -250,7 +250,8 @@ impl Record {
             return Err(FileError::new(format!(
                 "the recording has events of tick {before} that {} does not have",
                 self.path.display()
-            )));
+            ))
+            .of_record());
         }
         let tick = recorded.next_tick().map_err(|error| unreadable(&error))?;
         let Some(mut tick) = tick else {
@@ -284,10 +285,12 @@ impl Record {
         let path = self.path.display();
         FileError::new(format!("{path}, line {}: {error}", self.number))
             .with_help("the record is damaged: `cars check` says how far it is good")
+            .of_record()
     }
 }
 
 fn unreadable(error: &RecordingError) -> FileError {
     FileError::new(error.to_string())
         .with_help("the recording is damaged: nothing can be said of what the robots reported")
+        .of_record()
 }

@@ -145,7 +145,8 @@ impl RawLines {
     /// # Errors
     /// [`FileError`] if it cannot be read.
     pub(crate) fn open(path: &Path) -> Result<Self, FileError> {
-        let file = File::open(path).map_err(|error| FileError::unreadable(path, &error))?;
+        let file =
+            File::open(path).map_err(|error| FileError::unreadable(path, &error).of_record())?;
         Ok(Self {
             path: path.to_owned(),
             reader: BufReader::new(file),
@@ -162,7 +163,7 @@ impl RawLines {
             // A file without line breaks must not be read into memory as one line.
             .take(MAX_LINE)
             .read_until(b'\n', &mut bytes)
-            .map_err(|error| FileError::unreadable(&self.path, &error))?;
+            .map_err(|error| FileError::unreadable(&self.path, &error).of_record())?;
         if count == 0 {
             return Ok(None);
         }
@@ -232,4 +233,5 @@ fn damaged(path: &Path, checked: &Checked, reason: &str) -> FileError {
         "the record is good up to the end of tick {}; execute the run again from its scenario.toml",
         checked.tick
     ))
+    .of_record()
 }

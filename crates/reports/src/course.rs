@@ -7,6 +7,7 @@ use timeline::Kind;
 
 use super::facts::{RobotFacts, RunFacts};
 use crate::diagram::{Options, Window, draw};
+use lab::LabError;
 use lab::moment::Moment;
 
 /// How a space-time diagram is read.
@@ -66,7 +67,7 @@ pub(super) fn diagram_lines(
     name: &str,
     facts: &RunFacts,
     files: &EpochFiles,
-) -> miette::Result<DiagramLines> {
+) -> Result<DiagramLines, LabError> {
     let ticks = facts.last_tick + 1;
     // A short rest is not a line of its own.
     let count = ((ticks + LINE_TICKS / 2) / LINE_TICKS).clamp(1, MAX_LINES);

@@ -3,7 +3,6 @@
 
 use std::collections::BTreeMap;
 
-use miette::miette;
 use pictures::diagram::Diagram;
 use protocol::messages::Awaited;
 use protocol::{Event, Tick};
@@ -14,6 +13,7 @@ use timeline::Timeline;
 
 pub use pictures::diagram::Options;
 
+use lab::LabError;
 use lab::moment::Moment;
 
 /// The part of a run that is drawn, both ends included.
@@ -38,20 +38,20 @@ pub struct Drawn {
 ///
 /// # Errors
 /// If its events cannot be read, it has no tick in the window, or the window has too much for a diagram.
-pub fn draw(files: &EpochFiles, window: Window, mut options: Options) -> miette::Result<Drawn> {
+pub fn draw(files: &EpochFiles, window: Window, mut options: Options) -> Result<Drawn, LabError> {
     let events = files.events.display();
     let mut record = Record::of_events(&files.events)?;
     let mut next = record.next_entry()?;
     let Some((seed, tick_s)) = next.as_ref().and_then(beginning) else {
-        return Err(miette!("{events} has no complete tick"));
+        return Err(LabError::record(format!("{events} has no complete tick")));
     };
     options.title += &format!(", seed {seed}");
     let from = window.from.map_or(0, |moment| moment.tick(tick_s));
     let to = window.to.map_or(Tick::MAX, |moment| moment.tick(tick_s));
     if from > to {
-        return Err(miette!(
+        return Err(LabError::refused(format!(
             "the window is empty: tick {from} comes after tick {to}"
-        ));
+        )));
     }
 
     let mut timeline = Timeline::default();
@@ -60,9 +60,9 @@ pub fn draw(files: &EpochFiles, window: Window, mut options: Options) -> miette:
         next = record.next_entry()?;
         if next.is_none() {
             let last = entry.tick;
-            return Err(miette!(
+            return Err(LabError::refused(format!(
                 "the window begins with tick {from}, and {events} ends with tick {last}"
-            ));
+            )));
         }
     }
 
@@ -97,10 +97,7 @@ pub fn draw(files: &EpochFiles, window: Window, mut options: Options) -> miette:
     }
 
     let svg = diagram.to_svg().map_err(|error| {
-        miette!(
-            help = "draw a part of the run with --from and --to",
-            "{error}"
-        )
+        LabError::refused(error).with_help("draw a part of the run with --from and --to")
     })?;
     Ok(Drawn { svg, notes })
 }

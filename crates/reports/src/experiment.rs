@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use miette::{IntoDiagnostic, miette};
 use observe::{Measure, Measured};
 use pictures::{Cell, Figure, Page, Table, Text};
 use protocol::RunName;
@@ -20,6 +19,7 @@ use super::transitions::transitions;
 use super::words::{capitalized, counted, utc};
 use experiments::shell;
 use experiments::{Example, Outcome, Provenance, Results, Robots, Shown};
+use lab::LabError;
 use lab::folder::recorded_epoch;
 use lab::run::execute;
 
@@ -39,22 +39,21 @@ const EXAMPLE_PARTS: [Shown; 3] = [Shown::Runs, Shown::Transitions, Shown::Floor
 ///
 /// # Errors
 /// If it is not the folder of an experiment, none of its units has been played, or a file cannot be read.
-pub fn of_experiment(folder: &Path) -> miette::Result<Page> {
+pub fn of_experiment(folder: &Path) -> Result<Page, LabError> {
     let results = Results::load(folder)?;
     if let (true, Some(first)) = (results.outcomes.is_empty(), results.failures.first()) {
-        return Err(miette!(
-            help = "the reasons of all: `cars experiment merge`",
+        return Err(LabError::refused(format!(
             "every unit that was played has failed, the first one, {}: {}",
-            first.unit,
-            first.reason
-        ));
+            first.unit, first.reason
+        ))
+        .with_help("the reasons of all: `cars experiment merge`"));
     }
     if results.outcomes.is_empty() {
-        return Err(miette!(
-            help = "play it with `cars experiment run`",
+        return Err(LabError::refused(format!(
             "no unit of the experiment in {} has been played",
             folder.display()
-        ));
+        ))
+        .with_help("play it with `cars experiment run`"));
     }
     let provenance = Provenance::load(folder)?;
     let study = Study::of(&results);
@@ -343,21 +342,21 @@ fn write_example(
 }
 
 /// Plays a unit again, recorded in a temporary folder, and shows its course.
-fn write_course(page: &mut Page, study: &Study<'_>, outcome: &Outcome) -> miette::Result<()> {
+fn write_course(page: &mut Page, study: &Study<'_>, outcome: &Outcome) -> Result<(), LabError> {
     let plan = &study.results.plan;
     let unit = plan.unit(outcome.unit);
     let mut scenario =
         plan.scenario_of(&unit, &|| unreachable!("its robots run in this process"))?;
     scenario.record.frames = study.shows(Shown::Floor);
-    let place = tempfile::tempdir().into_diagnostic()?;
-    let run = RunName::new("unit").into_diagnostic()?;
+    let place = tempfile::tempdir().map_err(LabError::failed)?;
+    let run = RunName::unknown();
     let recorded = RunFolder::new(place.path(), &run);
     let lock = recorded.create(&scenario)?;
     let summary = execute(scenario, &run, &recorded, None)?;
     drop(lock);
     if summary.digest != outcome.digest {
-        return Err(miette!(
-            "played again, it is another run than that of the results: the program is another one"
+        return Err(LabError::failed(
+            "played again, it is another run than that of the results: the program is another one",
         ));
     }
 
@@ -389,7 +388,7 @@ fn write_course(page: &mut Page, study: &Study<'_>, outcome: &Outcome) -> miette
 }
 
 /// Emotions over time and the space-time diagram of a unit.
-fn course(outcome: &Outcome, facts: &RunFacts, files: &EpochFiles) -> miette::Result<Figure> {
+fn course(outcome: &Outcome, facts: &RunFacts, files: &EpochFiles) -> Result<Figure, LabError> {
     let mut panels = Vec::from_iter(run_panel(facts, Kind::Emotion));
     let diagram = diagram_lines(&format!("unit {}", outcome.unit), facts, files)?;
     panels.extend(diagram.lines);

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use config::FileError;
+use lab::LabError;
 use pictures::{Band, Floor};
 use protocol::messages::{End, Verdict};
 use protocol::time::time_s;
@@ -83,8 +83,8 @@ impl RunFacts {
     /// Reads the facts about an epoch.
     ///
     /// # Errors
-    /// [`FileError`] if its events cannot be read or have no complete tick.
-    pub(super) fn read(files: &EpochFiles) -> Result<Self, FileError> {
+    /// If its events cannot be read or have no complete tick.
+    pub(super) fn read(files: &EpochFiles) -> Result<Self, LabError> {
         let mut facts = Self::default();
         let mut record = Record::of_events(&files.events)?;
         let mut timeline = Timeline::default();
@@ -104,7 +104,7 @@ impl RunFacts {
         }
         if is_empty {
             let path = files.events.display();
-            return Err(FileError::new(format!("{path} has no complete tick"))
+            return Err(LabError::record(format!("{path} has no complete tick"))
                 .with_help("a run that has just begun has nothing to report yet"));
         }
 

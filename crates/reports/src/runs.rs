@@ -3,7 +3,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
-use miette::miette;
 use pictures::{BandRow, Cell, Figure, Page, Panel, Table, Text};
 use protocol::messages::{End, Variable};
 use protocol::time::{self, tick_seconds, time_s};
@@ -18,6 +17,7 @@ use super::limits::panels;
 use super::transitions::transitions;
 use super::words::counted;
 use experiments::shell;
+use lab::LabError;
 use lab::folder::{read_summary, recorded_epoch};
 
 /// Most runs of a report.
@@ -43,12 +43,14 @@ struct ReportedRun {
 ///
 /// # Errors
 /// If there is no run or there are too many, or one cannot be read.
-pub fn of_runs(folders: &[RunFolder]) -> miette::Result<Page> {
+pub fn of_runs(folders: &[RunFolder]) -> Result<Page, LabError> {
     if folders.len() > MAX_RUNS {
-        return Err(miette!(
-            help = "compare many runs by an experiment: `cars experiment run FILE`, then `cars report` with its folder",
+        return Err(LabError::refused(format!(
             "a report shows at most {MAX_RUNS} runs, and these are {}",
             folders.len()
+        ))
+        .with_help(
+            "compare many runs by an experiment: `cars experiment run FILE`, then `cars report` with its folder",
         ));
     }
     let mut runs = Vec::new();
@@ -56,7 +58,7 @@ pub fn of_runs(folders: &[RunFolder]) -> miette::Result<Page> {
         runs.push(ReportedRun::read(folder)?);
     }
     let Some(first) = runs.first() else {
-        return Err(miette!("there is no run to report"));
+        return Err(LabError::refused("there is no run to report"));
     };
 
     let title = match runs.len() {
@@ -89,7 +91,7 @@ pub fn of_runs(folders: &[RunFolder]) -> miette::Result<Page> {
 }
 
 impl ReportedRun {
-    fn read(folder: &RunFolder) -> miette::Result<Self> {
+    fn read(folder: &RunFolder) -> Result<Self, LabError> {
         let files = recorded_epoch(folder, None)?;
         let facts = RunFacts::read(&files)?;
         let summary = read_summary(folder)?.filter(|summary| summary.digest == facts.digest);

@@ -20,7 +20,7 @@ fn parse(text: &str) -> Result<Scenario, FileError> {
 
 /// The error as people see it, without colors.
 fn shown(error: &FileError) -> String {
-    config::render_plain(error, None)
+    config::render_plain(error, None, 200)
 }
 
 #[test]

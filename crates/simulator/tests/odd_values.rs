@@ -207,7 +207,7 @@ fn changed(text: &str, at: usize, change: &Change) -> String {
 
 /// Whether people are shown the file, a line and a caret.
 fn check_shown(error: &FileError) {
-    let shown = config::render_plain(error, None);
+    let shown = config::render_plain(error, None, 200);
     assert!(
         shown.contains("[odd.toml") && shown.contains('╰'),
         "{shown}"

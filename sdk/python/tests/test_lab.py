@@ -177,6 +177,25 @@ def test_errors_have_the_text_of_the_command_line(
         assert "wrong.toml:2" in str(raised.value) and "\x1b" not in str(raised.value)
 
 
+def test_errors_can_be_told_apart(lab: Lab) -> None:
+    wrong = lab.folder / "wrong.toml"
+    wrong.write_text('duration = "soon"\n')
+    with pytest.raises(cars.FileError, match="wrong.toml:1"):
+        cars.run(wrong)
+    with pytest.raises(cars.RecordError, match="there is no run other"):
+        cars.load("other", out=lab.folder)
+    with pytest.raises(cars.RefusedError, match="needs a process of its own"):
+        cars.run(PAPER, set={"fault": [{"robot": "Leguin", "kind": "crash", "at": "1 s", "until": "2 s"}]}, duration=5)
+    with pytest.raises(cars.RobotError, match="parameters of Leguin"):
+        cars.run(PAPER, set={"robot.Leguin.params.affect": "perhaps"}, duration=5)
+
+    damaged = cars.run(PAPER, out=lab.folder, duration=5)
+    events = damaged.folder / "events.jsonl"
+    events.write_text(events.read_text().replace("Leguin", "Vonda", 1))
+    with pytest.raises(cars.RecordError, match="line"):
+        _ = cars.load(damaged.folder).events
+
+
 LONG = """
 import sys, time
 import cars

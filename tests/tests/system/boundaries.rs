@@ -320,14 +320,11 @@ fn only_bus_names_the_middleware() {
     }
 }
 
-/// Crates whose errors are still reports of `miette`.
-const NOT_YET: [&str; 5] = ["lab", "experiments", "reports", "export", "python-module"];
-
 #[test]
 fn errors_are_rendered_in_one_crate() {
     for (name, dependencies) in dependencies() {
         // `bench` is a program for developers, a command line of its own.
-        let may = ["config", "bench"].contains(&name.as_str()) || NOT_YET.contains(&name.as_str());
+        let may = ["config", "bench"].contains(&name.as_str());
         let does = dependencies.contains("miette");
         assert!(!does || may, "{name} must not depend on miette");
     }

@@ -4,8 +4,8 @@ use std::fs::File;
 use std::io::{ErrorKind, Write};
 use std::path::{Component, Path, PathBuf};
 
-use config::shipped;
-use miette::{IntoDiagnostic, miette};
+use config::{FileError, shipped};
+use lab::LabError;
 use protocol::name::MAX_NAME_LEN;
 use protocol::plain::escape_line;
 use protocol::time::time_s;
@@ -37,13 +37,13 @@ pub(super) fn write(
     case: &Case,
     played: &Played,
     heading: Heading<'_>,
-) -> miette::Result<()> {
+) -> Result<(), LabError> {
     let folder = path.parent().unwrap_or(Path::new("."));
     let mut content = subject.content_of(case)?;
     rename_parameter_files(&mut content, &subject.folder, folder)?;
 
     let mut text = comment(path, subject, case, played, heading);
-    text += &toml::to_string(&content).into_diagnostic()?;
+    text += &toml::to_string(&content).map_err(LabError::failed)?;
     let mut draft = Draft::create(path)?;
     draft
         .write_all(text.as_bytes())
@@ -53,7 +53,7 @@ pub(super) fn write(
 }
 
 /// Makes an empty file with this name, or with a number behind it where there is one already: findings of other hunts stay.
-pub(super) fn reserve(path: &Path) -> miette::Result<PathBuf> {
+pub(super) fn reserve(path: &Path) -> Result<PathBuf, LabError> {
     for candidate in candidates(path) {
         match File::create_new(&candidate) {
             Ok(_) => return Ok(candidate),
@@ -61,18 +61,21 @@ pub(super) fn reserve(path: &Path) -> miette::Result<PathBuf> {
             Err(error) => return Err(unwritable(&candidate, &error).into()),
         }
     }
-    Err(miette!("{}: all names are taken", path.display()))
+    Err(LabError::refused(format!(
+        "{}: all names are taken",
+        path.display()
+    )))
 }
 
 /// Removes a file where an earlier hunt has written the same one, but for its name; returns the one that stays.
-pub(super) fn keep_one(path: PathBuf, named: &Path) -> miette::Result<PathBuf> {
+pub(super) fn keep_one(path: PathBuf, named: &Path) -> Result<PathBuf, LabError> {
     let own = text_without_names(&path)?;
     for candidate in candidates(named) {
         if candidate == path {
             break;
         }
         if text_without_names(&candidate).is_ok_and(|text| text == own) {
-            std::fs::remove_file(&path).into_diagnostic()?;
+            std::fs::remove_file(&path).map_err(LabError::failed)?;
             return Ok(candidate);
         }
     }
@@ -80,8 +83,9 @@ pub(super) fn keep_one(path: PathBuf, named: &Path) -> miette::Result<PathBuf> {
 }
 
 /// The text of a finding without the lines that have its name.
-fn text_without_names(path: &Path) -> miette::Result<String> {
-    let text = std::fs::read_to_string(path).into_diagnostic()?;
+fn text_without_names(path: &Path) -> Result<String, LabError> {
+    let text =
+        std::fs::read_to_string(path).map_err(|error| FileError::unreadable(path, &error))?;
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     let lines = text.lines().filter(|line| !line.contains(&*stem));
     Ok(lines.collect::<Vec<_>>().join("\n"))
@@ -169,7 +173,11 @@ fn described(fault: &PlannedFault, played: &Played, tick_s: f64) -> String {
 }
 
 /// Makes the names of parameter files relative to the folder of the new file.
-fn rename_parameter_files(content: &mut toml::Table, from: &Path, to: &Path) -> miette::Result<()> {
+fn rename_parameter_files(
+    content: &mut toml::Table,
+    from: &Path,
+    to: &Path,
+) -> Result<(), LabError> {
     let robots = content.get_mut("robot").and_then(Value::as_array_mut);
     for robot in robots.into_iter().flatten() {
         let Some(file) = robot.get_mut("params_from") else {
@@ -185,8 +193,8 @@ fn rename_parameter_files(content: &mut toml::Table, from: &Path, to: &Path) -> 
             continue;
         }
 
-        let path = path.canonicalize().into_diagnostic()?;
-        let folder = to.canonicalize().into_diagnostic()?;
+        let path = path.canonicalize().map_err(LabError::failed)?;
+        let folder = to.canonicalize().map_err(LabError::failed)?;
         *file = relative(&path, &folder).display().to_string().into();
     }
 

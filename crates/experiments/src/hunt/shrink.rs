@@ -484,6 +484,7 @@ mod tests {
     use super::super::fault::{Absence, Link};
     use super::super::trial::{Failure, SentMessage};
     use super::*;
+    use lab::LabError;
 
     const NAME: &str = "all is well";
 
@@ -539,7 +540,7 @@ mod tests {
     }
 
     impl Trial for Synthetic {
-        fn play(&self, case: &Case, _: &BTreeSet<String>) -> miette::Result<Played> {
+        fn play(&self, case: &Case, _: &BTreeSet<String>) -> Result<Played, LabError> {
             self.played.fetch_add(1, Ordering::Relaxed);
             let lost = numbers(case);
             let mut played = Played::default();
@@ -630,7 +631,7 @@ mod tests {
     fn a_fault_that_no_message_replaces_becomes_short() {
         struct Absent;
         impl Trial for Absent {
-            fn play(&self, case: &Case, _: &BTreeSet<String>) -> miette::Result<Played> {
+            fn play(&self, case: &Case, _: &BTreeSet<String>) -> Result<Played, LabError> {
                 let mut played = Played::default();
                 for fault in &case.faults {
                     if let PlannedFault::Absence { span, .. } = fault
@@ -670,7 +671,7 @@ mod tests {
     fn a_fault_moves_to_an_earlier_time() {
         struct Later;
         impl Trial for Later {
-            fn play(&self, case: &Case, _: &BTreeSet<String>) -> miette::Result<Played> {
+            fn play(&self, case: &Case, _: &BTreeSet<String>) -> Result<Played, LabError> {
                 let mut played = Played::default();
                 let does_fail = |fault: &PlannedFault| match fault {
                     PlannedFault::Absence { span, .. } => {
@@ -718,7 +719,7 @@ mod tests {
     fn what_is_left_of_the_scenario_does_not_fail_by_itself() {
         struct Lonely;
         impl Trial for Lonely {
-            fn play(&self, case: &Case, _: &BTreeSet<String>) -> miette::Result<Played> {
+            fn play(&self, case: &Case, _: &BTreeSet<String>) -> Result<Played, LabError> {
                 let mut played = Played::default();
                 let is_lonely = !case.without.is_empty();
                 if is_lonely || case.faults.contains(&lose(3)) {

@@ -5,7 +5,6 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
 use config::{Changes, Source};
-use miette::{IntoDiagnostic, miette};
 use protocol::messages::{End, Verdict};
 use protocol::{Event, RobotName, RunName, Tick};
 use robot::Robot;
@@ -16,6 +15,7 @@ use timeline::{Command, Counts, Kind, Span, Timeline};
 use super::case::Case;
 use super::coverage::{Fate, Feature};
 use super::fault::Link;
+use lab::LabError;
 use lab::run::{Local, check_faults, make_robots_with};
 
 /// What is expected of every run beside the expectations of its scenario.
@@ -68,7 +68,7 @@ pub trait Trial: Sync {
     ///
     /// # Errors
     /// If the case cannot be played.
-    fn play(&self, case: &Case, wanted: &BTreeSet<String>) -> miette::Result<Played>;
+    fn play(&self, case: &Case, wanted: &BTreeSet<String>) -> Result<Played, LabError>;
 }
 
 /// Makes a robot of a class; `None` if it makes no robots of that class.
@@ -93,7 +93,7 @@ impl Subject {
     ///
     /// # Errors
     /// If the scenario cannot be used, or cannot be played in one process.
-    pub fn load(file: &Path, changes: &Changes) -> miette::Result<Self> {
+    pub fn load(file: &Path, changes: &Changes) -> Result<Self, LabError> {
         Self::load_by(file, changes, robots::make)
     }
 
@@ -101,7 +101,7 @@ impl Subject {
     ///
     /// # Errors
     /// As [`Self::load`].
-    pub fn load_by(file: &Path, changes: &Changes, maker: Maker) -> miette::Result<Self> {
+    pub fn load_by(file: &Path, changes: &Changes, maker: Maker) -> Result<Self, LabError> {
         // Errors show the lines of the file.
         Scenario::load(file, changes)?;
 
@@ -125,7 +125,7 @@ impl Subject {
     ///
     /// # Errors
     /// As [`Self::load`].
-    pub fn of_file(&self, file: &Path) -> miette::Result<Self> {
+    pub fn of_file(&self, file: &Path) -> Result<Self, LabError> {
         Self::load_by(file, &Changes::default(), self.maker)
     }
 
@@ -133,13 +133,11 @@ impl Subject {
     ///
     /// # Errors
     /// If the file has no place for a change.
-    pub fn content_of(&self, case: &Case) -> miette::Result<toml::Table> {
+    pub fn content_of(&self, case: &Case) -> Result<toml::Table, LabError> {
         let changes = case.changes(&self.content, self.scenario.tick_s);
         let mut content = self.content.clone();
-        for change in changes.map_err(|reason| miette!("{reason}"))? {
-            content = change
-                .apply(content)
-                .map_err(|reason| miette!("{reason}"))?;
+        for change in changes.map_err(LabError::refused)? {
+            content = change.apply(content).map_err(LabError::refused)?;
         }
         Ok(content)
     }
@@ -148,10 +146,10 @@ impl Subject {
     ///
     /// # Errors
     /// If it is not a scenario: bodies overlap, or a robot is missing that something else names.
-    fn scenario_of(&self, case: &Case) -> miette::Result<Scenario> {
+    fn scenario_of(&self, case: &Case) -> Result<Scenario, LabError> {
         let source = Source {
             name: format!("{} (with the faults of a plan)", self.file.display()),
-            text: toml::to_string(&self.content_of(case)?).into_diagnostic()?,
+            text: toml::to_string(&self.content_of(case)?).map_err(LabError::failed)?,
         };
         Ok(Scenario::parse(&source, &self.folder)?)
     }
@@ -162,15 +160,15 @@ impl Subject {
         run: &RunName,
         wanted: &BTreeSet<String>,
         notes: &mut TrialNotes,
-    ) -> miette::Result<()> {
-        let record = local.simulation.init(&mut local.robots).into_diagnostic()?;
+    ) -> Result<(), LabError> {
+        let record = local.simulation.init(&mut local.robots)?;
         notes.note(&record);
         while local.simulation.tick() < local.simulation.scenario().ticks {
             if notes.has_failed(wanted) {
                 return Ok(());
             }
             local.carry_out_faults_with(run, &|_, class| (self.maker)(class))?;
-            let record = local.simulation.step(&mut local.robots).into_diagnostic()?;
+            let record = local.simulation.step(&mut local.robots)?;
             notes.note(&record);
         }
 
@@ -180,9 +178,9 @@ impl Subject {
 }
 
 impl Trial for Subject {
-    fn play(&self, case: &Case, wanted: &BTreeSet<String>) -> miette::Result<Played> {
+    fn play(&self, case: &Case, wanted: &BTreeSet<String>) -> Result<Played, LabError> {
         let scenario = self.scenario_of(case)?;
-        let run = RunName::new("hunt").into_diagnostic()?;
+        let run = RunName::unknown();
         let robots = make_robots_with(&scenario, &self.file, &|_, class| (self.maker)(class))?;
         let mut notes = TrialNotes::default();
         notes.played.expectations.insert(RUNS.to_owned());

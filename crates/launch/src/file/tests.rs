@@ -38,7 +38,7 @@ fn load(text: &str) -> Result<LaunchFile, FileError> {
 #[track_caller]
 fn refusal(text: &str) -> String {
     let error = load(text).expect_err("this file is to be refused");
-    config::render_plain(&error, None)
+    config::render_plain(&error, None, 200)
 }
 
 /// Every one of `words` is said about the file.

@@ -20,7 +20,21 @@ from ._data import (
     Welcome,
 )
 from ._entry import main, take_part
-from ._errors import BadArgument, BadParameters, CallError, Error, HostError, Interrupted, TooEarly, UnknownRobot, Unreachable
+from ._errors import (
+    BadArgument,
+    BadParameters,
+    CallError,
+    Error,
+    FileError,
+    HostError,
+    Interrupted,
+    RecordError,
+    RefusedError,
+    RobotError,
+    TooEarly,
+    UnknownRobot,
+    Unreachable,
+)
 from ._experiment import Experiment, Verdict, experiment
 from ._frames import Frames
 from ._pictures import Page, Picture
@@ -38,6 +52,7 @@ __all__ = [
     "Command",
     "Error",
     "Experiment",
+    "FileError",
     "Frames",
     "HostError",
     "Interrupted",
@@ -46,7 +61,10 @@ __all__ = [
     "Picture",
     "Point",
     "PublicState",
+    "RecordError",
+    "RefusedError",
     "Robot",
+    "RobotError",
     "Run",
     "SensedBody",
     "SensedRobot",

@@ -6,6 +6,22 @@ class Error(Exception):
     a file."""
 
 
+class FileError(Error):
+    """A file that a person has written cannot be used, or a file cannot be read or written."""
+
+
+class RecordError(Error):
+    """The record of a run or an experiment is damaged, incomplete, or not there."""
+
+
+class RefusedError(Error):
+    """What was asked for cannot be done, or not with this scenario or this record; the text says what can be done instead."""
+
+
+class RobotError(Error):
+    """A robot of the project refuses its parameters, or ends the run."""
+
+
 class BadArgument(Error, ValueError):
     """A value that an argument may not have; the text names the argument and what is accepted."""
 
