@@ -81,6 +81,8 @@ pub fn own_program() -> PathBuf {
 
 /// Arguments of this program that precede a program and its arguments.
 pub(crate) fn prefix(at_exit: AtExit) -> Vec<String> {
+    // With the id of this process, so that the child notices if it has ended before the kernel was
+    // asked.
     let mut prefix = vec!["child".to_owned(), std::process::id().to_string()];
     if at_exit == AtExit::Terminate {
         prefix.push(TERMINATE.to_owned());

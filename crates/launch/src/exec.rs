@@ -58,6 +58,7 @@ pub fn exec(
 
     let stopper = Arc::new(OnceLock::new());
     let (program, events) = Program::start(name, command, stopper.clone())?;
+    // From here on a signal ends the program as well. Until then it waits: it is blocked.
     let asked = listen(asking, &program, stopper.clone())?;
     let remarks = Remarks::default();
     let proxy = Box::new(Proxy::new(

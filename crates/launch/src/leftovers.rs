@@ -52,6 +52,7 @@ impl Leftovers {
             // What ends the group of the launcher does not end it.
             .process_group(0)
             .spawn();
+
         match guard {
             Ok(guard) => leftovers.guard = Some(guard),
             Err(error) => tracing::warn!(
@@ -99,6 +100,7 @@ impl Leftovers {
 impl Drop for Leftovers {
     /// Ends the guard, which has nothing more to do than after a kill.
     fn drop(&mut self) {
+        // The end of the pipe is its sign. It has nothing to kill then, and ends at once.
         if let Some(mut guard) = self.guard.take() {
             drop(guard.stdin.take());
             let _reaped = guard.wait();
@@ -113,6 +115,7 @@ impl Drop for Leftovers {
 /// If the standard input cannot be read.
 pub fn guard(launch: &str) -> std::io::Result<()> {
     let mut groups = BTreeSet::new();
+    // Until the launcher closes its end, which it does on drop, or the kernel does when it is killed.
     for line in std::io::stdin().lock().lines() {
         let line = line?;
         match line.split_at_checked(1) {
@@ -126,6 +129,7 @@ pub fn guard(launch: &str) -> std::io::Result<()> {
         }
     }
 
+    // Groups first: one signal reaches most programs at once.
     for group in groups {
         let _gone = killpg(Pid::from_raw(group), Signal::SIGKILL);
     }
@@ -142,6 +146,8 @@ fn is_of(launch: &str) -> impl Fn(&[u8]) -> bool {
 /// Kills all processes with such an entry in their environments, also those that these start meanwhile.
 fn kill_marked(is_mark: impl Fn(&[u8]) -> bool) -> BTreeSet<String> {
     let mut killed = BTreeSet::new();
+    // Until a search finds none: a program that was not killed yet may have started another one after
+    // it was looked at. The number of searches is limited, because a program may start others for ever.
     for _ in 0..SEARCHES {
         let found = marked(&is_mark);
         if found.is_empty() {
@@ -168,6 +174,7 @@ fn marked(is_mark: impl Fn(&[u8]) -> bool) -> Vec<Pid> {
     for process in processes.flatten() {
         let name = process.file_name();
         let pid = name.to_str().and_then(|name| name.parse().ok());
+        // Processes of other users cannot be read: they are none of this launch.
         let environment = std::fs::read(process.path().join("environ"));
         if let (Some(pid), Ok(environment)) = (pid, environment)
             && environment.split(|byte| *byte == 0).any(&is_mark)

@@ -113,11 +113,13 @@ impl LogFile {
             None => end_of_line_before(file, self.limit_bytes / 2)?,
         };
         let gap_end = head_bytes + self.gap_line_bytes;
+        // What was left out before is not read again: the gap only grows.
         let tail_start = gap_end.max(self.size_bytes.saturating_sub(self.limit_bytes / 4));
         let mut tail = Vec::new();
         file.seek(SeekFrom::Start(tail_start))?;
         file.read_to_end(&mut tail)?;
         let line_start = tail.iter().position(|byte| *byte == b'\n');
+        // Whole lines only, unless one is longer than what is kept.
         let tail = &tail[line_start.map_or(0, |end| end + 1)..];
 
         let kept_bytes = tail.len() as u64;

@@ -101,6 +101,7 @@ impl Watch {
             match self.open(end.clone()) {
                 Ok((bus, _declared)) => {
                     advance(state, ObserverPhase::Observing);
+                    // Until the supervisor is gone, which holds the other end.
                     for gone in &self.gone {
                         self.report(&bus, gone);
                     }
@@ -250,6 +251,7 @@ fn subscribe_faults(
         };
         let session = session.clone();
         let control = control.clone();
+        // The supervisor calls this on its own thread when the signals have been sent.
         let done = FaultsDone(Box::new(move || get_later(session, control, answer)));
 
         // The queue is closed only when the launch is over.

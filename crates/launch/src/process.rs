@@ -118,6 +118,8 @@ impl Started {
         if let Some(pipe) = self.child.stderr().take() {
             copies.push(tokio::spawn(copy(pipe, output, true)));
         }
+        // Its output is copied meanwhile, by tasks of their own: a full pipe would keep it from
+        // exiting.
         let status = self.child.wait().await;
 
         // Processes that the leader left behind would keep the pipes open.

@@ -60,6 +60,7 @@ impl Budget {
     /// Spends one restart. Returns the wait before it and its number among the recent ones, or `None` if the budget is
     /// exhausted.
     pub(super) fn spend(&mut self, now: Instant) -> Option<(Duration, usize)> {
+        // A process that has run for long is trusted again.
         self.recent
             .retain(|then| now.duration_since(*then) <= WINDOW);
         if self.recent.len() >= BUDGET {

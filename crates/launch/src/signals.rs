@@ -20,6 +20,8 @@ pub(super) fn listen(queue: &UnboundedSender<SupervisorEvent>) -> std::io::Resul
         if asking == Signal::SIGHUP && is_ignored(asking) {
             continue; // Started by `nohup`.
         }
+        // From here on the signal does not end the process: it is queued like everything else that
+        // happens.
         let mut signals = signal(SignalKind::from_raw(asking as i32))?;
         let queue = queue.clone();
         tokio::spawn(async move {

@@ -198,6 +198,9 @@ impl Supervisor {
             }
         }
 
+        // A run without processes of this launcher goes on: those that the user starts are not its to
+        // wait for. From the first step of the end on, the loop lasts as long as a process does; each
+        // phase is bounded by the grace period.
         while self.stage == Shutdown::Running
             || (self.stage < Shutdown::GivenUp && self.is_any_running())
         {
@@ -207,6 +210,7 @@ impl Supervisor {
             }
         }
 
+        // Only when the processes are gone: until then they may start further programs.
         let killed = self.leftovers.kill_all();
         self.notice_killed("the robots' processes", killed);
         self.explain().await;
@@ -217,6 +221,8 @@ impl Supervisor {
     async fn explain(&mut self) {
         let mut is_told = false;
         while self.is_console_running() {
+            // A console without a browser ends at once. Only one that is still here after this time is
+            // worth a word.
             let event = tokio::time::timeout(UNSEEN, self.events.recv()).await;
             let Ok(event) = event else {
                 if !is_told && self.is_explaining() {
@@ -227,6 +233,7 @@ impl Supervisor {
                 }
                 continue;
             };
+
             match event {
                 Some(SupervisorEvent::Ended(index, ended)) => self.on_ended(index, &ended),
                 Some(SupervisorEvent::Asked(signal)) if self.is_explaining() => {
@@ -303,7 +310,10 @@ impl Supervisor {
             }
         };
 
+        // Noted before anything else can happen to it: its end arrives through the queue, and is
+        // handled after this.
         supervised.group = Some(started.group);
+        // For the guard beside the launcher, in case that this one is killed.
         if supervised.planned.part == Part::Robots {
             self.leftovers.add(started.group.0);
         }
@@ -312,6 +322,7 @@ impl Supervisor {
             let screen = self.screen.clone();
             tokio::spawn(process::watch_stops(started.group, name, screen));
         }
+
         let output = Output {
             screen: self.screen.clone(),
             index,
@@ -328,6 +339,8 @@ impl Supervisor {
     }
 
     fn on_ended(&mut self, index: usize, ended: &Ended) {
+        // In every case: the number of the group may be given to another one, which must not get its
+        // signals.
         self.forget_group(index);
 
         let process = &self.processes[index];
@@ -335,6 +348,7 @@ impl Supervisor {
             self.on_simulator_ended(index, ended);
         } else if process.is_observer() && self.outcome.failure.is_some() {
             self.outcome.is_to_resume = self.outcome.asked.is_none() && ended.code() == RESUME;
+        // An order has killed it, and another one starts it: neither a failure nor a restart.
         } else if process.is_down {
             tracing::debug!("{} was killed by the scenario", self.name(index));
         } else if self.stage == Shutdown::Running {
@@ -357,6 +371,7 @@ impl Supervisor {
             return;
         }
 
+        // The guard must not kill another group that gets this number.
         self.leftovers.remove(group.0);
         // At the end of the run all are killed together.
         if self.stage == Shutdown::Running {
@@ -380,6 +395,7 @@ impl Supervisor {
     fn on_simulator_ended(&mut self, index: usize, ended: &Ended) {
         let has_failed = ended.has_failed();
         if has_failed && self.stage == Shutdown::Running {
+            // Its robots would wait for ever: all others are ended as well.
             self.fail(index, ended);
             self.terminate();
         } else if has_failed && self.stage == Shutdown::Stopping {
@@ -405,12 +421,14 @@ impl Supervisor {
     /// Handles the exit of a process other than the simulator during the run.
     fn on_other_ended(&mut self, index: usize, ended: &Ended) {
         let restart = self.processes[index].planned.restart;
+        // As long as there are restarts left, even a process that is required may fail.
         if restart.applies(ended.has_failed()) && self.restart_later(index, ended) {
             return;
         }
 
         if ended.has_failed() && self.processes[index].planned.is_required {
             self.fail(index, ended);
+            // By the simulator, so that the record has an end, and the other robots leave in order.
             self.stop();
         } else {
             self.on_gone(index, ended);
@@ -470,6 +488,7 @@ impl Supervisor {
     }
 
     fn on_restart_due(&mut self, index: usize) {
+        // The run may have ended during the wait.
         if self.stage == Shutdown::Running {
             self.notice(format!("restarting {}", self.name(index)));
             self.start(index);
@@ -477,6 +496,7 @@ impl Supervisor {
     }
 
     fn on_asked(&mut self, signal: Signal) {
+        // The first one decides about the exit status.
         self.outcome.asked.get_or_insert(signal);
         let is_ending = self.stage >= Shutdown::Terminating;
         if signal == Signal::SIGQUIT || is_ending && signal == Signal::SIGINT {
@@ -535,6 +555,7 @@ impl Supervisor {
             tail: self.processes[index].tail.lines(),
             log: log_of(&self.logs, name),
         };
+        // What fails after that fails because of it, most likely.
         if self.outcome.failure.is_none() {
             self.outcome.failure = Some(failure);
             self.show_failure();
@@ -551,6 +572,7 @@ impl Supervisor {
         else {
             return;
         };
+
         let run = self.logs.parent().unwrap_or(&self.logs);
         let command = format!("cars launch --resume {}", quote(&run.display().to_string()));
         if let Err(error) = failure.show(&self.logs, command) {
@@ -594,6 +616,7 @@ impl Supervisor {
     }
 
     fn enter(&mut self, stage: Shutdown) {
+        // Phases only advance. So the timer of an earlier one finds another phase, and decides nothing.
         if stage > self.stage {
             self.stage = stage;
             self.after(self.grace, SupervisorEvent::GraceOver(stage));

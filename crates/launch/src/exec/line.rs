@@ -268,6 +268,7 @@ fn parse(line: &[u8]) -> Result<ReadLine, String> {
         return Err("it begins with a byte order mark (U+FEFF): write UTF-8 without it".to_owned());
     }
 
+    // In two steps, so that an error names the field within the line's own type.
     let value: Value = serde_json::from_slice(line)
         .map_err(|error| format!("it is not valid JSON ({error}); {EXPECTED}"))?;
     let Some(kind) = value.get("type").and_then(Value::as_str) else {

@@ -71,6 +71,8 @@ impl Program {
         let mut child = spawn(command)?;
         let pid =
             i32::try_from(child.id()).map_err(LaunchError::system("the system's process id"))?;
+        // Taken out of `child`: a thread that reads or writes must not wait for one that holds its
+        // lock.
         let stdin = child.stdin.take();
         let stdout = child.stdout.take();
         let stderr = child.stderr.take();
@@ -133,6 +135,7 @@ impl Program {
             }
         }
 
+        // Last: after the lines that it has written, if its pipe was read to the end in time.
         let _over = self.queue.send(ProgramEvent::Ended);
     }
 
@@ -170,6 +173,7 @@ impl Program {
     /// Explains why the program writes no more lines: its exit status and the last lines of its error output, or
     /// `otherwise` if it is still running.
     pub(super) fn explain_end(&self, otherwise: &str) -> String {
+        // A program that closes its output is most likely about to exit, and its status says more.
         let Some(status) = self.wait(REST_OF_OUTPUT) else {
             return otherwise.to_owned();
         };
@@ -204,6 +208,8 @@ impl Program {
             drop(lock(&self.stdin).take());
         }
 
+        // `wait` is about the exit and the rest of the output; where another process holds the pipes,
+        // the program may have exited all the same.
         if self.wait(END_PATIENCE).is_none() && !self.has_exited() {
             self.kill();
             self.wait(END_PATIENCE);
@@ -281,6 +287,7 @@ fn read_lines(stdout: ChildStdout, queue: &SyncSender<ProgramEvent>) {
 /// The next line; the last one may have no end.
 fn read_line(stdout: &mut BufReader<ChildStdout>) -> ProgramEvent {
     let mut line = Vec::new();
+    // One byte more than allowed, so that a line which is too long is told from one that just fits.
     let mut limited = stdout.by_ref().take(MAX_LINE as u64 + 1);
     match limited.read_until(b'\n', &mut line) {
         Ok(0) | Err(_) => ProgramEvent::Closed,

@@ -68,6 +68,8 @@ impl Proxy {
     /// Begins a tick. The program must not have written lines since the last one.
     fn begin(&self, message: &ToProgram<'_>) -> Result<(), String> {
         match self.events.try_recv() {
+            // Whether a line outside a tick is noticed depends on time; what is noticed is an error in
+            // any case.
             Err(TryRecvError::Empty) => self.send(message),
             Err(TryRecvError::Disconnected) => Err(self.failure(ProgramEvent::Ended)),
             Ok(ProgramEvent::Line(line)) => Err(format!(
@@ -82,6 +84,7 @@ impl Proxy {
     fn converse(&mut self, cars: &mut Cars<'_>) -> Result<Done, String> {
         let mut commands = 0;
         let mut reported = 0;
+        // Bounded, because a program that writes for ever would hold the clock of the run.
         for _ in 0..MAX_LINES {
             let line = match self.next() {
                 ProgramEvent::Line(line) => line,
@@ -92,6 +95,7 @@ impl Proxy {
             if let Some(unknown) = unknown {
                 self.remark(cars, &unknown);
             }
+            // Counted before the line is carried out: the report cannot grow beyond its limit.
             if message.is_reported() {
                 reported += line.len();
             }
@@ -131,6 +135,8 @@ impl Proxy {
             self.silence = None;
         }
 
+        // Without a limit: the clock waits for a robot as long as it takes. A signal or the program's
+        // end comes through this queue, too.
         self.events.recv().unwrap_or(ProgramEvent::Ended)
     }
 
@@ -239,11 +245,14 @@ fn word_for(error: &CallError) -> &'static str {
 
 impl Robot for Proxy {
     fn init(&mut self, cars: &mut Cars<'_>) -> Result<(), BadParameters> {
+        // As if nothing had been before: an incarnation does not inherit what another one has
+        // published.
         self.done = Done::default();
         self.panel = Panel::default();
         self.remarks.start_over();
 
         let welcome = cars.welcome();
+        // What the program says to this is read in the tick that follows.
         let begun = self.begin(&ToProgram::init(welcome, cars.tick(), cars.sensed_robots()));
         self.is_initializing = true;
         if let Err(reason) = begun {

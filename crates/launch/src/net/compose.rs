@@ -86,6 +86,8 @@ impl Compose {
         let container = output(&mut self.compose(&["ps", "-q", &process.to_lowercase()]))?;
         let format = format!("{{{{(index .NetworkSettings.Networks {network:?}).IPAddress}}}}");
         let address = output(Command::new("docker").args(["inspect", "-f", &format, &container]))?;
+        // The address is noted before: without it the container would get another one, and its peers
+        // would not find it.
         docker_network(&["disconnect", &network, &container])?;
 
         self.away
@@ -109,6 +111,7 @@ impl Compose {
 
 impl Drop for Compose {
     fn drop(&mut self) {
+        // Before the file is removed, which compose needs for this.
         if let Err(error) = output(&mut self.compose(&["down", "--volumes", "--timeout", "1"])) {
             terminal::note(format_args!("containers may be left over: {error}"));
         }

@@ -37,6 +37,7 @@ impl Gate {
 
     /// Records the use of the link.
     pub(super) fn touch(&self) {
+        // The first one counts: the times of a plan begin with it.
         self.state().first_use.get_or_insert_with(Instant::now);
         self.changed.notify_all();
     }
@@ -82,6 +83,7 @@ impl Pace {
     /// When a piece that arrives at `now` may leave a link with this shape. `luck`, from 0 to 1, is its part of the jitter.
     pub(super) fn due(&mut self, now: Instant, shape: Shape, luck: f64) -> Instant {
         let due = now + shape.delay + shape.jitter.mul_f64(luck);
+        // Never before the piece ahead, however small its own jitter: a stream keeps its order.
         self.last = self.last.max(due);
         self.last
     }

@@ -115,6 +115,7 @@ impl Namespaces {
 
 impl Drop for Namespaces {
     fn drop(&mut self) {
+        // The bridge comes last. Removing a namespace removes what is in it, the pairs included.
         let hosts = (0..=self.processes.len()).map(|index| self.host(index));
         for namespace in hosts.chain([self.switch()]) {
             // Removing fails for a namespace that was not made.

@@ -188,12 +188,14 @@ impl Plan {
                 if is_over() {
                     return Ok(());
                 }
+                // In short steps, so that the end of the launch is noticed during a long wait.
                 let left = at.saturating_sub(begun.elapsed());
                 std::thread::sleep(left.min(LOOK_AGAIN));
             }
 
             for robot in self.robots() {
                 let shape = self.shape(robot, at);
+                // All faults of a moment are one shape: a link is changed only if that differs.
                 if now.insert(robot, shape).unwrap_or_default() != shape {
                     apply(robot, shape, begun.elapsed())?;
                 }

@@ -146,6 +146,8 @@ pub fn play(play: &Play, mut report: impl FnMut(String)) -> Result<u8, LaunchErr
         options: &options,
         more: &play.launch_args,
     };
+    // Before the links are made: from here on Ctrl-C ends the launch, and this process goes on to
+    // remove them.
     let signals = Signals::forward()?;
     let links = make_links(play.via, &file, &plan, &start, &mut report);
     let mut links = links.inspect_err(|_| reserved.discard())?;
@@ -161,10 +163,12 @@ pub fn play(play: &Play, mut report: impl FnMut(String)) -> Result<u8, LaunchErr
         Ok(false) => Ok(()),
         Err(error) => Err(error),
     };
+    // The launch is ended in order even then: its record is written, and the links go after it.
     if played.is_err() {
         signals.end();
     }
 
+    // The links are dropped after this, so that nothing is cut while the processes leave.
     let status = launch.wait().map_err(LaunchError::system(LOST))?;
     played.map(|()| exit_code(status))
 }
@@ -250,6 +254,7 @@ fn wait_for_clock(launch: &mut Child, events: &Path) -> Result<bool, LaunchError
 fn last_tick(events: &Path) -> Option<u64> {
     let mut file = File::open(events).ok()?;
     let length = file.metadata().ok()?.len();
+    // The end of the file is enough, however long the run: lines are much shorter than this.
     let begin = length.saturating_sub(TAIL_BYTES);
     file.seek(SeekFrom::Start(begin)).ok()?;
     let mut tail = Vec::new();
@@ -358,6 +363,8 @@ impl Signals {
             })?;
         let pid =
             i32::try_from(child.id()).map_err(LaunchError::system("the system's process id"))?;
+        // Stored first, then looked: a signal in between is seen here or forwarded by the handler, or
+        // both, which is harmless.
         self.launch.store(pid, Ordering::SeqCst);
 
         // A signal may have come before the process id was stored.

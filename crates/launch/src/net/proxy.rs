@@ -157,6 +157,8 @@ fn accept(listener: &TcpListener, to: SocketAddr, gate: &Arc<Gate>, open: &Arc<C
         let Ok(own) = client.try_clone() else {
             continue;
         };
+        // Noted before the thread begins, so that a link that closes now closes this connection as
+        // well.
         open.with(|open| open.insert(id, vec![own]));
 
         let gate = gate.clone();
@@ -190,6 +192,8 @@ fn forward(
     client.set_nodelay(true)?;
     let own = server.try_clone()?;
     let is_open = open.with(|open| open.get_mut(&id).map(|sides| sides.push(own)).is_some());
+    // The link may have closed while the target was connected: then this socket was not among those
+    // that were closed.
     if !is_open || gate.shape().flow == Flow::Closed {
         return Ok(());
     }
@@ -237,6 +241,8 @@ fn read(mut from: TcpStream, send: &SyncSender<Piece>, gate: &Gate, number: u64)
         let Ok(bytes @ 1..) = from.read(&mut buffer) else {
             return;
         };
+        // The time of arrival counts, so that pieces are delayed side by side and not one after the
+        // other.
         let due = pace.due(Instant::now(), gate.shape(), unit(&mut luck));
         if send.send((due, buffer[..bytes].to_vec())).is_err() {
             return; // The writer has ended because the other side is closed.
@@ -254,6 +260,7 @@ fn write(mut to: TcpStream, pieces: &Receiver<Piece>, gate: &Gate) {
             break;
         }
     }
+    // The end of a connection is held by a cut like its bytes.
     gate.pass();
 
     // The end of one direction leaves the other one open; a failure closes both.
@@ -275,6 +282,7 @@ fn write_piece(
     let slice_bytes = usize::try_from(bps / 8 / SLICES_PER_S).unwrap_or(usize::MAX);
 
     for slice in piece.chunks(slice_bytes.max(1)) {
+        // Before and after the wait: a cut that begins during it holds the slice as well.
         gate.pass();
         sleep_until(pace.sent(Instant::now(), gate.shape(), slice.len()));
         gate.pass();

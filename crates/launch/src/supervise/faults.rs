@@ -15,6 +15,7 @@ const SLOW_GO: Duration = Duration::from_millis(10);
 impl Supervisor {
     /// Carries orders out and reports it. Orders are idempotent, because the simulator may repeat them.
     pub(super) fn on_faults(&mut self, orders: &[ProcessOrder], done: FaultsDone) {
+        // A run that ends has no use for faults: its simulator has exited, or has received SIGTERM.
         if self.stage != Shutdown::Running {
             return;
         }
@@ -29,6 +30,8 @@ impl Supervisor {
                 )),
             }
         }
+        // What can be done at once has been done. Whether it has had its effect the simulator sees by
+        // the tokens.
         (done.0)();
     }
 
@@ -44,9 +47,11 @@ impl Supervisor {
         match order.kind {
             FaultKind::Crash if process.is_down => return,
             FaultKind::Crash => {
+                // Before the signal: the end of the process is then not a failure.
                 process.is_down = true;
                 process.signal(Signal::SIGKILL);
             }
+            // To stop a process that is stopped changes nothing.
             FaultKind::Hang => process.signal(Signal::SIGSTOP),
             // The simulator orders it as a crash and its end.
             FaultKind::Restart => return,
@@ -72,6 +77,7 @@ impl Supervisor {
                 // The exit of the killed process has not been handled yet.
                 self.after(SLOW_GO, SupervisorEvent::FaultOver(index, kind));
             }
+            // The second of two orders to end it finds it up.
             FaultKind::Crash if process.is_down => {
                 process.is_down = false;
                 if self.stage == Shutdown::Running {
@@ -82,6 +88,8 @@ impl Supervisor {
             FaultKind::Hang => process.signal(Signal::SIGCONT),
             FaultKind::Slow => {
                 process.is_slow = false;
+                // In case that it is just in the stopped part of a pulse. The pulse itself ends when it
+                // is due.
                 process.signal(Signal::SIGCONT);
             }
         }
