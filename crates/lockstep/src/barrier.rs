@@ -55,11 +55,13 @@ impl<R, C> Barrier<R, C> {
         timing: Timing,
         max_commands: u32,
     ) -> Self {
+        let mut members = BTreeMap::new();
+        for name in roster {
+            members.insert(name, Member::default());
+        }
+
         Self {
-            members: roster
-                .into_iter()
-                .map(|name| (name, Member::default()))
-                .collect(),
+            members,
             lateness,
             timing,
             max_commands,

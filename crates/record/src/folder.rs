@@ -213,6 +213,7 @@ impl RunFolder {
                     ..NewRun::named(&run, folder, lock)
                 });
             }
+
             // Another process may have taken this one as well. Then the next one is tried.
             number += 1;
         }

@@ -175,6 +175,7 @@ impl Writer {
     fn join(&mut self) -> Result<(), WriteError> {
         self.queue.lock().is_ended = true;
         self.queue.due.notify_one();
+
         // It writes all chunks before it finds that nothing more is to come. For a second call there is
         // no thread any more.
         let ended = match self.thread.take().map(JoinHandle::join) {

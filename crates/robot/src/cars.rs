@@ -303,9 +303,12 @@ impl<'a> Cars<'a> {
         if self.tick == 0 {
             return Err(CallError::TooEarly);
         }
+        // The simulator's verdict comes first: whether an answer could be had is not for the real
+        // network to decide.
         if self.news.unreachable.contains(&of) {
             return Err(CallError::Unreachable(of));
         }
+
         self.network
             .state_of(&of)
             .map_err(|undelivered| match undelivered {

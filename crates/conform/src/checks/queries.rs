@@ -450,6 +450,7 @@ fn reply_in(
             return Ok(reply);
         }
     }
+
     Ok(None)
 }
 

@@ -441,6 +441,7 @@ impl LastingState {
             Is::Behavior(states) => (words::Kind::Behavior, states),
             Is::Variable(..) => return Vec::new(),
         };
+
         let mut named = Vec::new();
         for state in states {
             named.push(Word {
