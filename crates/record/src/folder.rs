@@ -720,8 +720,12 @@ pub fn check_no_links(folder: &Path) -> Result<(), FileError> {
     for entry in entries {
         let entry = entry.map_err(|error| FileError::unreadable(folder, &error))?;
         let path = entry.path();
-        let found = path.symlink_metadata();
-        let found = found.map_err(|error| FileError::unreadable(&path, &error))?;
+        let found = match path.symlink_metadata() {
+            Ok(found) => found,
+            // A program that writes there has given its draft the final name since.
+            Err(error) if error.kind() == ErrorKind::NotFound => continue,
+            Err(error) => return Err(FileError::unreadable(&path, &error)),
+        };
         if found.is_symlink() {
             return Err(is_link(&path));
         }
