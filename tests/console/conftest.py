@@ -6,7 +6,7 @@ import pathlib
 import pytest
 from playwright.sync_api import expect, sync_playwright
 
-from lab import ROOT, Launch, Launched
+from lab import ROOT, Launch, Launched, Processes
 
 # The shell is the same engine without windows, and needs a third less processor time.
 SHELL = "/usr/bin/chromium-headless-shell"
@@ -17,7 +17,7 @@ expect.set_options(timeout=30_000)
 
 
 def pytest_configure(config):
-    config.addinivalue_line("markers", "thorough: of those that take long or repeat another test in other sizes and colors; left out by `-m 'not thorough'`")
+    config.addinivalue_line("markers", "thorough: for CI; a file of such tests says so in its head")
 
 
 @pytest.fixture(scope="session")
@@ -65,9 +65,18 @@ def launched(tmp_path):
 
 
 @pytest.fixture
-def open_page(browser, launch, launched):
+def processes(tmp_path):
+    """Starts programs and ends them with the test."""
+    processes = Processes(tmp_path)
+    yield processes
+    processes.end()
+    print(processes.logs())
+
+
+@pytest.fixture
+def open_page(browser, launch, launched, processes):
     """Opens pages. A test fails if one of them logs an error or warning, throws, or opens a dialog. Pages are closed before the
-    runs that they show end, which they would log: `launch` and `launched` are here for that."""
+    runs that they show end, which they would log: `launch`, `launched` and `processes` are here for that."""
     contexts = []
     errors = []
 

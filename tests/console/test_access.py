@@ -7,10 +7,11 @@ from playwright.sync_api import expect
 
 from lab import PATIENCE_S, ROOT, Crowd, start_console
 
+pytestmark = pytest.mark.thorough
+
 AXE = ROOT / "crates" / "console" / "check" / "node_modules" / "axe-core" / "axe.min.js"
 PHONE = (390, 844)
 LAPTOP = (1366, 768)
-THOROUGH = pytest.mark.thorough
 TABS = ("log", "charts", "setup")
 # Levels A and AA of WCAG 2.2, and what is good practice beyond.
 RUN = """(options) => axe.run(document, {resultTypes: ['violations'], ...options}).then(({violations}) =>
@@ -38,7 +39,7 @@ def violations(page, axe, what):
 
 @pytest.mark.parametrize(
     "many, width, height",
-    [(True, *PHONE), (False, *LAPTOP), pytest.param(False, *PHONE, marks=THOROUGH), pytest.param(True, *LAPTOP, marks=THOROUGH)],
+    [(True, *PHONE), (False, *LAPTOP), (False, *PHONE), (True, *LAPTOP)],
 )
 def test_axe_finds_nothing_in_a_run(launch, open_page, axe, many, width, height):
     run = launch(kind=Crowd, robots=12, guests=20) if many else launch()
@@ -58,7 +59,7 @@ def test_axe_finds_nothing_in_a_run(launch, open_page, axe, many, width, height)
     assert found == []
 
 
-@pytest.mark.parametrize("width, height", [LAPTOP, pytest.param(*PHONE, marks=THOROUGH)])
+@pytest.mark.parametrize("width, height", [LAPTOP, PHONE])
 def test_axe_finds_nothing_in_a_recording(launch, open_page, axe, width, height):
     run = launch(options=("--speed", "max", "--duration", "50 s"))
     run.control("start")

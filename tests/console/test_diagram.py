@@ -7,6 +7,8 @@ from playwright.sync_api import expect
 
 from lab import PATIENCE_S, eventually, start_console, until
 
+pytestmark = pytest.mark.thorough
+
 
 @pytest.fixture
 def recorded(launch):
@@ -33,7 +35,7 @@ def shown_tick(page):
     return int(page.get_by_test_id("tick").inner_text())
 
 
-@pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_a_click_on_a_command_shows_its_tick(recorded, open_page, screenshots, scheme):
     address, events = recorded
     page = open_page(address, scheme=scheme)

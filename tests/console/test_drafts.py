@@ -1,8 +1,11 @@
 """A draft of the set-up: it is called one, is not lost silently, and can be edited by keys."""
 
+import pytest
 from playwright.sync_api import expect
 
 from lab import ROOT, eventually
+
+pytestmark = pytest.mark.thorough
 
 BODY_M = 0.6096
 

@@ -9,6 +9,8 @@ from playwright.sync_api import expect
 
 from lab import BIN, eventually
 
+pytestmark = pytest.mark.thorough
+
 
 @pytest.fixture
 def open_quietly(browser):

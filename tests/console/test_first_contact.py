@@ -3,33 +3,32 @@
 import shlex
 import signal
 
+import pytest
 from playwright.sync_api import expect
 
-from lab import PATIENCE_S, Processes, free_port, start_console, until
+from lab import PATIENCE_S, free_port, start_console, until
+
+pytestmark = pytest.mark.thorough
 
 
-def test_the_advice_works_when_it_is_typed(open_page, tmp_path, screenshots):
-    processes = Processes(tmp_path)
+def test_the_advice_works_when_it_is_typed(processes, open_page, tmp_path, screenshots):
     address = start_console(processes, "--run", "typed", "--connect", f"tcp/127.0.0.1:{free_port()}")
-    try:
-        page = open_page(address)
-        advice = page.get_by_test_id("advice")
-        expect(advice).to_contain_text("typed")
-        page.screenshot(path=screenshots / "advice.png")
+    page = open_page(address)
+    advice = page.get_by_test_id("advice")
+    expect(advice).to_contain_text("typed")
+    page.screenshot(path=screenshots / "advice.png")
 
-        program, *arguments = shlex.split(advice.inner_text())
-        assert program == "cars"
-        launching = processes.start("cars", *arguments, "--out", tmp_path / "runs", stdout=-3, start_new_session=True)
-        expect(page.get_by_test_id("connection")).to_have_text("connected")
-        until(page, "window.carsConsole.frame() !== null")
-        assert page.evaluate("window.carsConsole.frame().run") == "typed"
+    program, *arguments = shlex.split(advice.inner_text())
+    assert program == "cars"
+    launching = processes.start("cars", *arguments, "--out", tmp_path / "runs", stdout=-3, start_new_session=True)
+    expect(page.get_by_test_id("connection")).to_have_text("connected")
+    until(page, "window.carsConsole.frame() !== null")
+    assert page.evaluate("window.carsConsole.frame().run") == "typed"
 
-        # A launch ends its processes.
-        launching.send_signal(signal.SIGINT)
-        launching.wait(PATIENCE_S)
-        expect(page.get_by_test_id("connection")).to_have_text("no simulator")
-    finally:
-        processes.end()
+    # A launch ends its processes.
+    launching.send_signal(signal.SIGINT)
+    launching.wait(PATIENCE_S)
+    expect(page.get_by_test_id("connection")).to_have_text("no simulator")
 
 
 def test_nothing_is_green_when_the_simulator_is_gone(launch, open_page, screenshots):

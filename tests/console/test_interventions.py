@@ -1,8 +1,11 @@
 """Experiments by hand in a browser: what is done is seen, can be undone, and is in the record."""
 
+import pytest
 from playwright.sync_api import expect
 
 from lab import eventually
+
+pytestmark = pytest.mark.thorough
 
 
 def open_menu(page):

@@ -5,6 +5,8 @@ from playwright.sync_api import expect
 
 from lab import eventually, until
 
+pytestmark = pytest.mark.thorough
+
 # The design demands this on an otherwise idle machine.
 WANTED_FPS = 25
 # Of the rate with few guests at the same time: other machines are slower or under load.
@@ -16,8 +18,8 @@ LEAST_RATIO = 0.2
     [
         (1440, 900, "light"),
         (390, 844, "dark"),
-        pytest.param(1440, 900, "dark", marks=pytest.mark.thorough),
-        pytest.param(390, 844, "light", marks=pytest.mark.thorough),
+        (1440, 900, "dark"),
+        (390, 844, "light"),
     ],
 )
 def test_everything_can_be_seen(launch, open_page, screenshots, width, height, scheme):
@@ -75,7 +77,6 @@ def test_robots_obstacles_and_floor_are_drawn_in_their_colors(launch, open_page)
     assert red > green and red > blue, (red, green, blue)
 
 
-@pytest.mark.thorough
 def test_ten_thousand_guests_move_smoothly(launch, open_page, screenshots):
     # What is measured is the page: nothing else has much to do.
     field = ("--set", 'field.size=["150 m", "150 m"]', "--set", "record.frames=false")

@@ -5,6 +5,8 @@ from playwright.sync_api import expect
 
 from lab import Crowd, eventually, until
 
+pytestmark = pytest.mark.thorough
+
 THREE = {"scenario": "configs/three_robots.toml", "robots": ("Butler", "Leguin", "Vonda")}
 
 

@@ -8,6 +8,8 @@ from playwright.sync_api import expect
 
 from lab import PATIENCE_S, Processes, eventually, start_console, until
 
+pytestmark = pytest.mark.thorough
+
 
 @pytest.fixture
 def recorded(launch, tmp_path):
@@ -121,7 +123,6 @@ def differing(live, recorded, screenshots):
     return found
 
 
-@pytest.mark.thorough
 def test_a_tick_has_the_same_pixels_live_and_recorded(launch, open_page, screenshots):
     run = launch()
     live = open_page(run.address, height=1500)

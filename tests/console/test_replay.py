@@ -7,6 +7,8 @@ from playwright.sync_api import expect
 
 from lab import BIN, PATIENCE_S, ROOT, Processes, eventually, free_port, start_console
 
+pytestmark = pytest.mark.thorough
+
 RUN = "replayed"
 
 

@@ -6,6 +6,8 @@ import pytest
 
 from lab import BIN, ROOT
 
+pytestmark = pytest.mark.thorough
+
 SIZES = [(1280, 900), (375, 812)]
 
 

@@ -7,6 +7,8 @@ from playwright.sync_api import expect
 
 from lab import eventually, until
 
+pytestmark = pytest.mark.thorough
+
 THREE = {"scenario": "configs/three_robots.toml", "robots": ("Butler", "Leguin", "Vonda")}
 
 
@@ -217,7 +219,6 @@ def test_the_page_works_with_any_content_of_a_panel(launch, open_page):
     expect(page.get_by_test_id("tick")).to_have_text("2")
 
 
-@pytest.mark.thorough
 def test_the_number_of_log_rows_is_bounded(launch, open_page):
     run = launch(options=("--speed", "max", "--duration", "1000000 s"))
     page = open_page(run.address)

@@ -7,6 +7,8 @@ from playwright.sync_api import expect
 
 from lab import FITS, eventually, until
 
+pytestmark = pytest.mark.thorough
+
 BODY_M = 0.6096
 
 

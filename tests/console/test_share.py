@@ -10,6 +10,8 @@ from playwright.sync_api import expect
 
 from lab import PATIENCE_S, ROOT, eventually, start_console, until
 
+pytestmark = pytest.mark.thorough
+
 
 @pytest.fixture
 def recorded(launch):
@@ -90,7 +92,7 @@ SAME = """([text, places]) => new Promise((done, failed) => {
 })"""
 
 
-@pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_the_plan_is_saved_as_a_drawing(launch, open_page, tmp_path, screenshots, scheme):
     run = launch(options=("--set", "guests.count=30"))
     page = open_page(run.address, scheme=scheme)

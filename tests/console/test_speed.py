@@ -5,6 +5,8 @@ from playwright.sync_api import expect
 
 from lab import Crowd, eventually, until
 
+pytestmark = pytest.mark.thorough
+
 ROBOTS = 32
 
 # Counts calls of the canvas by the element that is drawn on, and changes of the document by where they are.

@@ -8,6 +8,8 @@ from playwright.sync_api import expect
 
 from lab import eventually
 
+pytestmark = pytest.mark.thorough
+
 
 @pytest.fixture
 def open_quietly(browser):

@@ -9,7 +9,9 @@ import urllib.request
 import pytest
 from playwright.sync_api import expect
 
-from lab import PATIENCE_S, Processes, eventually, free_port, start_console
+from lab import PATIENCE_S, eventually, free_port, start_console
+
+pytestmark = pytest.mark.thorough
 
 
 def token_of(address):
@@ -36,14 +38,6 @@ def context(browser):
     context = browser.new_context()
     yield context
     context.close()
-
-
-@pytest.fixture
-def processes(tmp_path):
-    processes = Processes(tmp_path)
-    yield processes
-    processes.end()
-    print(processes.logs())
 
 
 def test_the_address_bar_and_the_history_have_no_token(launch, open_page):

@@ -1,6 +1,9 @@
 """What is expected of a run, while it is in progress."""
 
+import pytest
 from playwright.sync_api import expect
+
+pytestmark = pytest.mark.thorough
 
 EXPECTATIONS = """expect=[
     { name = "Butler does not serve", never = { robot = "Butler", behavior = "SERVE", for = "2 s" } },

@@ -7,6 +7,8 @@ from playwright.sync_api import expect
 
 from lab import PATIENCE_S, free_port, start_console
 
+pytestmark = pytest.mark.thorough
+
 
 @pytest.mark.parametrize("width, height", [(1440, 900), (390, 844)])
 def test_the_name_of_the_run_is_always_visible(launch, open_page, screenshots, width, height):

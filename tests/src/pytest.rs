@@ -63,8 +63,7 @@ fn files_of(folder: &Path, choice: Choice) -> Vec<PathBuf> {
         let path = entry.unwrap().path();
         let name = path.file_name().unwrap().to_string_lossy();
         let is_test = name.starts_with("test_") && name.ends_with(".py");
-        let is_usual = choice == Choice::Usual;
-        if is_test && (is_usual || has_thorough_tests(&path)) {
+        if is_test && has_tests(&path, choice) {
             tests.push(path);
         }
     }
@@ -75,10 +74,12 @@ fn files_of(folder: &Path, choice: Choice) -> Vec<PathBuf> {
     tests
 }
 
-fn has_thorough_tests(file: &Path) -> bool {
-    std::fs::read_to_string(file)
-        .unwrap()
-        .contains("pytest.mark.thorough")
+fn has_tests(file: &Path, choice: Choice) -> bool {
+    let text = std::fs::read_to_string(file).unwrap();
+    match choice {
+        Choice::Usual => !text.contains("\npytestmark = pytest.mark.thorough\n"),
+        Choice::Thorough => text.contains("pytest.mark.thorough"),
+    }
 }
 
 /// In CI, runs the tests once more that have failed, and names those that pass then in the file of the variable `CARS_FLAKY`.
