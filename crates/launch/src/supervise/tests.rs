@@ -472,9 +472,13 @@ fn the_simulator_is_not_told_of_robots_that_a_process_follows() {
         robots: Vec::new(),
         ..shell("console", "touch $DIR/closed; exit 0")
     };
-    let at_the_end = shell("Leguin", "until [ -e $DIR/over ]; do sleep 0.01; done");
+    // It ends when the simulator has ended.
+    let at_the_end = shell(
+        "Leguin",
+        "until [ -s $DIR/simulator ] && ! kill -0 $(cat $DIR/simulator) 2> /dev/null; do sleep 0.01; done",
+    );
     let simulator = "until [ -e $DIR/left ] && [ -e $DIR/closed ]; do sleep 0.01; done; \
-                     sleep 0.3; (sleep 0.3; touch $DIR/over) < /dev/null > /dev/null 2>&1 &";
+                     sleep 0.3; echo $$ > $DIR/simulator";
     let hall = Hall::new(simulator)
         .with(restarted)
         .with(observer)
