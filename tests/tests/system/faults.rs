@@ -41,7 +41,7 @@ fn with_leguin_stopped(lab: &Lab, run: &str, duration: &str, more: &[&str]) -> (
 #[test]
 fn a_stopped_robot_holds_the_clock_costs_nothing_and_changes_nothing() {
     let lab = Lab::new();
-    let (mut launch, leguin) = with_leguin_stopped(&lab, "hang", "60 s", &["--speed", "10"]);
+    let (mut launch, leguin) = with_leguin_stopped(&lab, "hang", "60 s", &["--speed", "20"]);
     let stopped = Instant::now();
     lab.ctl("hang", &["start"]);
     let said = launch.prints_after("Leguin (", Some(stopped));
@@ -53,7 +53,7 @@ fn a_stopped_robot_holds_the_clock_costs_nothing_and_changes_nothing() {
     // Long enough that its link is given up, too.
     std::thread::sleep(Duration::from_secs(1));
     let (before_s, begun) = (launch.cpu_s(), Instant::now());
-    std::thread::sleep(Duration::from_secs(4));
+    std::thread::sleep(Duration::from_secs(3));
     let share = (launch.cpu_s() - before_s) / begun.elapsed().as_secs_f64();
     println!(
         "all processes together used {:.2} % of a core while the clock was held",
@@ -158,11 +158,11 @@ fn set_deadline(lab: &Lab, run: &str, deadline: &str) {
 
 #[test]
 fn on_late_abort_ends_the_run_and_on_late_continue_goes_on() {
-    let lab = Lab::new();
-    for (mode, end) in [("abort", "aborted"), ("continue", "finished")] {
+    let play = |mode: &str, end: &str| {
+        let lab = Lab::new();
         let run = format!("late-{mode}");
         let set = format!("on_late={mode}");
-        let args = ["--speed", "10", "--set", &set, "--set", PATIENT];
+        let args = ["--speed", "20", "--set", &set, "--set", PATIENT];
         let (mut launch, leguin) = with_leguin_stopped(&lab, &run, "60 s", &args);
         set_deadline(&lab, &run, "0.5 s");
         lab.ctl(&run, &["start"]);
@@ -181,7 +181,11 @@ fn on_late_abort_ends_the_run_and_on_late_continue_goes_on() {
             launch.printed()
         );
         nobody_is_left(&run);
-    }
+    };
+    side_by_side(&[
+        ("abort", &|| play("abort", "aborted")),
+        ("continue", &|| play("continue", "finished")),
+    ]);
 }
 
 #[test]
@@ -208,6 +212,7 @@ fn each_robot_can_have_its_own_rule_and_a_lost_one_returns() {
     // Otherwise a machine that stands still for longer than the lease of a link loses her again.
     let wait = ["ctl", "late", "wait", "--robot", "Leguin"];
     lab.ok(&[&wait[..], &["--run", "late-own"]].concat());
+    lab.ok(&["ctl", "speed", "max", "--run", "late-own"]);
     launch.finish();
     let events = lab.events("late-own");
     let of = |kind: &str| -> Vec<u64> {
@@ -356,11 +361,11 @@ fn a_crash_of_the_scenario_happens_at_its_tick_and_is_the_same_every_time() {
     assert_eq!(lab.summary("fault-crash")["robots"]["Leguin"]["returns"], 1);
 }
 
-/// Plays the hall eight times side by side with Leguin stopped at 10 s, and demands the same record of all. The lease of her
+/// Plays the hall several times side by side with Leguin stopped at 10 s, and demands the same record of all. The lease of her
 /// token and the deadline end in the middle of the hang. The deadline is so long, and Butler has none, because otherwise a
 /// machine that stands still makes a robot miss a tick. Returns the events of one run.
 fn play_hang(run: &str, end: &str, lose_after: u32) -> Vec<serde_json::Value> {
-    const REPETITIONS: usize = 8;
+    const REPETITIONS: usize = 4;
     let lab = Lab::new();
     let fault = format!("fault=[{{ robot = \"Leguin\", do = \"hang\", at = \"10 s\"{end} }}]");
     let lose_after = format!("lose_after={lose_after}");
@@ -447,8 +452,10 @@ fn returns_from_hang(until_s: u64, lose_after: u32) {
 
 #[test]
 fn a_robot_that_returns_from_a_hang_of_the_scenario_does_the_same_every_time() {
-    returns_from_hang(50, 70);
-    returns_from_hang(50, 100);
+    side_by_side(&[
+        ("after it was lost", &|| returns_from_hang(50, 70)),
+        ("without having been lost", &|| returns_from_hang(50, 100)),
+    ]);
 }
 
 /// Its link has not been given up.
@@ -607,16 +614,29 @@ fn a_stopped_simulator_is_named_while_it_is_stopped_and_afterwards() {
     );
 }
 
-/// What robots answered before the stop, or in it, arrives after the deadline: they are not late.
+/// What robots answered before the stop, or in it, arrives after the deadline: they are not late. A machine that stands still
+/// keeps the robots waiting, too: then it is tried again.
 #[test]
 fn a_stopped_simulator_misses_no_robot() {
-    const STOPS: usize = 12;
+    const ATTEMPTS: usize = 5;
+    let lab = Lab::new();
+    for attempt in 1..=ATTEMPTS {
+        let (late, is_disturbed) = stop_simulator(&lab, &format!("sim-stops-{attempt}"));
+        if late == 0 {
+            return;
+        }
+        assert!(is_disturbed, "{late} robots were late");
+    }
+    panic!("this machine stood still in each of {ATTEMPTS} attempts");
+}
+
+/// Stops the simulator of a run several times. Returns how often a robot was late, and whether the machine stood still.
+fn stop_simulator(lab: &Lab, run: &str) -> (usize, bool) {
+    const STOPS: usize = 4;
     const DEADLINE: Duration = Duration::from_millis(700);
     // Shorter than the lease of a link, which would lose every robot.
     const STOP: Duration = Duration::from_millis(1000);
 
-    let lab = Lab::new();
-    let run = "sim-stops";
     let deadline = format!("deadline={} s", DEADLINE.as_secs_f64());
     // At this speed a tick is open nearly always.
     let mut args = vec!["launch", FILE, "--speed", "max", "--duration", "1000000 s"];
@@ -634,6 +654,7 @@ fn a_stopped_simulator_misses_no_robot() {
     }
     lab.ok(&["ctl", "stop", "--run", run]);
     launch.finish();
+    nobody_is_left(run);
 
     let events = lab.events(run);
     let late = events
@@ -644,8 +665,5 @@ fn a_stopped_simulator_misses_no_robot() {
         "{STOPS} stops, {} ticks, {late} late",
         events.last().unwrap()["tick"]
     );
-    // A machine that stands still keeps the robots waiting, too.
-    let is_disturbed = stalls.longer_than(DEADLINE / 2) > 0;
-    assert!(late == 0 || is_disturbed, "{late} robots were late");
-    nobody_is_left(run);
+    (late, stalls.longer_than(DEADLINE / 2) > 0)
 }
