@@ -153,6 +153,7 @@ def test_an_encrypted_endpoint_wants_a_certificate(lab: Lab) -> None:
     assert robot.returncode == 1 and "wants a certificate: name a file zenoh.json5" in said
 
 
+@pytest.mark.thorough
 def test_the_kit_finds_no_fault(lab: Lab) -> None:
     """Every rule of docs/protocol.md, as `cars conform` checks it."""
     echo = Path(__file__).with_name("echo.py")

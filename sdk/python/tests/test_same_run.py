@@ -16,20 +16,34 @@ LOSSY = (
 )
 
 
+HALL = "hors_doeuvres.toml"
+TWO = ["Butler", "Leguin"]
+
+
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("scenario", "team", "changes"),
     [
-        ("hors_doeuvres.toml", ["Butler", "Leguin"], []),
-        ("hors_doeuvres.toml", ["Butler", "Leguin"], ["--seed", "7"]),
-        ("hors_doeuvres.toml", ["Butler", "Leguin"], ["--set", LOSSY, "--set", "network.queries.loss=0.2"]),
-        ("hors_doeuvres.toml", ["Butler", "Leguin"], ["--set", "robot.Leguin.params.affect=off"]),
-        ("hors_doeuvres.toml", ["Butler", "Leguin"], ["--set", "guests.count=180", "--seed", "99"]),
-        ("partition.toml", ["Butler", "Leguin"], []),
-        ("museum.toml", ["Butler", "Leguin"], ["--seed", "12345"]),
-        ("three_robots.toml", ["Butler", "Leguin", "Vonda"], ["--set", "robot.Butler.params.refiller=Vonda"]),
+        (HALL, TWO, ["--seed", "7"]),
+        (HALL, TWO, ["--set", LOSSY, "--set", "network.queries.loss=0.2"]),
+        (HALL, TWO, ["--set", "robot.Leguin.params.affect=off"]),
+        (HALL, TWO, ["--set", "guests.count=180", "--seed", "99"]),
+        ("partition.toml", TWO, []),
+        ("museum.toml", TWO, ["--seed", "12345"]),
+        ("three_robots.toml", [*TWO, "Vonda"], ["--set", "robot.Butler.params.refiller=Vonda"]),
     ],
 )
-def test_leguin_in_python_gives_the_same_run(lab: Lab, scenario: str, team: list[str], changes: list[str]) -> None:
+def test_leguin_in_python_gives_the_same_run_elsewhere(
+    lab: Lab, scenario: str, team: list[str], changes: list[str]
+) -> None:
+    assert_leguin_is_the_same(lab, scenario, team, changes)
+
+
+def test_leguin_in_python_gives_the_same_run(lab: Lab) -> None:
+    assert_leguin_is_the_same(lab, HALL, TWO, [])
+
+
+def assert_leguin_is_the_same(lab: Lab, scenario: str, team: list[str], changes: list[str]) -> None:
     """Byte for byte, as the Rust Leguin, as a process and in one process."""
     python = lab.launch("python", scenario, {name: PYTHON[name] for name in team}, *changes)
     assert len(python) > 1200
@@ -45,12 +59,8 @@ FAULTS = {
 }
 
 
-THOROUGH = ("a crash that is waited for", "a hang that is waited for")
-
-
-@pytest.mark.parametrize(
-    "fault", [pytest.param(name, marks=pytest.mark.thorough) if name in THOROUGH else name for name in FAULTS]
-)
+@pytest.mark.thorough
+@pytest.mark.parametrize("fault", list(FAULTS))
 def test_a_leguin_that_falters_gives_the_same_run(lab: Lab, fault: str) -> None:
     """What happens to a process is part of the seed, too; who returns takes over as in Rust."""
     on_late = "wait" if "waited" in fault else "continue"

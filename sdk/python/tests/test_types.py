@@ -7,7 +7,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from conftest import missing
+
+pytestmark = pytest.mark.thorough
 
 
 def test_mypy_has_nothing_to_say(tmp_path: Path) -> None:

@@ -33,12 +33,12 @@ enum Back {
     After(Tick),
 }
 
-/// Every third tick of each robot and way, and with `CARS_SCHEDULES` every tick.
+/// Every sixth tick of each robot and way, and with `CARS_SCHEDULES` every tick.
 fn ticks(index: usize) -> impl Iterator<Item = Tick> {
     let every = if crate::number("CARS_SCHEDULES").is_some() {
         1
     } else {
-        3
+        6
     };
     (1 + index as Tick % every..TICKS).step_by(every as usize)
 }

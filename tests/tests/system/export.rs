@@ -145,6 +145,7 @@ fn play_hostile(lab: &Lab, run: &str) {
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn tables_have_every_value_of_the_record_also_of_hostile_robots() {
     if !has_python(HOSTILE) {
         return;
@@ -208,6 +209,7 @@ fn tables_have_every_value_of_the_record_also_of_hostile_robots() {
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn the_examples_of_the_documentation_work() {
     let lab = Lab::new();
     lab.ok(&["run", HALL, "--run", "hall", "--duration", "60 s"]);
@@ -239,6 +241,7 @@ fn notes_of_export(lab: &Lab, run: &str) -> String {
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn a_run_that_was_killed_or_not_recorded_is_exported_as_far_as_it_goes() {
     let lab = Lab::new();
     let launch = [
@@ -385,6 +388,7 @@ fn select<'a>(trace: &'a Value, members: &[(&str, Value)]) -> Vec<&'a Value> {
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn a_trace_has_every_tick_every_report_and_what_held_the_clock_up() {
     let lab = Lab::new();
     let run = "exports-trace";

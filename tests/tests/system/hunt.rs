@@ -97,7 +97,7 @@ fn a_command_that_is_printed_can_be_typed() {
     let lab = Lab::new();
     let folder = lab.out().join("what I found");
     let out = folder.to_str().unwrap();
-    let args = affectless(&["--plans", "64", "-o", out]);
+    let args = affectless(&["--plans", "8", "-o", out]);
     let args: Vec<&str> = args.into_iter().filter(|arg| *arg != "--json").collect();
     let (status, printed) = lab.cars_without_out(&args);
     assert_eq!(status, 1, "{printed}");
@@ -144,6 +144,7 @@ fn the_result_depends_on_seed_and_plans_only() {
 
 /// The planted defect: Leguin stands still after she has received a command twice for the second time.
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn a_planted_defect_is_found() {
     let lab = Lab::new();
     let text = std::fs::read_to_string(root().join(HALL)).unwrap();

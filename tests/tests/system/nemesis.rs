@@ -27,6 +27,8 @@ use cable::Cable;
 use plan::{Fault, Flood, Plan};
 use rogue::Rogue;
 
+/// Launches of the usual version: both policies, one of them secured.
+const USUAL: [u64; 2] = [0, 1];
 /// Launches of the short version: every size, both policies, plain and secured, every kind of fault.
 const SHORT: [u64; 5] = [0, 1, 3, 4, 8];
 /// Ticks that must follow the last fault.
@@ -440,12 +442,23 @@ fn number(variable: &str) -> Option<u64> {
 
 #[test]
 fn whatever_happens_the_run_goes_on_and_its_record_is_whole() {
+    play_launches(&USUAL);
+}
+
+#[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
+fn more_happens_and_the_run_goes_on_and_its_record_is_whole() {
+    play_launches(&SHORT);
+}
+
+/// Plays the launches of these seeds, or those that the environment states.
+fn play_launches(usual: &[u64]) {
     let begun = Instant::now();
     let length = number("CARS_NEMESIS_S").map(Duration::from_secs);
     let seeds: Box<dyn Iterator<Item = u64>> = match (number("CARS_NEMESIS_SEED"), length) {
         (Some(seed), None) => Box::new(std::iter::once(seed)),
         (Some(seed), Some(_)) => Box::new(seed..),
-        (None, None) => Box::new(SHORT.into_iter()),
+        (None, None) => Box::new(usual.iter().copied()),
         (None, Some(_)) => {
             let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap();
             Box::new(now.as_millis() as u64..)

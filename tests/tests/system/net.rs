@@ -44,13 +44,14 @@ fn play(lab: &Lab, run: &str, via: &str, plan: &str, more: &[&str]) -> Running {
     lab.start(run, &[args.as_slice(), more].concat())
 }
 
-/// What links can be made of here.
-fn vias(test: &str) -> &'static [&'static str] {
-    if has_namespaces(test) {
-        &["proxy", "namespaces"]
-    } else {
-        &["proxy"]
-    }
+/// Checks links of all that they can be made of here, side by side.
+fn for_each_via(test: &str, check: impl Fn(&str) + Sync) {
+    let by_proxy = || check("proxy");
+    let by_namespaces = || check("namespaces");
+    let checks: [(&str, &(dyn Fn() + Sync)); 2] =
+        [("proxy", &by_proxy), ("namespaces", &by_namespaces)];
+    let count = if has_namespaces(test) { 2 } else { 1 };
+    side_by_side(&checks[..count]);
 }
 
 fn nothing_is_left(run: &str, player: &Running) {
@@ -239,7 +240,7 @@ fn the_partition_of_a_scenario_is_played_on_real_links() {
     let (lab, run) = (Lab::new(), "partition-on-links");
     let file = "launch/partition.toml";
 
-    // From 120 s to 240 s at this speed: from 4 s to 8 s of the wall clock.
+    // From 120 s to 240 s at this speed: from 2 s to 4 s of the wall clock.
     let mut player = lab.start(
         run,
         &[
@@ -249,7 +250,7 @@ fn the_partition_of_a_scenario_is_played_on_real_links() {
             "--via",
             "proxy",
             "--speed",
-            "30",
+            "60",
             "--duration",
             "300 s",
         ],
@@ -365,7 +366,7 @@ fn a_slow_a_narrow_and_a_closed_link_change_nothing() {
 
 #[test]
 fn an_interrupted_play_leaves_nothing_behind() {
-    for via in vias("interrupt") {
+    for_each_via("interrupt", |via| {
         let (lab, run) = (Lab::new(), format!("stop-{via}"));
         let plan = plan(&lab, 60, "\"cut\"");
         let mut player = play(&lab, &run, via, &plan, &[]);
@@ -376,12 +377,12 @@ fn an_interrupted_play_leaves_nothing_behind() {
             "a run that was interrupted did not finish"
         );
         nothing_is_left(&run, &player);
-    }
+    });
 }
 
 #[test]
 fn a_killed_play_leaves_nothing_but_what_the_next_one_removes() {
-    for via in vias("killed") {
+    for_each_via("killed", |via| {
         let (lab, run) = (Lab::new(), format!("killed-{via}"));
         let plan = plan(&lab, 60, "\"cut\"");
         let mut player = play(&lab, &run, via, &plan, &[]);
@@ -390,8 +391,8 @@ fn a_killed_play_leaves_nothing_but_what_the_next_one_removes() {
         player.wait();
         nobody_is_left(&run);
         assert_eq!(lab.events(&run).pop().unwrap()["event"], "end");
-        if *via == "proxy" {
-            continue;
+        if via == "proxy" {
+            return;
         }
 
         // A process of the play that does not end by itself.
@@ -407,7 +408,7 @@ fn a_killed_play_leaves_nothing_but_what_the_next_one_removes() {
         next.wait();
         nothing_is_left("next-play", &player);
         nothing_is_left("next-play", &next);
-    }
+    });
 }
 
 #[test]

@@ -13,6 +13,17 @@ pub(crate) fn check(lab: &Lab, folder: &str) -> (i32, String) {
 
 #[test]
 fn damage_anywhere_in_a_record_is_found_and_named() {
+    damage_record(15);
+}
+
+#[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
+fn damage_at_many_places_of_a_record_is_found_and_named() {
+    damage_record(120);
+}
+
+/// Damages a record at so many places, half of them in its last lines.
+fn damage_record(count: usize) {
     let lab = Lab::new();
     lab.ok(&["run", HALL, "--duration", "30 s", "--run", "whole"]);
     let folder = lab.out().join("whole");
@@ -23,8 +34,9 @@ fn damage_anywhere_in_a_record_is_found_and_named() {
     assert_eq!(code, 0, "{said}");
     assert!(said.contains("60 ticks to the end"), "{said}");
 
-    let mut places: Vec<usize> = (0..whole.len()).step_by(whole.len() / 60).collect();
-    places.extend(whole.len() - 120..whole.len() - 1);
+    let end = whole.len() - 120;
+    let mut places: Vec<usize> = (0..end).step_by(2 * end / count).collect();
+    places.extend((end..whole.len() - 1).step_by(240 / count));
     for &place in &places {
         let mut damaged = whole.clone();
         damaged[place] ^= 1;
@@ -44,6 +56,17 @@ fn damage_anywhere_in_a_record_is_found_and_named() {
 
 #[test]
 fn damage_in_any_file_of_a_run_is_found_and_the_file_named() {
+    damage_files(5);
+}
+
+#[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
+fn damage_at_many_places_of_any_file_of_a_run_is_found_and_the_file_named() {
+    damage_files(40);
+}
+
+/// Damages each file of a run at so many places.
+fn damage_files(count: usize) {
     let lab = Lab::new();
     let launch = ["launch", HALL, "--no-console", "--speed", "max", "--quiet"];
     lab.ok(&[&launch[..], &["--duration", "10 s", "--run", "whole"]].concat());
@@ -62,7 +85,7 @@ fn damage_in_any_file_of_a_run_is_found_and_the_file_named() {
     for name in files {
         let file = folder.join(name);
         let whole = std::fs::read(&file).unwrap();
-        let mut step = whole.len() / 40;
+        let mut step = whole.len() / count;
         step += usize::from(step.is_multiple_of(2)); // Not always at the same column.
         for place in (0..whole.len()).step_by(step) {
             let mut damaged = whole.clone();

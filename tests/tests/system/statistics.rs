@@ -17,6 +17,7 @@ const QUANTILES: [f64; 6] = [0.0, 0.1, 0.25, 0.5, 0.9, 1.0];
 type Draw = fn(&mut Stream) -> f64;
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn all_numbers_are_those_of_scipy_and_lifelines() {
     let install = "pip install scipy lifelines";
     if !has_modules("the statistics", "lifelines, scipy", install) {

@@ -107,6 +107,7 @@ fn means(name: &str, change: (&str, &str), args: &[&str]) -> impl Fn(&str, &str,
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn where_all_commands_are_lost_a_team_that_can_intercept_works_on() {
     let values = ("values = [0.0, 0.1, 0.25, 0.5, 1.0]", "values = [0.0, 1.0]");
     let mean = means("deadlock.toml", values, &["--duration", "200 s"]);
@@ -121,6 +122,7 @@ fn where_all_commands_are_lost_a_team_that_can_intercept_works_on() {
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn with_emotions_the_team_works_on_while_it_is_cut_off_and_recovers() {
     let values = (
         "values = [\"0 s\", \"60 s\", \"120 s\", \"240 s\"]",
