@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 /// The continuous input to the dynamics during one step.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Drive {
+pub enum StepInput {
     /// The time until help arrives divided by the time until it is needed; dimensionless, 0 or more.
     Need(f64),
     /// No need: the urgency falls.
@@ -57,7 +57,7 @@ pub enum Belief {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Stimulus {
     /// The continuous input.
-    pub drive: Drive,
+    pub drive: StepInput,
     /// The event that happened in this step, if any.
     pub event: Option<ProgressEvent>,
     /// The belief formed in this step. `None` keeps the previous one.
@@ -68,7 +68,7 @@ pub struct Stimulus {
 
 impl Stimulus {
     /// A stimulus with only a continuous input.
-    pub fn new(drive: Drive) -> Self {
+    pub fn new(drive: StepInput) -> Self {
         Self {
             drive,
             event: None,
@@ -79,12 +79,12 @@ impl Stimulus {
 
     /// A stimulus with a need ratio (dimensionless).
     pub fn need(ratio: f64) -> Self {
-        Self::new(Drive::Need(ratio))
+        Self::new(StepInput::Need(ratio))
     }
 
     /// A stimulus without need.
     pub fn rest() -> Self {
-        Self::new(Drive::Rest)
+        Self::new(StepInput::Rest)
     }
 
     /// Sets the event.
@@ -233,15 +233,15 @@ impl<E: EmotionLabel> Dynamics<E> {
     /// The urgency that `drive` moves toward: `min(1, g * need / rho_max)`.
     ///
     /// `None` if the drive leaves the urgency unchanged.
-    pub fn target(&self, drive: Drive) -> Option<Urgency> {
+    pub fn target(&self, drive: StepInput) -> Option<Urgency> {
         match drive {
-            Drive::Need(ratio) if ratio.is_nan() => None,
-            Drive::Need(ratio) => {
+            StepInput::Need(ratio) if ratio.is_nan() => None,
+            StepInput::Need(ratio) => {
                 let target = self.gain * ratio / self.parameters.rho_max;
                 Some(Urgency::saturating(target))
             }
-            Drive::Rest => Some(Urgency::MIN),
-            Drive::Hold => None,
+            StepInput::Rest => Some(Urgency::MIN),
+            StepInput::Hold => None,
         }
     }
 

@@ -28,7 +28,7 @@ pub const FACE: &str = "face";
 ///
 /// A robot builds it from its feeling and its appraisal, publishes it with its state, and shows it in its panel. Peers,
 /// consoles and exports therefore see the same values. By convention, the state variables have the names of
-/// [`Frame::numbers`] and [`Frame::texts`].
+/// [`AffectFrame::numbers`] and [`AffectFrame::texts`].
 ///
 /// ```
 /// use affect::akr::{Agency, Appraisal};
@@ -41,7 +41,7 @@ pub const FACE: &str = "face";
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
-pub struct Frame<'a> {
+pub struct AffectFrame<'a> {
     name: &'a str,
     urgency: Urgency,
     appraisal: Appraisal,
@@ -50,10 +50,15 @@ pub struct Frame<'a> {
 
 impl Schemata {
     /// The emotion with this name in the present situation; `None` if there is no schema for it.
-    pub fn frame(&self, name: &str, urgency: Urgency, appraisal: Appraisal) -> Option<Frame<'_>> {
+    pub fn frame(
+        &self,
+        name: &str,
+        urgency: Urgency,
+        appraisal: Appraisal,
+    ) -> Option<AffectFrame<'_>> {
         let (name, schema) = self.entry(name)?;
 
-        Some(Frame {
+        Some(AffectFrame {
             name,
             urgency,
             appraisal,
@@ -62,7 +67,7 @@ impl Schemata {
     }
 }
 
-impl Frame<'_> {
+impl AffectFrame<'_> {
     /// Name of the emotion.
     pub fn name(&self) -> &str {
         self.name

@@ -8,7 +8,7 @@
 //! | Task | Item |
 //! | --- | --- |
 //! | Describe a personality, appraise a situation | [`akr`] |
-//! | Describe an emotion with all its components, explain it in words, publish it | [`Frame`], [`Schemata`] |
+//! | Describe an emotion with all its components, explain it in words, publish it | [`AffectFrame`], [`Schemata`] |
 //! | Measure progress | [`progress`] |
 //! | Change a feeling over time with progress, events and beliefs | [`Dynamics`], [`Ladder`] |
 //! | Generate emotion from progress (ESG) | [`EmotionGenerator`] and its implementations |
@@ -155,8 +155,8 @@ pub mod progress;
 mod scalar;
 mod schema;
 
-pub use dynamics::{Belief, Drive, Dynamics, EmotionState, ProgressEvent, Stimulus};
-pub use frame::Frame;
+pub use dynamics::{Belief, Dynamics, EmotionState, ProgressEvent, StepInput, Stimulus};
+pub use frame::AffectFrame;
 pub use generator::{DynamicGenerator, EmotionGenerator, EmotionRow, RuleGenerator};
 pub use label::{EmotionLabel, Feeling, StandardEmotion};
 pub use ladder::{BeliefEmotions, Ladder, Rung};

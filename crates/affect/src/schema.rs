@@ -1,6 +1,6 @@
 //! Emotion schemata: the components that all instances of an emotion share, as data.
 //!
-//! Together with an urgency and an appraisal, which depend on the situation, a schema makes a [`Frame`](crate::Frame). The schemata of
+//! Together with an urgency and an appraisal, which depend on the situation, a schema makes a [`AffectFrame`](crate::AffectFrame). The schemata of
 //! [`StandardEmotion`] are in a TOML file of this crate, which marks each value as documented or chosen. A robot with
 //! an emotion of its own defines a table for it and loads it with [`Schemata::from_toml`].
 //!

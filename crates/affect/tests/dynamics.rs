@@ -9,8 +9,8 @@ use affect::StandardEmotion::{
     Angry, Concerned, Confident, Discouraged, Frustrated, Happy, Hopeful,
 };
 use affect::{
-    Belief, Caution, Drive, Dynamics, DynamicsParameters, EmotionState, Ladder, ProgressEvent,
-    StandardEmotion, StateSet, Stimulus, Urgency,
+    Belief, Caution, Dynamics, DynamicsParameters, EmotionState, Ladder, ProgressEvent,
+    StandardEmotion, StateSet, StepInput, Stimulus, Urgency,
 };
 use proptest::prelude::*;
 
@@ -119,7 +119,7 @@ fn urgency_does_not_change_without_a_measure() {
     robot.entered(Stimulus::need(1.0), 5.0);
     let before = robot.state.feeling();
 
-    for stimulus in [Stimulus::new(Drive::Hold), Stimulus::need(f64::NAN)] {
+    for stimulus in [Stimulus::new(StepInput::Hold), Stimulus::need(f64::NAN)] {
         assert_eq!(robot.entered(stimulus, 5.0), []);
         assert_eq!(robot.state.feeling(), before);
     }
@@ -140,7 +140,7 @@ fn t18_a_positive_input_leads_back_by_its_importance() {
         robot.entered(Stimulus::need(9.0), 60.0);
 
         let event = ProgressEvent::Positive(importance(value));
-        let emotion = robot.step(Stimulus::new(Drive::Hold).with_event(Some(event)));
+        let emotion = robot.step(Stimulus::new(StepInput::Hold).with_event(Some(event)));
 
         assert_eq!(
             emotion,
@@ -155,7 +155,7 @@ fn t18_a_positive_input_leads_back_by_its_importance() {
 fn a_setback_is_multiplied_by_the_gain() {
     let mut robot = Robot::new(StateSet::Murphy4);
     let event = ProgressEvent::Negative(importance(0.3));
-    robot.step(Stimulus::new(Drive::Hold).with_event(Some(event)));
+    robot.step(Stimulus::new(StepInput::Hold).with_event(Some(event)));
     assert_eq!(robot.urgency(), 0.3);
 }
 
@@ -288,7 +288,7 @@ fn a_state_of_another_ladder_moves_to_a_rung() {
     let json = r#"{"emotion":"CONFIDENT","urgency":0.5,"unchanged_s":0.0,"pressing_s":0.0,"belief":"unstated"}"#;
     robot.state = serde_json::from_str(json).unwrap();
     assert!(!robot.dynamics.accepts(&robot.state));
-    assert_eq!(robot.step(Stimulus::new(Drive::Hold)), Concerned);
+    assert_eq!(robot.step(Stimulus::new(StepInput::Hold)), Concerned);
 
     let wrong = json.replace("0.5", "1.5");
     assert!(serde_json::from_str::<EmotionState<StandardEmotion>>(&wrong).is_err());

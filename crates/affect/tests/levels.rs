@@ -8,7 +8,7 @@
 use affect::StandardEmotion::{self, Concerned, Frustrated, Happy};
 use affect::akr::{ActionTendency, Affect, Personality, Preference, Valence};
 use affect::levels::{
-    Candidate, CandidateError, Choice, Conceptual, ConceptualParameters, Memory, Outcome,
+    ActionOutcome, Candidate, CandidateError, Choice, Conceptual, ConceptualParameters, Memory,
     SensoryMotor, SensoryMotorParameters,
 };
 use affect::{EmotionLabel, Feeling, Intensity, Urgency};
@@ -41,15 +41,15 @@ fn feeling(emotion: StandardEmotion, intensity: f64) -> Feeling<StandardEmotion>
     }
 }
 
-fn outcome(probability: f64, after_s: f64, signed: f64) -> Outcome {
-    Outcome {
+fn outcome(probability: f64, after_s: f64, signed: f64) -> ActionOutcome {
+    ActionOutcome {
         probability,
         after_s,
         anticipated: affect(signed),
     }
 }
 
-fn candidate(action: Behavior, outcomes: &[Outcome]) -> Candidate<Behavior> {
+fn candidate(action: Behavior, outcomes: &[ActionOutcome]) -> Candidate<Behavior> {
     Candidate::new(action, None, outcomes.to_vec()).unwrap()
 }
 

@@ -7,9 +7,11 @@
 
 use affect::akr::{Agency, Appraisal, Personality, Preference, TABLE_2, Valence};
 use affect::frame::{AGENCY, CERTAINTY, CONTROLLABILITY, GOAL_CONGRUENCE, INTENSITY, VALENCE};
-use affect::{Circumstances, EmotionLabel, Frame, SchemaError, Schemata, StandardEmotion, Urgency};
+use affect::{
+    AffectFrame, Circumstances, EmotionLabel, SchemaError, Schemata, StandardEmotion, Urgency,
+};
 
-fn frame(name: &str, urgency: f64, appraisal: Appraisal) -> Frame<'_> {
+fn frame(name: &str, urgency: f64, appraisal: Appraisal) -> AffectFrame<'_> {
     let urgency = Urgency::new(urgency).unwrap();
     let frame = Schemata::standard().frame(name, urgency, appraisal);
     frame.unwrap()
@@ -63,7 +65,7 @@ fn two_episodes_of_an_emotion_differ_in_their_appraisals() {
         CERTAINTY,
     ];
     for name in names {
-        let value = |frame: &Frame<'_>| {
+        let value = |frame: &AffectFrame<'_>| {
             let all = frame.numbers();
             all.iter().find(|(own, _)| *own == name).unwrap().1
         };

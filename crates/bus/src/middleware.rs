@@ -24,7 +24,7 @@ use crate::reason::reason;
 use crate::reply::{Pending, QUERY_TIMEOUT, Reply};
 use crate::role::Role;
 use crate::runtime::{block, check_threads};
-use crate::settings::{CLIENT_MODE, ROUTER_MODE, SETTINGS, Setting};
+use crate::settings::{CLIENT_MODE, MiddlewareSetting, ROUTER_MODE, SETTINGS};
 
 /// What else may be the matter with an encrypted endpoint.
 const TLS_HINT: &str = " (are both certificates of the same `cars secure init`, valid, and the simulator's for this host?)";
@@ -576,7 +576,7 @@ fn configuration(role: &Role, overrides: Option<&PathBuf>) -> Result<Config, Str
         }
     };
     let common = SETTINGS.iter().filter(|_| overrides.is_none());
-    for Setting { key, value, .. } in [&mode].into_iter().chain(common) {
+    for MiddlewareSetting { key, value, .. } in [&mode].into_iter().chain(common) {
         set(key, value)?;
     }
 
@@ -797,8 +797,8 @@ mod tests {
             .to_vec()
     }
 
-    fn assert_settings(config: &Config, settings: &[Setting]) {
-        for Setting { key, value, .. } in settings
+    fn assert_settings(config: &Config, settings: &[MiddlewareSetting]) {
+        for MiddlewareSetting { key, value, .. } in settings
             .iter()
             .filter(|setting| !setting.key.ends_with("retry"))
         {
@@ -969,7 +969,7 @@ mod tests {
         ] {
             let built_in = configuration(&role, None).unwrap();
             let from_file = configuration(&role, Some(&folder.join(file))).unwrap();
-            for Setting { key, .. } in SETTINGS.iter().chain(&[ROUTER_MODE]) {
+            for MiddlewareSetting { key, .. } in SETTINGS.iter().chain(&[ROUTER_MODE]) {
                 assert_eq!(
                     from_file.get_json(key).ok(),
                     built_in.get_json(key).ok(),

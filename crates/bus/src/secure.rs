@@ -9,7 +9,7 @@ use base64::engine::general_purpose::STANDARD;
 
 use crate::DEFAULT_ENDPOINT;
 use crate::endpoint::TLS;
-use crate::settings::{CLIENT_MODE, ROUTER_MODE, SETTINGS, Setting};
+use crate::settings::{CLIENT_MODE, MiddlewareSetting, ROUTER_MODE, SETTINGS};
 use protocol::access::{CONSOLE, Grant, of_operator, of_robot};
 use protocol::keys::Keys;
 use protocol::name::{OPERATOR, RobotName};
@@ -172,7 +172,7 @@ struct Tree {
 }
 
 impl Tree {
-    fn of<'a>(settings: impl Iterator<Item = &'a Setting>) -> Self {
+    fn of<'a>(settings: impl Iterator<Item = &'a MiddlewareSetting>) -> Self {
         let mut tree = Self::default();
         settings.for_each(|setting| tree.add(setting.key, setting.why, setting.value));
         tree

@@ -2,7 +2,7 @@
 //! file and for the files that `cars secure init` writes; `configs/zenoh/` says the same.
 
 /// One of the middleware's settings.
-pub(crate) struct Setting {
+pub(crate) struct MiddlewareSetting {
     /// Its path.
     pub(crate) key: &'static str,
     /// Its value, as JSON5.
@@ -11,26 +11,26 @@ pub(crate) struct Setting {
     pub(crate) why: &'static str,
 }
 
-const fn setting(key: &'static str, value: &'static str, why: &'static str) -> Setting {
-    Setting { key, value, why }
+const fn setting(key: &'static str, value: &'static str, why: &'static str) -> MiddlewareSetting {
+    MiddlewareSetting { key, value, why }
 }
 
 /// How those who connect take part; never a file's affair.
-pub(crate) const CLIENT_MODE: Setting = setting(
+pub(crate) const CLIENT_MODE: MiddlewareSetting = setting(
     "mode",
     "\"client\"",
     "Everything goes by the simulator, which checks it.",
 );
 
 /// How those to whom others connect take part; never a file's affair.
-pub(crate) const ROUTER_MODE: Setting = setting(
+pub(crate) const ROUTER_MODE: MiddlewareSetting = setting(
     "mode",
     "\"router\"",
     "All processes connect here, and to no other process.",
 );
 
 /// What every session is set to, unless a configuration file says otherwise.
-pub(crate) const SETTINGS: [Setting; 13] = [
+pub(crate) const SETTINGS: [MiddlewareSetting; 13] = [
     setting(
         "scouting/delay",
         "0",

@@ -18,7 +18,7 @@ use terminal::OutputError;
 
 use crate::errors::{Context, Result, refusal, render};
 use crate::experiment::equal_arms;
-use crate::kind::{Kind, class_of};
+use crate::kind::{FileKind, class_of};
 use crate::{named, remarks};
 
 /// `cars check`.
@@ -58,22 +58,22 @@ fn describe(path: &Path) -> Result<String> {
     if path.is_dir() {
         return describe_run(path);
     }
-    let kind = Kind::of(path)?;
-    if matches!(kind, Kind::Launch | Kind::Scenario) {
+    let kind = FileKind::of(path)?;
+    if matches!(kind, FileKind::Launch | FileKind::Scenario) {
         // As `cars run` and `cars launch` name it.
         default_run_name(path)?;
     }
 
     match kind {
-        Kind::Experiment => describe_experiment(path),
-        Kind::Launch => describe_launch(path),
-        Kind::Links => {
-            let faults = launch::net::Plan::check(path)?;
+        FileKind::Experiment => describe_experiment(path),
+        FileKind::Launch => describe_launch(path),
+        FileKind::Links => {
+            let faults = launch::net::FaultPlan::check(path)?;
             Ok(count(faults, "fault of a link", "faults of links"))
         }
-        Kind::Parameters => describe_parameters(path),
-        Kind::Roster => describe_roster(path),
-        Kind::Scenario => {
+        FileKind::Parameters => describe_parameters(path),
+        FileKind::Roster => describe_roster(path),
+        FileKind::Scenario => {
             let changes = Changes::default();
             let scenario = Scenario::load(path, &changes)?;
             remarks::show(path, &changes);

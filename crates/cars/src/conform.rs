@@ -5,7 +5,7 @@ use std::process::{Command, ExitCode};
 
 use clap::Args;
 use config::Changes;
-use conform::{CheckSetting, Report, Role, Rule};
+use conform::{CheckReport, CheckSetting, ProtocolRule, RosterRobot};
 use protocol::{RobotName, Tick};
 use scenario::Scenario;
 use terminal::OutputError;
@@ -34,7 +34,7 @@ pub(crate) struct ConformArgs {
     json: bool,
     /// Check only this rule; may be repeated.
     #[arg(long = "rule", value_name = "NAME", value_parser = parse_rule)]
-    rules: Vec<Rule>,
+    rules: Vec<ProtocolRule>,
     /// Ticks of the longer checks.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(24..=100_000))]
     ticks: Option<Tick>,
@@ -46,8 +46,8 @@ pub(crate) struct ConformArgs {
     command: Vec<String>,
 }
 
-fn parse_rule(name: &str) -> Result<Rule, String> {
-    Rule::named(name).ok_or_else(|| {
+fn parse_rule(name: &str) -> Result<ProtocolRule, String> {
+    ProtocolRule::named(name).ok_or_else(|| {
         let names = conform::RULES.map(|rule| rule.name).join(", ");
         format!("there is no such rule; the rules are {names}")
     })
@@ -78,7 +78,7 @@ pub(crate) fn conform(args: &ConformArgs) -> Result<ExitCode> {
     }
 }
 
-fn check(args: &ConformArgs) -> Result<Report> {
+fn check(args: &ConformArgs) -> Result<CheckReport> {
     let setting = setting(args)?;
     let (program, arguments) = args
         .command
@@ -125,10 +125,10 @@ fn take_scenario(setting: &mut CheckSetting, file: &Path) -> Result<()> {
 
     setting.fake_peers.clear();
     for (name, spec) in &scenario.robots {
-        let role = Role {
+        let role = RosterRobot {
             location: spec.at,
             parameters: spec.parameters.clone(),
-            ..Role::default()
+            ..RosterRobot::default()
         };
         setting.fake_peers.insert(name.clone(), role);
     }

@@ -8,7 +8,7 @@ use lab::folder::{find, recorded_epoch, recorded_epochs};
 use lab::moment::Moment;
 use protocol::Epoch;
 use record::names::LATEST;
-use reports::diagram::{Options, Window, draw};
+use reports::diagram::{DiagramOptions, Window, draw};
 
 use crate::errors::Result;
 use crate::output;
@@ -50,11 +50,11 @@ pub(crate) fn diagram(args: &DiagramArgs) -> Result<ExitCode> {
     if recorded_epochs(&folder)?.len() > 1 {
         title += &format!(", epoch {}", files.epoch);
     }
-    let options = Options {
+    let options = DiagramOptions {
         title,
         queries: args.queries,
         is_whole: args.whole,
-        ..Options::default()
+        ..DiagramOptions::default()
     };
     let window = Window {
         from: args.from,

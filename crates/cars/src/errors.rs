@@ -14,7 +14,7 @@ pub(crate) type Result<T, E = Box<dyn Error + Send + Sync>> = std::result::Resul
 /// What the command line itself refuses, or what it was about when a library failed.
 #[derive(Debug, Default, thiserror::Error)]
 #[error("{reason}")]
-pub(crate) struct Refusal {
+pub(crate) struct RefusedCommand {
     pub(crate) reason: String,
     pub(crate) help: Option<String>,
     pub(crate) source: Option<Box<dyn Error + Send + Sync>>,
@@ -23,7 +23,7 @@ pub(crate) struct Refusal {
 /// An error of the command line: a text as for `format!`, after `help = …,` if something can be done about it.
 macro_rules! refusal {
     (help = $help:expr, $($reason:tt)+) => {
-        Box::<dyn std::error::Error + Send + Sync>::from($crate::errors::Refusal {
+        Box::<dyn std::error::Error + Send + Sync>::from($crate::errors::RefusedCommand {
             reason: format!($($reason)+),
             help: Some($help.to_string()),
             source: None,
@@ -44,7 +44,7 @@ pub(crate) trait Context<T> {
 impl<T, E: Into<Box<dyn Error + Send + Sync>>> Context<T> for Result<T, E> {
     fn context(self, reason: impl Into<String>) -> Result<T> {
         self.map_err(|source| {
-            let refusal = Refusal {
+            let refusal = RefusedCommand {
                 reason: reason.into(),
                 help: None,
                 source: Some(source.into()),
@@ -76,7 +76,7 @@ fn file_of<'a>(error: &'a (dyn Error + 'static)) -> Option<&'a FileError> {
 
 /// The help of one error, without those of its causes. A [`config::FileError`] shows its own.
 fn help_of<'a>(error: &'a (dyn Error + 'static)) -> Option<&'a str> {
-    let refusal = error.downcast_ref::<Refusal>();
+    let refusal = error.downcast_ref::<RefusedCommand>();
     let launch = error.downcast_ref::<LaunchError>();
     let lab = error.downcast_ref::<LabError>();
     refusal

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use clap::Args;
 use launch::child::{AtExit, become_program};
-use launch::exec::{Ended, exec as run_program};
+use launch::exec::{ProgramEnd, exec as run_program};
 use robot::RobotArgs;
 
 use crate::errors::{Result, refusal};
@@ -46,9 +46,9 @@ pub(crate) fn exec(args: &ExecArgs) -> Result<ExitCode> {
 
     let silence = conform::unflushed(&args.command);
     match run_program(name, args.robot.options(), &args.command, &silence)? {
-        Ended::WithRun => Ok(ExitCode::SUCCESS),
-        Ended::BySignal(code) => Ok(ExitCode::from(code)),
-        Ended::Failed(reason) => {
+        ProgramEnd::WithRun => Ok(ExitCode::SUCCESS),
+        ProgramEnd::BySignal(code) => Ok(ExitCode::from(code)),
+        ProgramEnd::Failed(reason) => {
             terminal::note(format_args!("error: {reason}"));
             Ok(ExitCode::FAILURE)
         }

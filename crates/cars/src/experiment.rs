@@ -13,7 +13,7 @@ use std::str::FromStr;
 use clap::{Args, Subcommand};
 use config::Override;
 use config::units::Time;
-use experiments::engine::{self, OUT, Options, Queue, WORKER};
+use experiments::engine::{self, EngineOptions, OUT, Queue, WORKER};
 use experiments::shell;
 use experiments::{Experiment, LaunchText, Plan, Provenance, Request, Results, Robots, Store};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -59,7 +59,7 @@ enum ExperimentCommand {
     /// Show how many units have been played, have failed, and are missing.
     Status(StatusArgs),
     /// Play one unit once more and record it as a run.
-    Replay(replay::ReplayArgs),
+    Replay(replay::ReplayUnitArgs),
 }
 
 /// What is planned.
@@ -354,7 +354,7 @@ fn play(plan: &Plan, folder: &Path, workers: &Workers, units: Range<usize>) -> R
         Some(jobs) => jobs as usize,
         None => std::thread::available_parallelism().map_or(1, usize::from),
     };
-    let options = Options {
+    let options = EngineOptions {
         units,
         jobs,
         retries_failed: workers.retry_failed,

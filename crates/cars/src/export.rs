@@ -14,7 +14,7 @@ use record::{EpochFiles, RunFolder};
 use terminal::OutputError;
 
 use crate::errors::{Result, refusal};
-use crate::output::{Output, cannot_write, check_no_record};
+use crate::output::{Destination, cannot_write, check_no_record};
 
 /// `cars export`.
 #[derive(Debug, Args)]
@@ -73,7 +73,7 @@ pub(crate) fn export(args: &ExportArgs) -> Result<ExitCode> {
     }
 
     let path = args.output.as_deref();
-    let mut output = Output::create(path)?;
+    let mut output = Destination::create(path)?;
     let written = args.write(&folder, &mut output);
     let failure = written
         .as_ref()
@@ -119,7 +119,7 @@ fn write_tables(epochs: &[EpochFiles], into: &Path) -> Result<ExitCode> {
 
 impl ExportArgs {
     /// Writes any format but the tables. Returns what it leaves out, a sentence each.
-    fn write(&self, folder: &RunFolder, out: &mut Output) -> Result<Vec<String>> {
+    fn write(&self, folder: &RunFolder, out: &mut Destination) -> Result<Vec<String>> {
         if self.format.shiviz {
             shiviz::write(&self.epochs(folder)?, out)?;
             return Ok(Vec::new());

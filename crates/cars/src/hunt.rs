@@ -10,8 +10,8 @@ use clap::Args;
 use config::units::Time;
 use config::{Changes, Override};
 use experiments::hunt::{
-    Budget, Coverage, Fate, Feature, Finding, Kind, Link, Options, Progress, Report, Subject,
-    hunt as go,
+    CommandFate, Coverage, FaultClass, Feature, Finding, HuntBudget, HuntOptions, HuntProgress,
+    HuntReport, Link, Subject, hunt as go,
 };
 use experiments::shell;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -49,7 +49,7 @@ pub(crate) struct HuntArgs {
     /// Kinds of faults that are drawn, for example `lose,crash`; without it all: lose, loss, burst, delay, duplication,
     /// partition, one-way, crash, hang, wall, crowd.
     #[arg(long, value_name = "KINDS", value_delimiter = ',')]
-    kinds: Vec<Kind>,
+    kinds: Vec<FaultClass>,
     /// Longest time of a fault, in simulated time. Walls and crowds are there for the whole run.
     #[arg(long, value_name = "TIME", default_value = "60 s", value_parser = parse_longest)]
     longest: Time,
@@ -82,7 +82,7 @@ pub(crate) fn hunt(args: &HuntArgs) -> ExitCode {
     }
 }
 
-fn play(args: &HuntArgs) -> Result<Report> {
+fn play(args: &HuntArgs) -> Result<HuntReport> {
     let file = launch::scenario_file(&args.file)?;
     let changes = Changes {
         set: args.set.clone(),
@@ -101,18 +101,18 @@ fn play(args: &HuntArgs) -> Result<Report> {
     let bar = ProgressBar::new_spinner().with_style(style);
     let begun = Instant::now();
     let report = go(&subject, &options, &mut |progress| match progress {
-        Progress::Played(plans, features) => {
+        HuntProgress::Played(plans, features) => {
             bar.set_message(format!("{plans} plans, {features} features"));
             bar.tick();
         }
-        Progress::Found(finding) => bar.suspend(|| {
+        HuntProgress::Found(finding) => bar.suspend(|| {
             let elapsed_s = begun.elapsed().as_secs_f64();
             terminal::note(format_args!(
                 "plan {} fails after {elapsed_s:.1} s: {}",
                 finding.plan, finding.expectation
             ));
         }),
-        Progress::Shrunk(finding) => bar.suspend(|| {
+        HuntProgress::Shrunk(finding) => bar.suspend(|| {
             let elapsed_s = begun.elapsed().as_secs_f64();
             let runs = finding.shrink_runs;
             terminal::note(format_args!(
@@ -143,12 +143,12 @@ fn parse_longest(text: &str) -> Result<Time, String> {
 }
 
 impl HuntArgs {
-    fn options(&self) -> Options<'static> {
+    fn options(&self) -> HuntOptions<'static> {
         let budget = match (self.plans, self.time) {
-            (Some(plans), _) => Budget::Plans(plans),
+            (Some(plans), _) => HuntBudget::Plans(plans),
             (None, time) => {
                 let time_s = time.map_or(DEFAULT_S, |time| time.0);
-                Budget::Time(Duration::try_from_secs_f64(time_s).unwrap_or(Duration::MAX))
+                HuntBudget::Time(Duration::try_from_secs_f64(time_s).unwrap_or(Duration::MAX))
             }
         };
         let jobs = match self.jobs {
@@ -156,12 +156,12 @@ impl HuntArgs {
             None => std::thread::available_parallelism().map_or(1, usize::from),
         };
         let kinds = if self.kinds.is_empty() {
-            Kind::ALL.to_vec()
+            FaultClass::ALL.to_vec()
         } else {
             self.kinds.clone()
         };
 
-        Options {
+        HuntOptions {
             seed: self.seed,
             budget,
             jobs,
@@ -176,7 +176,7 @@ impl HuntArgs {
 }
 
 /// The report for people.
-fn in_words(report: &Report) -> String {
+fn in_words(report: &HuntReport) -> String {
     let mut text = coverage_in_words(&report.coverage);
     let scenario = report.scenario.display();
     text += &format!(
@@ -261,8 +261,8 @@ fn coverage_in_words(coverage: &Coverage) -> String {
 }
 
 /// The most frequent texts of the commands of each link that had the same fate: robots choose texts freely.
-fn frequent_texts(coverage: &Coverage) -> BTreeMap<(&Link, &Fate), Vec<&str>> {
-    let mut all: BTreeMap<(&Link, &Fate), Vec<(u64, &str)>> = BTreeMap::new();
+fn frequent_texts(coverage: &Coverage) -> BTreeMap<(&Link, &CommandFate), Vec<&str>> {
+    let mut all: BTreeMap<(&Link, &CommandFate), Vec<(u64, &str)>> = BTreeMap::new();
     for (feature, plans) in coverage.features() {
         if let Feature::Message { link, text, fate } = feature {
             let texts = all.entry((link, fate)).or_default();

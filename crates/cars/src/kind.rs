@@ -15,7 +15,7 @@ const OF_LINKS: &str = "link_fault";
 
 /// What a file is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Kind {
+pub(crate) enum FileKind {
     /// An environment and its robots.
     Scenario,
     /// The processes of a run.
@@ -30,7 +30,7 @@ pub(crate) enum Kind {
     Roster,
 }
 
-impl Kind {
+impl FileKind {
     /// The kind of a file.
     ///
     /// # Errors

@@ -7,7 +7,7 @@ use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
 use config::units::Time;
-use launch::{Launch, LaunchOptions, Outcome, Planned, ProcessLink, What, code_of};
+use launch::{Launch, LaunchOptions, LaunchOutcome, Planned, ProcessLink, What, code_of};
 use protocol::RobotName;
 use protocol::messages::Verdict;
 use record::RunFolder;
@@ -214,7 +214,7 @@ fn print_plan(planned: Vec<Planned>) -> Result<(), OutputError> {
 }
 
 /// Prints the summary of the run, or its failure; returns the exit status.
-fn conclude(outcome: &Outcome, folder: &RunFolder, is_quiet: bool) -> Result<ExitCode> {
+fn conclude(outcome: &LaunchOutcome, folder: &RunFolder, is_quiet: bool) -> Result<ExitCode> {
     let summary = lab::folder::read_summary(folder)?;
     if let Some(summary) = &summary
         && !is_quiet

@@ -9,7 +9,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::{Args, Subcommand, ValueEnum};
-use launch::net::{self, Flow, LinkOrder, Plan, Proxy, Shape, address};
+use launch::net::{self, FaultPlan, Flow, LinkOrder, Proxy, Shape, address};
 use protocol::RobotName;
 use terminal::OutputError;
 
@@ -90,7 +90,7 @@ pub(crate) fn net(command: NetCommand) -> Result<ExitCode> {
 fn proxy(args: ProxyArgs) -> Result<ExitCode> {
     let closes = args.close;
     let plan = match args.plan.zip(args.robot) {
-        Some((file, robot)) => Some(Plan::load(&file, &BTreeSet::from([robot]))?),
+        Some((file, robot)) => Some(FaultPlan::load(&file, &BTreeSet::from([robot]))?),
         None => None,
     };
 
@@ -122,7 +122,7 @@ fn show(line: impl Display) -> Result<(), OutputError> {
     OutputError::unless_closed(terminal::print_line(line))
 }
 
-fn play_plan(proxy: &Proxy, plan: &Plan, closes: bool) {
+fn play_plan(proxy: &Proxy, plan: &FaultPlan, closes: bool) {
     proxy.play(plan, |shape, at| {
         proxy.set(closing(shape, closes));
         let line = format!("{:.3} s: {}", at.as_secs_f64(), proxy.shape());

@@ -16,9 +16,9 @@ const STANDARD: [&str; 3] = ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"];
 /// What paths of files begin with that this process has open.
 const OPEN: [&str; 3] = ["/dev/stderr", "/dev/fd/", "/proc/"];
 
-/// Where a command writes. [`Output::finish`] completes it; a file that is not completed is as it was before, or not there.
+/// Where a command writes. [`Destination::finish`] completes it; a file that is not completed is as it was before, or not there.
 #[derive(Debug)]
-pub(crate) enum Output {
+pub(crate) enum Destination {
     /// A file, which is replaced as a whole.
     File(Draft),
     /// A pipe or a device.
@@ -27,7 +27,7 @@ pub(crate) enum Output {
     Standard(BufWriter<Stdout>),
 }
 
-impl Output {
+impl Destination {
     /// Begins to write to a path; without one to the standard output.
     ///
     /// # Errors
@@ -68,7 +68,7 @@ impl Output {
     }
 }
 
-impl Write for Output {
+impl Write for Destination {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
         match self {
             Self::File(draft) => draft.write(bytes),
@@ -91,7 +91,7 @@ impl Write for Output {
 /// # Errors
 /// If it cannot be written. A file is then as it was before, or not there.
 pub(crate) fn write(path: Option<&Path>, text: &str) -> Result<()> {
-    let mut output = Output::create(path)?;
+    let mut output = Destination::create(path)?;
     match output.write_all(text.as_bytes()) {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
         Err(error) => Err(cannot_write(path, &error)),

@@ -13,7 +13,7 @@ use record::RunLock;
 use record::names::ENDPOINT;
 use record::{EpochFiles, RunFolder};
 use recording::Recording;
-use simulator::server::{Options, REPEAT_AFTER, Server, Stay};
+use simulator::server::{KeepAlive, REPEAT_AFTER, Server, ServerOptions};
 use terminal::OutputError;
 
 use crate::errors::Result;
@@ -63,11 +63,11 @@ pub(crate) fn replay(args: &ReplayArgs) -> Result<ExitCode> {
     };
     let bus = Bus::open(&role, None)?;
     let run = args.run.clone().unwrap_or_else(|| recorded.clone());
-    let options = Options {
+    let options = ServerOptions {
         run: run.clone(),
         speed: args.speed.0,
         is_paused: args.paused,
-        stay: Stay::Always,
+        stay: KeepAlive::Always,
         repeat_after: REPEAT_AFTER,
     };
     let server = Server::replay(bus, recording, options)?;

@@ -6,7 +6,7 @@ use std::path::Path;
 use protocol::messages::{End, Verdict};
 use protocol::time::seconds;
 use record::Summary;
-use record::summary::{Judged, RobotSummary};
+use record::summary::{ExpectationVerdict, RobotSummary};
 use tabled::builder::Builder;
 use tabled::settings::Style;
 use terminal::OutputError;
@@ -96,7 +96,7 @@ fn rows(summary: &Summary) -> Vec<[String; 5]> {
 }
 
 /// A line for each expectation: its verdict, its name, and the reason unless it is met.
-pub(crate) fn verdicts(expectations: &BTreeMap<String, Judged>) -> Vec<String> {
+pub(crate) fn verdicts(expectations: &BTreeMap<String, ExpectationVerdict>) -> Vec<String> {
     let mut lines = Vec::new();
     for (name, judged) in expectations {
         let verdict = judged.verdict;

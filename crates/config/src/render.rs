@@ -25,7 +25,7 @@ fn rendered(
     help: Option<&str>,
     handler: &dyn ReportHandler,
 ) -> String {
-    let report = Report { error, help };
+    let report = ErrorWithHelp { error, help };
     let diagnostic: &dyn Diagnostic = match error.downcast_ref::<FileError>() {
         Some(error) => error,
         None => &report,
@@ -39,24 +39,24 @@ fn rendered(
 
 /// An error of any type with its help.
 #[derive(Debug)]
-struct Report<'a> {
+struct ErrorWithHelp<'a> {
     error: &'a (dyn Error + 'static),
     help: Option<&'a str>,
 }
 
-impl Display for Report<'_> {
+impl Display for ErrorWithHelp<'_> {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         Display::fmt(self.error, f)
     }
 }
 
-impl Error for Report<'_> {
+impl Error for ErrorWithHelp<'_> {
     fn source(&self) -> Option<&(dyn Error + 'static)> {
         self.error.source()
     }
 }
 
-impl Diagnostic for Report<'_> {
+impl Diagnostic for ErrorWithHelp<'_> {
     fn help<'a>(&'a self) -> Option<Box<dyn Display + 'a>> {
         self.help.map(|help| Box::new(help) as Box<dyn Display>)
     }

@@ -13,12 +13,12 @@ const SHIFT: (f64, f64) = (0.25, 0.125);
 
 /// Where the robot stands, and where it wants to be.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Body {
+pub(crate) struct RobotBody {
     pub(crate) stands: Point,
     pub(crate) proposal: Point,
 }
 
-impl Body {
+impl RobotBody {
     /// A body that stands and stays.
     pub(crate) fn at(location: Point) -> Self {
         Self {

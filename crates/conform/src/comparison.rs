@@ -5,7 +5,7 @@ use serde_json::Value;
 
 use crate::kit::Kit;
 use crate::report::RuleFailure;
-use crate::transcript::{Entry, Transcript};
+use crate::transcript::{PlayedTick, Transcript};
 
 /// What is shown of a value that differs, characters.
 const SHOWN: usize = 200;
@@ -18,7 +18,7 @@ pub(crate) struct PlayDifference {
 }
 
 /// What a robot did in a tick: its report, and its commands with their targets.
-fn outcome(entry: &Entry) -> Value {
+fn outcome(entry: &PlayedTick) -> Value {
     let mut value = serde_json::json!(entry.report);
     value["epoch"] = Value::Null;
 

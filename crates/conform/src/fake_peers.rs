@@ -9,14 +9,14 @@ use protocol::messages::{PublicState, SensedBody, SensedKind, SensedRobot, Varia
 use protocol::{Epoch, Message, RobotName, Tick, encode};
 use serde_json::{Value, json};
 
-use crate::setting::Role;
+use crate::setting::RosterRobot;
 
 /// Below this, each whole number has a floating-point number of its own.
 const MAX_WHOLE: f64 = 9_007_199_254_740_992.0;
 
 /// A query that one of them received.
 #[derive(Debug, Clone)]
-pub(crate) struct Asked {
+pub(crate) struct ReceivedQuery {
     /// The robot that was asked.
     pub(crate) of: RobotName,
     /// Its parameters, as they came.
@@ -29,7 +29,7 @@ pub(crate) struct Asked {
 #[derive(Default)]
 struct PeersState {
     now: (Epoch, Tick),
-    asked: Vec<Asked>,
+    asked: Vec<ReceivedQuery>,
     is_holding: bool,
     held: Vec<(RobotName, String, Query)>,
 }
@@ -37,7 +37,7 @@ struct PeersState {
 /// The others, and the tick that they are in.
 #[derive(Clone, Default)]
 pub(crate) struct FakePeers {
-    others: Arc<BTreeMap<RobotName, Role>>,
+    others: Arc<BTreeMap<RobotName, RosterRobot>>,
     state: Arc<Mutex<PeersState>>,
     /// Whether everything that is put carries unknown fields.
     has_extras: bool,
@@ -47,7 +47,7 @@ pub(crate) struct FakePeers {
 
 impl FakePeers {
     pub(crate) fn new(
-        others: BTreeMap<RobotName, Role>,
+        others: BTreeMap<RobotName, RosterRobot>,
         has_extras: bool,
         writes_integers: bool,
     ) -> Self {
@@ -74,7 +74,7 @@ impl FakePeers {
     }
 
     /// The queries that they received so far.
-    pub(crate) fn asked(&self) -> Vec<Asked> {
+    pub(crate) fn asked(&self) -> Vec<ReceivedQuery> {
         self.state().asked.clone()
     }
 
@@ -185,7 +185,7 @@ impl FakePeers {
     fn receive(&self, name: &RobotName, what: &str, query: Query) {
         let mut state = self.state();
         let now = state.now;
-        state.asked.push(Asked {
+        state.asked.push(ReceivedQuery {
             of: name.clone(),
             tick: query.parameter("tick").map(str::to_owned),
             epoch: query.parameter("epoch").map(str::to_owned),

@@ -5,11 +5,11 @@ use std::collections::BTreeMap;
 use crate::report::{RuleFailure, RuleVerdict};
 
 /// What was found, by rule.
-pub(crate) type Verdicts = BTreeMap<&'static str, RuleVerdict>;
+pub(crate) type VerdictsByRule = BTreeMap<&'static str, RuleVerdict>;
 
 /// What one check finds.
 #[derive(Default)]
-pub(crate) struct Findings(pub(crate) Verdicts);
+pub(crate) struct Findings(pub(crate) VerdictsByRule);
 
 impl Findings {
     /// The rule is broken. The first failure of a rule is the one that is reported.

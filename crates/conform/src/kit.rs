@@ -12,7 +12,7 @@ use protocol::messages::{JoinRequest, Welcome};
 use protocol::{PROTOCOL_VERSION, RobotName, RunName};
 
 use crate::process;
-use crate::setting::{CheckSetting, Role};
+use crate::setting::{CheckSetting, RosterRobot};
 use crate::transcript::Transcript;
 
 /// Why nothing could be checked.
@@ -45,7 +45,7 @@ pub(crate) struct Kit {
 /// What the first request to join contained.
 struct Learned {
     request: JoinRequest,
-    fake_peers: BTreeMap<RobotName, Role>,
+    fake_peers: BTreeMap<RobotName, RosterRobot>,
 }
 
 /// Attempts to find a free port before giving up.
@@ -124,7 +124,7 @@ impl Kit {
     }
 
     /// The robots that the kit plays.
-    pub(crate) fn others(&self) -> BTreeMap<RobotName, Role> {
+    pub(crate) fn others(&self) -> BTreeMap<RobotName, RosterRobot> {
         let learned = self.learned();
         let mut others = learned.fake_peers.clone();
         others.remove(&learned.request.name);

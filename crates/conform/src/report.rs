@@ -5,7 +5,7 @@ use std::fmt;
 use protocol::RobotName;
 use serde::Serialize;
 
-use crate::rules::Rule;
+use crate::rules::ProtocolRule;
 
 /// Why a rule failed.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -44,7 +44,7 @@ pub enum RuleVerdict {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RuleOutcome {
     /// The rule.
-    pub rule: Rule,
+    pub rule: ProtocolRule,
     /// What is known of it.
     pub verdict: RuleVerdict,
 }
@@ -88,7 +88,7 @@ fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
 
 /// What came of a check.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Report {
+pub struct CheckReport {
     /// The robot that was checked.
     pub name: RobotName,
     /// What it is written with, as it states.
@@ -99,7 +99,7 @@ pub struct Report {
     pub answers: Option<AnswerTimes>,
 }
 
-impl Report {
+impl CheckReport {
     /// Whether no rule failed.
     #[must_use]
     pub fn is_passed(&self) -> bool {
@@ -107,7 +107,7 @@ impl Report {
     }
 
     /// The rules that failed, and why.
-    pub fn failed(&self) -> impl Iterator<Item = (Rule, &RuleFailure)> {
+    pub fn failed(&self) -> impl Iterator<Item = (ProtocolRule, &RuleFailure)> {
         self.outcomes
             .iter()
             .filter_map(|outcome| match &outcome.verdict {
@@ -157,7 +157,7 @@ fn scalar(text: &str) -> String {
     serde_json::Value::from(text).to_string()
 }
 
-impl fmt::Display for Report {
+impl fmt::Display for CheckReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "TAP version 14")?;
         writeln!(f, "1..{}", self.outcomes.len())?;

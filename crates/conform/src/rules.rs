@@ -5,14 +5,14 @@ pub const PAGE: &str = "docs/protocol.md";
 
 /// A rule of the protocol.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Rule {
+pub struct ProtocolRule {
     /// Its name; the page states it in a sentence that begins with the name.
     pub name: &'static str,
     /// Anchor of its section in [`PAGE`].
     pub section: &'static str,
 }
 
-impl Rule {
+impl ProtocolRule {
     /// The rule called `name`.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
@@ -26,12 +26,12 @@ impl Rule {
     }
 }
 
-const fn rule(name: &'static str, section: &'static str) -> Rule {
-    Rule { name, section }
+const fn rule(name: &'static str, section: &'static str) -> ProtocolRule {
+    ProtocolRule { name, section }
 }
 
 /// All rules, in the order of the page.
-pub const RULES: [Rule; 34] = [
+pub const RULES: [ProtocolRule; 34] = [
     rule("join.request", "joining"),
     rule("join.ready-last", "joining"),
     rule("join.refused", "joining"),

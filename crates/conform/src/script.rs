@@ -1,14 +1,14 @@
 //! The ticks that a robot is taken through: what happens to it is a function of the tick and of what it proposed, so that
 //! the same robot meets the same again.
 
-use protocol::messages::{Correction, Delivery, News, Performative};
+use protocol::messages::{Correction, Delivery, Performative, TickUpdate};
 use protocol::{RobotName, Tick};
 
-use crate::body::{Body, ROUND};
+use crate::body::{ROUND, RobotBody};
 use crate::harness::{Harness, HarnessOptions};
 use crate::kit::Kit;
 use crate::report::RuleFailure;
-use crate::transcript::{Entry, Transcript};
+use crate::transcript::{PlayedTick, Transcript};
 
 /// In a round of ticks: the robot senses another one, and it cannot query any other.
 const SENSES: Tick = 12;
@@ -56,7 +56,7 @@ pub(crate) trait Disturbance {
     }
 
     /// After the tick is complete.
-    fn after(&mut self, _stage: &mut Harness<'_>, _entry: &Entry) -> Result<(), RuleFailure> {
+    fn after(&mut self, _stage: &mut Harness<'_>, _entry: &PlayedTick) -> Result<(), RuleFailure> {
         Ok(())
     }
 }
@@ -153,7 +153,7 @@ pub(crate) fn step(
     harness: &mut Harness<'_>,
     script: &PlayScript,
     disturbance: &mut dyn Disturbance,
-) -> Result<Entry, RuleFailure> {
+) -> Result<PlayedTick, RuleFailure> {
     let epoch = harness.epoch();
     let tick = harness.next_tick();
     let news = news_of(harness, script, tick);
@@ -163,7 +163,7 @@ pub(crate) fn step(
 
     let done = harness.complete()?;
     harness.body.proposal = done.report.proposal;
-    let entry = Entry {
+    let entry = PlayedTick {
         epoch,
         tick,
         news,
@@ -179,24 +179,24 @@ pub(crate) fn step(
 }
 
 /// What is new for the robot in a tick.
-fn news_of(harness: &mut Harness<'_>, script: &PlayScript, tick: Tick) -> News {
+fn news_of(harness: &mut Harness<'_>, script: &PlayScript, tick: Tick) -> TickUpdate {
     let epoch = harness.epoch();
-    let mut news = News {
+    let mut news = TickUpdate {
         commands: script.deliveries(tick),
-        ..News::default()
+        ..TickUpdate::default()
     };
     if harness.kit.wants_bodies() {
         news.bodies = harness.fake_peers.bodies(epoch, tick);
     }
 
     if harness.takes_over() {
-        harness.body = Body::at(harness.template.location);
+        harness.body = RobotBody::at(harness.template.location);
         news.correction = Some(Correction {
             location: harness.body.stands,
             blocked: false,
         });
     } else if tick == 0 {
-        harness.body = Body::at(harness.template.location);
+        harness.body = RobotBody::at(harness.template.location);
     } else {
         news.correction = harness.body.advance(tick, &harness.template);
         if tick % ROUND == SENSES {

@@ -11,7 +11,7 @@ use protocol::{Tick, decode};
 use crate::reading::{self, Reading};
 
 /// A report that came.
-pub(crate) struct Answer {
+pub(crate) struct ReceivedReport {
     pub(crate) reading: Reading,
     pub(crate) bytes: Vec<u8>,
     pub(crate) at: Instant,
@@ -21,7 +21,7 @@ pub(crate) struct Answer {
 
 /// A command of the robot that came.
 #[derive(Debug, Clone)]
-pub(crate) struct SentCommand {
+pub(crate) struct ReportedCommand {
     pub(crate) to: String,
     /// The sender that its key names.
     pub(crate) from: String,
@@ -31,7 +31,7 @@ pub(crate) struct SentCommand {
     pub(crate) order: usize,
 }
 
-impl SentCommand {
+impl ReportedCommand {
     /// Its number in its tick, if it can be read.
     pub(crate) fn number(&self) -> Option<u32> {
         self.command.as_ref().ok().map(|command| command.number)
@@ -46,10 +46,10 @@ impl SentCommand {
 /// All that came from the robot so far.
 #[derive(Default)]
 pub(crate) struct Seen {
-    pub(crate) answers: Vec<Answer>,
+    pub(crate) answers: Vec<ReceivedReport>,
     /// Reports that cannot be read, and why.
     pub(crate) unreadable: Vec<String>,
-    pub(crate) commands: Vec<SentCommand>,
+    pub(crate) commands: Vec<ReportedCommand>,
     /// Integers of commands that are written with a fraction.
     pub(crate) not_integers: Vec<String>,
     /// States that it put, with their place among all that came.
@@ -109,7 +109,7 @@ impl Seen {
         };
 
         let index = self.answers.len();
-        self.answers.push(Answer {
+        self.answers.push(ReceivedReport {
             reading,
             bytes,
             at,
@@ -119,7 +119,12 @@ impl Seen {
     }
 
     /// Files a command of the robot.
-    pub(crate) fn file_command(&mut self, key: &str, bytes: Vec<u8>, order: usize) -> SentCommand {
+    pub(crate) fn file_command(
+        &mut self,
+        key: &str,
+        bytes: Vec<u8>,
+        order: usize,
+    ) -> ReportedCommand {
         let from = Keys::last_chunk(key).to_owned();
         let command = match reading::read_command(key, &from, &bytes) {
             Ok((command, not_integers)) => {
@@ -129,7 +134,7 @@ impl Seen {
             Err(error) => Err(error.to_string()),
         };
 
-        let sent = SentCommand {
+        let sent = ReportedCommand {
             to: Keys::robot_of(key).unwrap_or_default().to_owned(),
             from,
             command,

@@ -21,8 +21,8 @@ pub struct CheckSetting {
     /// Distance within which the robot senses other bodies, meters.
     pub sensing_range_m: f64,
     /// The robots of the roster. Empty: the robot itself, without parameters, and one other.
-    pub fake_peers: BTreeMap<RobotName, Role>,
-    /// Texts of commands that the robot understands, if its [`Role::understands`] has none.
+    pub fake_peers: BTreeMap<RobotName, RosterRobot>,
+    /// Texts of commands that the robot understands, if its [`RosterRobot::understands`] has none.
     pub commands: Vec<String>,
     /// Ticks of the longer checks.
     pub ticks: Tick,
@@ -30,7 +30,7 @@ pub struct CheckSetting {
 
 /// A robot of the roster.
 #[derive(Debug, Clone, Default)]
-pub struct Role {
+pub struct RosterRobot {
     /// Where it starts, meters.
     pub location: Point,
     /// Its parameters, if it is the one that is checked.
@@ -68,7 +68,10 @@ impl Default for CheckSetting {
 
 impl CheckSetting {
     /// The roster for a robot that asks to be `name`, or why it is not of the roster.
-    pub(crate) fn cast_for(&self, name: &RobotName) -> Result<BTreeMap<RobotName, Role>, String> {
+    pub(crate) fn cast_for(
+        &self,
+        name: &RobotName,
+    ) -> Result<BTreeMap<RobotName, RosterRobot>, String> {
         if let Some(wanted) = self.name.as_ref().filter(|wanted| *wanted != name) {
             return Err(format!(
                 "the robot asks to be {name}, and {wanted} is checked"
@@ -92,23 +95,23 @@ impl CheckSetting {
 }
 
 /// The robot and one other.
-fn pair(name: &RobotName) -> BTreeMap<RobotName, Role> {
+fn pair(name: &RobotName) -> BTreeMap<RobotName, RosterRobot> {
     let mut fake_peers = BTreeMap::new();
     let other = OTHERS
         .iter()
         .filter_map(|other| RobotName::new(other).ok())
         .find(|other| other != name);
     if let Some(other) = other {
-        let role = Role {
+        let role = RosterRobot {
             location: BESIDE,
-            ..Role::default()
+            ..RosterRobot::default()
         };
         fake_peers.insert(other, role);
     }
 
-    let own = Role {
+    let own = RosterRobot {
         location: CENTER,
-        ..Role::default()
+        ..RosterRobot::default()
     };
     fake_peers.insert(name.clone(), own);
     fake_peers

@@ -2,22 +2,22 @@
 
 use std::time::Duration;
 
-use protocol::messages::{News, Point, Report};
+use protocol::messages::{Point, Report, TickUpdate};
 use protocol::{Epoch, Tick};
 
-use crate::seen::SentCommand;
+use crate::seen::ReportedCommand;
 
 /// A tick that was played.
 #[derive(Debug, Clone)]
-pub(crate) struct Entry {
+pub(crate) struct PlayedTick {
     pub(crate) epoch: Epoch,
     pub(crate) tick: Tick,
-    pub(crate) news: News,
+    pub(crate) news: TickUpdate,
     /// Where the robot stands in it.
     pub(crate) location: Point,
     pub(crate) report: Report,
     /// Its commands, by number.
-    pub(crate) commands: Vec<SentCommand>,
+    pub(crate) commands: Vec<ReportedCommand>,
     /// The place of its report in [`crate::seen::Seen::answers`].
     pub(crate) index: usize,
     /// From the clock to the report, wall clock.
@@ -25,4 +25,4 @@ pub(crate) struct Entry {
 }
 
 /// Ticks that were played, in their order.
-pub(crate) type Transcript = Vec<Entry>;
+pub(crate) type Transcript = Vec<PlayedTick>;

@@ -3,7 +3,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use pictures::diagram::{Diagram, Options, TooMuch};
+use pictures::diagram::{Diagram, DiagramOptions, TooMuch};
 use protocol::{Epoch, Tick};
 use recording::{Recording, RecordingError};
 use serde::Deserialize;
@@ -18,7 +18,7 @@ const WIDTHS_PX: std::ops::RangeInclusive<f64> = 300.0..=4800.0;
 
 /// A window, as the query string of a request states it.
 #[derive(Debug, Clone, Copy, Deserialize)]
-pub(crate) struct Window {
+pub(crate) struct WindowQuery {
     /// The first tick.
     pub(crate) from: Tick,
     /// Number of ticks.
@@ -32,7 +32,7 @@ pub(crate) struct Window {
     pub(crate) epoch: Option<Epoch>,
 }
 
-impl Window {
+impl WindowQuery {
     /// Whether the request is within its limits.
     pub(crate) fn is_valid(&self) -> bool {
         (1..=MAX_WINDOW_TICKS).contains(&self.count) && WIDTHS_PX.contains(&self.width)
@@ -69,14 +69,18 @@ impl Diagrams {
     ///
     /// # Errors
     /// [`DiagramError`] if the file is damaged or the window has too much.
-    pub(crate) fn draw(&self, file: &Recording, window: Window) -> Result<String, DiagramError> {
+    pub(crate) fn draw(
+        &self,
+        file: &Recording,
+        window: WindowQuery,
+    ) -> Result<String, DiagramError> {
         let from = window.from.min(file.len().saturating_sub(1));
         let to = from.saturating_add(window.count).min(file.len());
-        let options = Options {
+        let options = DiagramOptions {
             queries: window.queries,
             max_width_px: window.width,
             has_style: false,
-            ..Options::default()
+            ..DiagramOptions::default()
         };
 
         let timeline = self.before(file, from)?;

@@ -14,7 +14,7 @@ const GRACE: Duration = Duration::from_secs(10);
 
 /// How the console ends after a failure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Next {
+pub(crate) enum AfterFailure {
     /// Nobody looks any more.
     End,
     /// A person wants the run to go on.
@@ -23,12 +23,12 @@ pub(crate) enum Next {
 
 /// Looks for the file in which the launcher says that the run has failed, and tells browsers. Returns when a person wants the run
 /// to go on, or when it has failed and no browser shows it. `awaits_browser` is whether one has been started.
-pub(crate) async fn watch(file: &Path, app: &App, awaits_browser: bool) -> Next {
+pub(crate) async fn watch(file: &Path, app: &App, awaits_browser: bool) -> AfterFailure {
     // A browser that was started counts as seen until it can be here.
     let mut seen_at = awaits_browser.then(|| Instant::now() + GRACE);
     loop {
         tokio::select! {
-            () = app.resumed() => return Next::Resume,
+            () = app.resumed() => return AfterFailure::Resume,
             () = tokio::time::sleep(LOOK_EVERY) => {}
         }
         if app.is_viewed() {
@@ -43,7 +43,7 @@ pub(crate) async fn watch(file: &Path, app: &App, awaits_browser: bool) -> Next 
             app.fail(failed);
         }
         if seen_at.is_none_or(|seen_at| seen_at.elapsed() >= GRACE) {
-            return Next::End;
+            return AfterFailure::End;
         }
     }
 }

@@ -80,7 +80,7 @@ impl std::str::FromStr for AllowedHost {
 
 /// Why a request is refused.
 #[derive(Debug, PartialEq, Eq)]
-pub(crate) enum Refusal {
+pub(crate) enum RequestRefusal {
     /// It is for another host, or from another page; the text explains it.
     Foreign(String),
     /// It has no token, or a wrong one.
@@ -159,13 +159,13 @@ impl Guard {
         headers: &HeaderMap,
         path: &str,
         query: Option<&str>,
-    ) -> Option<Refusal> {
+    ) -> Option<RequestRefusal> {
         // The host before anything else: under a name that was rebound to this machine, a page would be
         // of the same origin as its request, and pass the next check.
         let named = single(headers, &HOST);
         let is_allowed = named.is_some_and(|host| self.is_allowed(host));
         let Some(host) = named.filter(|host| is_allowed || self.is_own(host)) else {
-            return Some(Refusal::Foreign(format!(
+            return Some(RequestRefusal::Foreign(format!(
                 "This console is at {}: a request must name that address, or localhost, with its port. \
                  The option --allow-host admits other names.\n",
                 self.address
@@ -178,7 +178,7 @@ impl Guard {
             &["http"]
         };
         if is_from_other_page(headers, host, schemes) {
-            return Some(Refusal::Foreign(
+            return Some(RequestRefusal::Foreign(
                 "A page from elsewhere may not use this console.\n".to_owned(),
             ));
         }
@@ -188,7 +188,7 @@ impl Guard {
             Some(rest) => is_static(rest) || self.has_cookie(headers),
             None => path == ENTRANCE && self.has_token(query),
         };
-        (!is_admitted).then_some(Refusal::NoToken)
+        (!is_admitted).then_some(RequestRefusal::NoToken)
     }
 
     fn is_allowed(&self, host: &str) -> bool {
@@ -468,7 +468,10 @@ mod tests {
 
         for wrong in [twice, HeaderMap::new()] {
             let refusal = guard.refuse(&wrong, ENTRANCE, None);
-            assert!(matches!(refusal, Some(Refusal::Foreign(_))), "{refusal:?}");
+            assert!(
+                matches!(refusal, Some(RequestRefusal::Foreign(_))),
+                "{refusal:?}"
+            );
         }
     }
 
@@ -524,7 +527,11 @@ mod tests {
                 token,
             ] {
                 let refusal = guard.refuse(&headers, ENTRANCE, Some(wrong));
-                assert_eq!(refusal, Some(Refusal::NoToken), "{wrong:?} at {address}");
+                assert_eq!(
+                    refusal,
+                    Some(RequestRefusal::NoToken),
+                    "{wrong:?} at {address}"
+                );
             }
             assert!(guard.refuse(&headers, ENTRANCE, None).is_some());
 
@@ -550,7 +557,7 @@ mod tests {
             &format!("/{}{}ws", guard.path, guard.path),
         ] {
             let refusal = guard.refuse(&headers, path, Some(&query));
-            assert_eq!(refusal, Some(Refusal::NoToken), "{path:?}");
+            assert_eq!(refusal, Some(RequestRefusal::NoToken), "{path:?}");
         }
     }
 

@@ -35,7 +35,7 @@ use tokio::runtime::Runtime;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 
 use app::{App, Mode};
-use failing::Next;
+use failing::AfterFailure;
 use guard::{AllowedHost, Guard};
 use live::Live;
 use past::Past;
@@ -53,7 +53,7 @@ const SHUTDOWN_TIMEOUT: Duration = Duration::from_millis(200);
 /// The web console of the Cooperative Affective Robot Simulator.
 #[derive(Debug, Parser)]
 #[command(name = "cars-console", version)]
-struct Args {
+struct ConsoleArgs {
     /// The run to watch.
     #[arg(long, env = "CARS_RUN", default_value = "default")]
     run: RunName,
@@ -108,15 +108,15 @@ struct Serving {
 
 fn main() -> ExitCode {
     bus::runtime::use_one_thread();
-    let args: Args = match terminal::arguments() {
+    let args: ConsoleArgs = match terminal::arguments() {
         Ok(args) => args,
         Err(code) => return code,
     };
     terminal::print_diagnostics("warn,zenoh=error");
 
     match run(args) {
-        Ok(Next::End) => ExitCode::SUCCESS,
-        Ok(Next::Resume) => ExitCode::from(RESUME),
+        Ok(AfterFailure::End) => ExitCode::SUCCESS,
+        Ok(AfterFailure::Resume) => ExitCode::from(RESUME),
         Err(error) => {
             terminal::note(format_args!("error: {error}"));
             ExitCode::FAILURE
@@ -124,7 +124,7 @@ fn main() -> ExitCode {
     }
 }
 
-fn run(args: Args) -> Result<Next, String> {
+fn run(args: ConsoleArgs) -> Result<AfterFailure, String> {
     let (mode, past) = match args.recording {
         Some(path) => open_recording(&path)?,
         None => {
@@ -168,7 +168,7 @@ fn build_runtime() -> Result<Runtime, String> {
 }
 
 /// Serves until the process receives SIGTERM or SIGINT, or until a run that has failed is not looked at any more.
-async fn serve(mode: Mode, past: Option<Past>, how: Serving) -> Result<Next, String> {
+async fn serve(mode: Mode, past: Option<Past>, how: Serving) -> Result<AfterFailure, String> {
     let kept = how.keep.as_deref().and_then(SavedSession::read);
     if let Some(file) = how.keep.as_deref().filter(|_| kept.is_none()) {
         SavedSession::check_replaceable(file)?;
@@ -207,8 +207,8 @@ async fn serve(mode: Mode, past: Option<Past>, how: Serving) -> Result<Next, Str
 
     let serving = tokio::spawn(server::serve(listener, app.clone()));
     let next = tokio::select! {
-        _ = terminate.recv() => Next::End,
-        _ = interrupt.recv() => Next::End,
+        _ = terminate.recv() => AfterFailure::End,
+        _ = interrupt.recv() => AfterFailure::End,
         next = failure => next,
     };
 

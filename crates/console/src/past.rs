@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use protocol::{Epoch, RunName};
 use recording::RecordingError;
 
-use crate::playback::{OpenError, Recording};
+use crate::playback::{OpenError, RecordedEpoch};
 
 /// Recordings of earlier epochs that are kept open.
 const MAX_EARLIER: usize = 4;
@@ -40,8 +40,8 @@ enum RecordingSource {
 
 #[derive(Debug, Default)]
 struct Open {
-    last: Option<Arc<Recording>>,
-    earlier: BTreeMap<Epoch, Arc<Recording>>,
+    last: Option<Arc<RecordedEpoch>>,
+    earlier: BTreeMap<Epoch, Arc<RecordedEpoch>>,
     /// Number of recordings that were the last one so far.
     number: u64,
 }
@@ -58,7 +58,7 @@ impl Past {
             (path.to_owned(), None)
         };
 
-        let last = Arc::new(Recording::open(&file, 1)?);
+        let last = Arc::new(RecordedEpoch::open(&file, 1)?);
         Ok(Self {
             place: RecordingSource::Finished { folder },
             open: Mutex::new(Open {
@@ -84,7 +84,7 @@ impl Past {
     ///
     /// # Errors
     /// [`OpenError`] if there is none, or it cannot be read.
-    pub(crate) fn last(&self) -> Result<Arc<Recording>, OpenError> {
+    pub(crate) fn last(&self) -> Result<Arc<RecordedEpoch>, OpenError> {
         // One look at a time: two requests that find the file grown would read it twice.
         let mut open = self.lock();
         let RecordingSource::Growing { folder, run } = &self.place else {
@@ -99,7 +99,7 @@ impl Past {
         }
 
         open.last = None;
-        let opened = Recording::open(&file, open.number + 1);
+        let opened = RecordedEpoch::open(&file, open.number + 1);
         let last = opened.map_err(|error| match error {
             OpenError::Unreadable(RecordingError::Damaged { .. }) => error,
             _ => OpenError::NotYet,
@@ -119,7 +119,7 @@ impl Past {
     ///
     /// # Errors
     /// [`OpenError`] if there is none, or it cannot be read.
-    pub(crate) fn epoch(&self, epoch: Option<Epoch>) -> Result<Arc<Recording>, OpenError> {
+    pub(crate) fn epoch(&self, epoch: Option<Epoch>) -> Result<Arc<RecordedEpoch>, OpenError> {
         // Outside of the lock below, which this takes itself.
         let last = self.last();
         let Some(epoch) = epoch else {
@@ -137,7 +137,7 @@ impl Past {
         }
         let folder = self.folder().ok_or(OpenError::NoEpoch)?;
         let file = folder.join(earlier_name(epoch));
-        let earlier = Arc::new(Recording::open(&file, open.number)?);
+        let earlier = Arc::new(RecordedEpoch::open(&file, open.number)?);
         // The oldest epoch makes room: opening a recording again is cheap.
         if open.earlier.len() == MAX_EARLIER {
             open.earlier.pop_first();

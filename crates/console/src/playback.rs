@@ -10,7 +10,7 @@ use recording::{Header, Json, PlacedRobot, RawTick, RecordingError};
 use serde::Serialize;
 use timeline::Timeline;
 
-use crate::diagrams::{DiagramError, Diagrams, Window};
+use crate::diagrams::{DiagramError, Diagrams, WindowQuery};
 
 /// Most ticks in one answer.
 pub(crate) const MAX_TICKS: u64 = 512;
@@ -46,7 +46,7 @@ pub(crate) enum OpenError {
 
 /// A recorded epoch.
 #[derive(Debug)]
-pub(crate) struct Recording {
+pub(crate) struct RecordedEpoch {
     header: Header,
     /// Which one of the recordings with this epoch it is: a run may be started anew.
     number: u64,
@@ -132,7 +132,7 @@ impl Wanted {
     }
 }
 
-impl Recording {
+impl RecordedEpoch {
     /// Opens a recording. `number` tells it from others of its epoch.
     ///
     /// # Errors
@@ -246,7 +246,7 @@ impl Recording {
     ///
     /// # Errors
     /// [`DiagramError`] if the file is damaged or the window has too much.
-    pub(crate) fn diagram(&self, window: Window) -> Result<String, DiagramError> {
+    pub(crate) fn diagram(&self, window: WindowQuery) -> Result<String, DiagramError> {
         self.diagrams.draw(&self.file(), window)
     }
 }

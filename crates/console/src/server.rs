@@ -26,9 +26,9 @@ use tokio::sync::{Notify, Semaphore};
 
 use crate::app::{App, Ending};
 use crate::browser;
-use crate::diagrams::{DiagramError, MAX_WINDOW_TICKS, Window};
-use crate::guard::{ENTRANCE, HEADERS, Refusal};
-use crate::playback::{MAX_SAMPLED_TICKS, MAX_TICKS, Recording, Wanted};
+use crate::diagrams::{DiagramError, MAX_WINDOW_TICKS, WindowQuery};
+use crate::guard::{ENTRANCE, HEADERS, RequestRefusal};
+use crate::playback::{MAX_SAMPLED_TICKS, MAX_TICKS, RecordedEpoch, Wanted};
 
 /// Most connections at a time; a browser uses one for its WebSocket and up to six for HTTP requests.
 const MAX_CONNECTIONS: usize = 256;
@@ -222,10 +222,10 @@ async fn guard(State(app): State<Arc<App>>, request: Request, next: Next) -> Res
 
 /// The response to a request that is not admitted. It closes the connection, so that clients without the token cannot keep
 /// all connections of the console.
-fn refused(refusal: Refusal) -> Response {
+fn refused(refusal: RequestRefusal) -> Response {
     let explanation = match refusal {
-        Refusal::Foreign(reason) => reason.into_response(),
-        Refusal::NoToken => asset("token.html"),
+        RequestRefusal::Foreign(reason) => reason.into_response(),
+        RequestRefusal::NoToken => asset("token.html"),
     };
 
     (StatusCode::FORBIDDEN, [(CONNECTION, "close")], explanation).into_response()
@@ -328,7 +328,7 @@ async fn read(app: Arc<App>, answer: impl FnOnce(&App) -> Response + Send + 'sta
 fn with_epoch(
     app: &App,
     epoch: Option<Epoch>,
-    answer: impl FnOnce(&Recording) -> Response,
+    answer: impl FnOnce(&RecordedEpoch) -> Response,
 ) -> Response {
     let Some(past) = &app.past else {
         return not_found();
@@ -372,7 +372,7 @@ async fn ticks(
 }
 
 /// Reads from the recording's files; blocks.
-fn read_ticks(recording: &Recording, wanted: Wanted) -> Response {
+fn read_ticks(recording: &RecordedEpoch, wanted: Wanted) -> Response {
     match recording.range(wanted) {
         Ok(range) => json_text(range),
         Err(error) => internal_error(&error),
@@ -389,7 +389,7 @@ async fn diagram_style() -> Response {
 
 async fn diagram(
     State(app): State<Arc<App>>,
-    query: Result<Query<Window>, QueryRejection>,
+    query: Result<Query<WindowQuery>, QueryRejection>,
 ) -> Response {
     let window = match query {
         Ok(Query(window)) if window.is_valid() => window,
@@ -405,7 +405,7 @@ async fn diagram(
 }
 
 /// Reads from the recording's files; blocks.
-fn draw_diagram(recording: &Recording, window: Window) -> Response {
+fn draw_diagram(recording: &RecordedEpoch, window: WindowQuery) -> Response {
     match recording.diagram(window) {
         Ok(svg) => ([(CONTENT_TYPE, content_type("diagram.svg"))], svg).into_response(),
         Err(error @ DiagramError::TooMuch(_)) => {

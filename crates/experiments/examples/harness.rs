@@ -9,7 +9,7 @@ use std::error::Error;
 use std::path::Path;
 
 use config::Changes;
-use experiments::engine::{self, Options, Queue};
+use experiments::engine::{self, EngineOptions, Queue};
 use experiments::{Experiment, Plan, Request, Robots, Store};
 use lab::run::Local;
 use protocol::RunName;
@@ -108,7 +108,7 @@ fn play_bare(scenario: &std::path::Path) -> Result<f64, Box<dyn Error>> {
 /// Seconds for the same runs as the first units of an experiment, from an empty folder to the last line.
 fn play(plan: &Plan) -> Result<f64, Box<dyn Error>> {
     let folder = tempfile::tempdir()?;
-    let options = Options {
+    let options = EngineOptions {
         units: 0..RUNS as usize,
         jobs: 1,
         retries_failed: false,

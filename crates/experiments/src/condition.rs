@@ -27,7 +27,7 @@ pub struct Factor {
     /// Head of the column with its values.
     pub name: String,
     /// Its values, in the order of the table.
-    pub values: Vec<Value>,
+    pub values: Vec<FactorValue>,
     /// Places of the values in the file, bytes.
     pub(super) spans: Vec<Range<usize>>,
     /// Begin, simulated seconds. The value of a factor with a begin is its duration; a factor without one lasts for the
@@ -52,7 +52,7 @@ pub(super) enum Target {
 
 /// A value of a factor.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Value {
+pub enum FactorValue {
     /// A whole number.
     Integer(i64),
     /// A number without a unit.
@@ -94,7 +94,7 @@ pub enum ConditionError {
     NoTime(String),
     /// A factor with a begin has a value that is not a time.
     #[error("a factor with `begins` lasts for a time, and {0} is not a time")]
-    NotATime(Value),
+    NotATime(FactorValue),
     /// A condition is there twice.
     #[error("the condition \"{0}\" is there twice: the same runs would count as independent ones")]
     Repeated(String),
@@ -102,7 +102,7 @@ pub enum ConditionError {
     #[error(
         "{0} and {1} make the same changes: `set` contains `{{value}}`, or `{{until}}` of a factor with `begins`"
     )]
-    Same(Value, Value),
+    Same(FactorValue, FactorValue),
     /// A change of what the experiment says itself.
     #[error("`{0}` would have no effect: `seeds` and `duration` of the experiment say it")]
     Own(Override),
@@ -361,9 +361,9 @@ impl Factor {
         Ok(levels)
     }
 
-    fn level(&self, value: &Value, span: &Range<usize>) -> Result<Condition, ConditionError> {
+    fn level(&self, value: &FactorValue, span: &Range<usize>) -> Result<Condition, ConditionError> {
         let time_s = match (self.begins_s, value) {
-            (Some(from_s), Value::Time(lasting_s)) => Some((from_s, from_s + lasting_s)),
+            (Some(from_s), FactorValue::Time(lasting_s)) => Some((from_s, from_s + lasting_s)),
             (None, _) => None,
             (Some(_), other) => return Err(ConditionError::NotATime(other.clone())),
         };
@@ -386,7 +386,7 @@ impl Factor {
 impl Target {
     fn changes(
         &self,
-        value: &Value,
+        value: &FactorValue,
         time_s: Option<(f64, f64)>,
     ) -> Result<Vec<Override>, ConditionError> {
         let template = match self {
@@ -431,7 +431,7 @@ pub(super) fn parse(
     change.parse().map_err(ConditionError::Change)
 }
 
-impl Value {
+impl FactorValue {
     /// A text, which is a time if it has a unit of time.
     #[must_use]
     pub fn of_text(text: String) -> Self {
@@ -468,7 +468,7 @@ impl Value {
     }
 }
 
-impl std::fmt::Display for Value {
+impl std::fmt::Display for FactorValue {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Integer(number) => write!(f, "{number}"),
@@ -488,7 +488,7 @@ mod tests {
         let partition = r#"network.partition=[{ from = "{from}", until = "{until}" }]"#;
         let factor = Factor {
             name: "cut for".to_owned(),
-            values: values.iter().copied().map(Value::Time).collect(),
+            values: values.iter().copied().map(FactorValue::Time).collect(),
             spans: vec![0..0; values.len()],
             begins_s: Some(120.0),
             target: Target::Set {
@@ -533,7 +533,7 @@ mod tests {
         assert!(cut(&[60.0]).list(180.0).is_ok());
     }
 
-    fn at(path: &str, name: &str, values: Vec<Value>) -> Factor {
+    fn at(path: &str, name: &str, values: Vec<FactorValue>) -> Factor {
         Factor {
             name: name.to_owned(),
             spans: vec![0..0; values.len()],
@@ -560,7 +560,7 @@ mod tests {
             named("empty", "guests.count=0", None),
             named("crash", "on_late=continue", Some((100.0, 150.0))),
         ];
-        let policies = ["emotion", "rules", "true"].map(|word| Value::Text(word.to_owned()));
+        let policies = ["emotion", "rules", "true"].map(|word| FactorValue::Text(word.to_owned()));
         let policy = at("robot.Butler.params.policy", "policy", policies.to_vec());
         conditions.factors.push(policy);
 
@@ -604,7 +604,7 @@ mod tests {
     #[test]
     fn values_that_change_the_same_are_refused() {
         let mut twice = Conditions::default();
-        let counts = vec![Value::Integer(1), Value::Integer(2)];
+        let counts = vec![FactorValue::Integer(1), FactorValue::Integer(2)];
         twice.factors = vec![
             at("guests.count", "guests", counts.clone()),
             at("guests", "more", counts),
@@ -618,7 +618,7 @@ mod tests {
             at_zero: None,
         };
         let error = conditions.list(600.0).unwrap_err();
-        let expected = ConditionError::Same(Value::Time(30.0), Value::Time(60.0));
+        let expected = ConditionError::Same(FactorValue::Time(30.0), FactorValue::Time(60.0));
         assert_eq!(error, expected);
     }
 }

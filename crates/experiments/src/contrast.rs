@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use observe::{Measure, Measured};
 use serde::Serialize;
 use statistics::{
-    Estimate, Interval, MIN_VALUES, PairedTimes, SignFlip, TimeTo, dominance, holm, least_p,
+    CensoredTime, Estimate, Interval, MIN_VALUES, PairedTimes, SignFlip, dominance, holm, least_p,
 };
 
 use super::estimate::{Excluded, by_seed, conditions_of, failed, time_of};
 use super::file::Experiment;
-use super::outcome::{Failure, Outcome};
+use super::outcome::{FailedUnit, UnitOutcome};
 
 /// Largest p value, after Holm's correction, of a difference that is stated.
 pub const SHOWN_P: f64 = 0.05;
@@ -34,7 +34,7 @@ pub struct Contrast {
     pub excluded_baseline: Excluded,
     /// Arm minus baseline.
     #[serde(flatten)]
-    pub difference: Difference,
+    pub difference: ArmDifference,
     /// The p value of the test, corrected by Holm's procedure for all tests of this measure: every arm under every condition.
     /// `None` if there is no test.
     pub p_holm: Option<f64>,
@@ -45,7 +45,7 @@ pub struct Contrast {
 /// Arm minus baseline.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
-pub enum Difference {
+pub enum ArmDifference {
     /// Of a number of each run.
     Number {
         /// Difference of the means.
@@ -72,7 +72,7 @@ pub enum Difference {
     NotFinite,
 }
 
-impl Difference {
+impl ArmDifference {
     /// The p value of the test, not corrected.
     #[must_use]
     pub fn p(&self) -> Option<f64> {
@@ -96,13 +96,13 @@ impl Difference {
         }
     }
 
-    fn of_times(pairs: &[(TimeTo, TimeTo)]) -> Self {
+    fn of_times(pairs: &[(CensoredTime, CensoredTime)]) -> Self {
         if pairs.len() < MIN_VALUES {
             return Self::NoPair;
         }
 
-        let (arm, baseline): (Vec<TimeTo>, Vec<TimeTo>) = pairs.iter().copied().unzip();
-        let only = |one: &[TimeTo], other: &[TimeTo]| {
+        let (arm, baseline): (Vec<CensoredTime>, Vec<CensoredTime>) = pairs.iter().copied().unzip();
+        let only = |one: &[CensoredTime], other: &[CensoredTime]| {
             let pairs = one.iter().zip(other);
             let only = pairs.filter(|(one, other)| one.is_event && !other.is_event);
             only.count()
@@ -127,10 +127,10 @@ impl Contrast {
     #[must_use]
     pub fn no_difference(&self) -> Option<String> {
         match self.difference {
-            Difference::Number { .. } | Difference::Time { .. } => None,
-            Difference::NoPair if self.n == 0 => Some("no pair".to_owned()),
-            Difference::NoPair => Some("too few pairs".to_owned()),
-            Difference::NotFinite => Some("not finite".to_owned()),
+            ArmDifference::Number { .. } | ArmDifference::Time { .. } => None,
+            ArmDifference::NoPair if self.n == 0 => Some("no pair".to_owned()),
+            ArmDifference::NoPair => Some("too few pairs".to_owned()),
+            ArmDifference::NotFinite => Some("not finite".to_owned()),
         }
     }
 }
@@ -139,7 +139,7 @@ impl Experiment {
     /// Differences of every arm to the baseline in every measure under each condition, in the order of the file; none without
     /// a baseline, or where one of the arms was not run.
     #[must_use]
-    pub fn contrast(&self, outcomes: &[Outcome], failures: &[Failure]) -> Vec<Contrast> {
+    pub fn contrast(&self, outcomes: &[UnitOutcome], failures: &[FailedUnit]) -> Vec<Contrast> {
         let Some(baseline) = &self.baseline else {
             return Vec::new();
         };
@@ -202,13 +202,13 @@ fn compare(
     measure: &Measure,
     arm: &BTreeMap<u64, &Measured>,
     baseline: &BTreeMap<u64, &Measured>,
-) -> (usize, Difference) {
+) -> (usize, ArmDifference) {
     if measure.is_time() {
         let pairs = paired(arm, baseline, time_of);
-        (pairs.len(), Difference::of_times(&pairs))
+        (pairs.len(), ArmDifference::of_times(&pairs))
     } else {
         let pairs = paired(arm, baseline, Measured::value);
-        (pairs.len(), Difference::of_numbers(&pairs))
+        (pairs.len(), ArmDifference::of_numbers(&pairs))
     }
 }
 
@@ -259,7 +259,7 @@ mod tests {
 
     /// Runs of the shipped experiment under two conditions with eight seeds, in which an arm is so much better than the
     /// baseline, and deadlocks in every second run, while the baseline never does.
-    fn outcomes(experiment: &Experiment, better: &BTreeMap<&str, f64>) -> Vec<Outcome> {
+    fn outcomes(experiment: &Experiment, better: &BTreeMap<&str, f64>) -> Vec<UnitOutcome> {
         let mut outcomes = Vec::new();
         for condition in ["0", "0.5"] {
             for arm in &experiment.arms {
@@ -278,7 +278,7 @@ mod tests {
                         };
                         measures.insert(measure.name.clone(), measured);
                     }
-                    outcomes.push(Outcome {
+                    outcomes.push(UnitOutcome {
                         unit: outcomes.len(),
                         condition: condition.to_owned(),
                         levels: Vec::new(),
@@ -315,7 +315,7 @@ mod tests {
         assert_eq!(contrasts.len(), 4 * 2 * compared.count());
         let rules = find(&contrasts, "served", "rules");
         assert_eq!((rules.n, rules.condition.as_str()), (8, "0"));
-        let Difference::Number {
+        let ArmDifference::Number {
             mean,
             dominance,
             test,
@@ -341,7 +341,7 @@ mod tests {
             (neither.difference.p(), neither.p_holm),
             (Some(1.0), Some(1.0))
         );
-        let Difference::Number { mean, .. } = &neither.difference else {
+        let ArmDifference::Number { mean, .. } = &neither.difference else {
             panic!("{neither:?}");
         };
         assert_eq!((mean.value, mean.interval), (0.0, Interval::AllEqual));
@@ -353,7 +353,7 @@ mod tests {
         let outcomes = outcomes(&experiment, &BTreeMap::new());
         let contrasts = experiment.contrast(&outcomes, &[]);
         let rules = find(&contrasts, "deadlock", "rules");
-        let Difference::Time {
+        let ArmDifference::Time {
             share,
             restricted_mean_s,
             until_s,
@@ -395,14 +395,18 @@ mod tests {
 
         let rules = find(&contrasts, "served", "rules");
         assert_eq!(rules.n, 2);
-        assert_eq!(rules.difference, Difference::NoPair);
+        assert_eq!(rules.difference, ArmDifference::NoPair);
         assert_eq!(rules.p_holm, None);
         let yoked = find(&contrasts, "served", "yoked");
         assert_eq!(yoked.comparisons, 4, "{yoked:?}");
     }
 
     /// Runs of one condition, in which both arms measured these, by seed.
-    fn measured(experiment: &Experiment, arm: &[Measured], baseline: &[Measured]) -> Vec<Outcome> {
+    fn measured(
+        experiment: &Experiment,
+        arm: &[Measured],
+        baseline: &[Measured],
+    ) -> Vec<UnitOutcome> {
         let mut all = outcomes(experiment, &BTreeMap::new());
         all.retain(|run| run.condition == "0" && ["rules", "emotions"].contains(&&*run.arm));
         for run in &mut all {
@@ -467,13 +471,13 @@ mod tests {
         let excluded = rules.excluded_baseline.to_string();
         assert_eq!(excluded, "1 no pair, 1 unfinished, 1 missing");
         assert_eq!(rules.difference.p(), Some(2.0 / 32.0));
-        let Difference::Number { mean, .. } = &rules.difference else {
+        let ArmDifference::Number { mean, .. } = &rules.difference else {
             panic!("{rules:?}");
         };
         assert_eq!(mean.value, 6.0);
 
         // One failed: it is beside the numbers of its arm, and an arm all of whose runs failed has a row.
-        let failure = |unit: usize, arm: &str| Failure {
+        let failure = |unit: usize, arm: &str| FailedUnit {
             unit,
             condition: outcomes[0].condition.clone(),
             arm: arm.to_owned(),
@@ -481,7 +485,7 @@ mod tests {
             reason: "it fell".to_owned(),
         };
         let failures = [failure(1_000, "rules"), failure(1_001, "timer")];
-        let played: Vec<Outcome> = outcomes
+        let played: Vec<UnitOutcome> = outcomes
             .iter()
             .filter(|one| one.arm != "timer")
             .cloned()
@@ -508,7 +512,7 @@ mod tests {
         let none = measured(&experiment, &arm, &[const { Measured::NoPair }; 8]);
         let contrasts = experiment.contrast(&none, &[]);
         let rules = find(&contrasts, "served", "rules");
-        assert_eq!((&rules.difference, rules.n), (&Difference::NoPair, 0));
+        assert_eq!((&rules.difference, rules.n), (&ArmDifference::NoPair, 0));
         assert_eq!((rules.p_holm, rules.comparisons), (None, 0));
         let cells = experiment.estimate(&none, &[]);
         let cell = cells.iter().find(|cell| cell.arm == "emotions").unwrap();
@@ -538,9 +542,9 @@ mod tests {
         let experiment = Experiment::find(Path::new("deadlock")).unwrap();
         let arm = [80.0, 80.0, 80.0, 0.0, 0.0, 0.0, 0.0, 0.0].map(at);
         let outcomes = measured(&experiment, &arm[..], &[0.0; 8].map(at));
-        let outcomes: Vec<Outcome> = outcomes.into_iter().filter(|run| run.seed < 5).collect();
+        let outcomes: Vec<UnitOutcome> = outcomes.into_iter().filter(|run| run.seed < 5).collect();
         let contrasts = experiment.contrast(&outcomes, &[]);
-        let Difference::Time {
+        let ArmDifference::Time {
             restricted_mean_s,
             until_s,
             ..
@@ -559,7 +563,7 @@ mod tests {
         let outcomes = measured(&experiment, &[1.7e308; 8].map(value), &[0.0; 8].map(value));
         let contrasts = experiment.contrast(&outcomes, &[]);
         let rules = find(&contrasts, "served", "rules");
-        assert_eq!(rules.difference, Difference::NotFinite);
+        assert_eq!(rules.difference, ArmDifference::NotFinite);
         assert_eq!((rules.p_holm, rules.comparisons), (None, 0));
     }
 

@@ -32,7 +32,7 @@ const LOCK: &str = "first.lock";
 
 /// What is played, and how.
 #[derive(Debug, Clone)]
-pub struct Options {
+pub struct EngineOptions {
     /// Numbers of the units.
     pub units: Range<usize>,
     /// Number of units at the same time; the results do not depend on it.
@@ -67,7 +67,7 @@ struct Current<'a> {
 impl Queue {
     /// The units that have not been played. Of units that are the same run, it has the first.
     #[must_use]
-    pub fn of(plan: &Plan, store: &Store, options: &Options) -> Self {
+    pub fn of(plan: &Plan, store: &Store, options: &EngineOptions) -> Self {
         let mut units = Vec::new();
         let mut keys = BTreeSet::new();
         for number in options.units.clone() {
@@ -117,7 +117,7 @@ pub fn play(
     folder: &Path,
     store: &mut Store,
     queue: &mut Queue,
-    options: &Options,
+    options: &EngineOptions,
     launcher: Launcher<'_>,
     done: &(impl Fn() + Sync),
 ) -> Result<(), LabError> {

@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 
 use observe::{Measure, Measured};
 use serde::Serialize;
-use statistics::{Estimate, Survival, TimeTo, quantile};
+use statistics::{CensoredTime, Estimate, Survival, quantile};
 
 use super::file::Experiment;
-use super::outcome::{Failure, Outcome};
+use super::outcome::{FailedUnit, UnitOutcome};
 
 /// One measure of the runs of an arm under a condition.
 #[derive(Debug, Clone, Serialize)]
-pub struct Cell {
+pub struct ArmMeasure {
     /// Name of the measure.
     pub measure: String,
     /// Name of the condition.
@@ -110,7 +110,7 @@ impl Estimated {
     #[must_use]
     pub fn of(measure: &Measure, measured: &[&Measured]) -> Self {
         if measure.is_time() {
-            let times: Vec<TimeTo> = measured.iter().filter_map(|one| time_of(one)).collect();
+            let times: Vec<CensoredTime> = measured.iter().filter_map(|one| time_of(one)).collect();
             let survival = Survival::of(&times);
             return Self::Time {
                 share: Estimate::share(survival.events, survival.n),
@@ -139,7 +139,7 @@ impl Estimated {
 impl Experiment {
     /// Estimates of every measure over the seeds, for each arm under each condition that was run, in the order of the file.
     #[must_use]
-    pub fn estimate(&self, outcomes: &[Outcome], failures: &[Failure]) -> Vec<Cell> {
+    pub fn estimate(&self, outcomes: &[UnitOutcome], failures: &[FailedUnit]) -> Vec<ArmMeasure> {
         let mut cells = Vec::new();
         for measure in &self.measures {
             for condition in conditions_of(outcomes, failures) {
@@ -150,7 +150,7 @@ impl Experiment {
                         continue;
                     }
                     let measured: Vec<&Measured> = measured.into_values().collect();
-                    cells.push(Cell {
+                    cells.push(ArmMeasure {
                         measure: measure.name.clone(),
                         condition: condition.to_owned(),
                         arm: arm.name.clone(),
@@ -166,7 +166,10 @@ impl Experiment {
 }
 
 /// The conditions of the units, each once, in the order of the units.
-pub(super) fn conditions_of<'a>(outcomes: &'a [Outcome], failures: &'a [Failure]) -> Vec<&'a str> {
+pub(super) fn conditions_of<'a>(
+    outcomes: &'a [UnitOutcome],
+    failures: &'a [FailedUnit],
+) -> Vec<&'a str> {
     let mut units = BTreeMap::new();
     for outcome in outcomes {
         units.insert(outcome.unit, outcome.condition.as_str());
@@ -181,7 +184,7 @@ pub(super) fn conditions_of<'a>(outcomes: &'a [Outcome], failures: &'a [Failure]
 }
 
 /// Number of runs of an arm under a condition that could not be played to their end.
-pub(super) fn failed(failures: &[Failure], condition: &str, arm: &str) -> usize {
+pub(super) fn failed(failures: &[FailedUnit], condition: &str, arm: &str) -> usize {
     failures
         .iter()
         .filter(|failure| failure.condition == condition && failure.arm == arm)
@@ -190,7 +193,7 @@ pub(super) fn failed(failures: &[Failure], condition: &str, arm: &str) -> usize 
 
 /// What was measured in the runs of an arm under a condition, by seed.
 pub(super) fn by_seed<'a>(
-    outcomes: &'a [Outcome],
+    outcomes: &'a [UnitOutcome],
     measure: &Measure,
     condition: &str,
     arm: &str,
@@ -208,7 +211,7 @@ pub(super) fn by_seed<'a>(
 }
 
 /// The time of a run that was at risk.
-pub(super) fn time_of(measured: &Measured) -> Option<TimeTo> {
+pub(super) fn time_of(measured: &Measured) -> Option<CensoredTime> {
     let (time_s, is_event) = measured.time()?;
-    Some(TimeTo { time_s, is_event })
+    Some(CensoredTime { time_s, is_event })
 }

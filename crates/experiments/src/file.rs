@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use config::units::Time;
 use config::{FileError, Source, shipped};
 use observe::expect::check_all;
-use observe::measure::Kind;
+use observe::measure::MeasureSource;
 use observe::measure::check_name;
 use observe::{Expectation, Measure};
 use protocol::RobotName;
@@ -17,8 +17,8 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::condition::{
-    Condition, ConditionError, Conditions, Factor, NAMED, Target, Value, check_apart, check_change,
-    check_levels, parse,
+    Condition, ConditionError, Conditions, Factor, FactorValue, NAMED, Target, check_apart,
+    check_change, check_levels, parse,
 };
 use super::presentation::{Presentation, RawPresentation};
 use super::setting::Setting;
@@ -318,7 +318,7 @@ impl Experiment {
     /// Checks that the numbers of the summary that are measured can be there.
     fn check_summaries(&self) -> Result<(), FileError> {
         for measure in &self.measures {
-            let Kind::Summary(path) = &measure.kind else {
+            let MeasureSource::Summary(path) = &measure.kind else {
                 continue;
             };
             if let Err(reason) = Summary::check_path(path) {
@@ -635,14 +635,14 @@ impl RawFactor {
 }
 
 impl RawValue {
-    fn check(self) -> Result<Value, String> {
+    fn check(self) -> Result<FactorValue, String> {
         match self {
-            Self::Flag(is_set) => Ok(Value::Flag(is_set)),
-            Self::Integer(number) => Ok(Value::Integer(number)),
-            Self::Number(number) if number.is_finite() => Ok(Value::Number(number)),
+            Self::Flag(is_set) => Ok(FactorValue::Flag(is_set)),
+            Self::Integer(number) => Ok(FactorValue::Integer(number)),
+            Self::Number(number) if number.is_finite() => Ok(FactorValue::Number(number)),
             Self::Number(number) => Err(format!("{number} is not a finite number")),
             Self::Text(text) => match check_name(&text) {
-                Ok(()) => Ok(Value::of_text(text)),
+                Ok(()) => Ok(FactorValue::of_text(text)),
                 Err(error) => Err(error.to_string()),
             },
         }

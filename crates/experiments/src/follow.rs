@@ -13,7 +13,7 @@ pub(super) trait Follow {
 }
 
 /// A run that has ended.
-pub(super) struct Ended {
+pub(super) struct EndedRun {
     /// Digest of the run.
     pub(super) digest: String,
     /// Its summary.
@@ -22,7 +22,7 @@ pub(super) struct Ended {
     pub(super) verdicts: BTreeMap<String, String>,
 }
 
-impl Ended {
+impl EndedRun {
     /// The end of a run by its summary.
     ///
     /// # Errors

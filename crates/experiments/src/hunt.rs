@@ -26,13 +26,13 @@ use protocol::random::{stream, unit};
 use protocol::time::time_s;
 use serde::Serialize;
 
-pub use case::Case;
-pub use cause::{Cause, Sign};
-pub use coverage::{Coverage, Fate, Feature};
+pub use case::FaultCase;
+pub use cause::{FailureSignature, Sign};
+pub use coverage::{CommandFate, Coverage, Feature};
 pub use draw::Ground;
-pub use fault::{Effect, Kind, Link, Messages, PlannedFault, Span};
-pub use shrink::{Bounds, Shrunk, World, shrink};
-pub use trial::{Failure, Maker, Played, RUNS, SentMessage, Subject, Trial};
+pub use fault::{Effect, FaultClass, Link, Messages, PlannedFault, TickSpan};
+pub use shrink::{Bounds, ScenarioParts, Shrunk, shrink};
+pub use trial::{FailedExpectation, Maker, RUNS, SentMessage, Subject, Trial, TrialResult};
 
 use file::Heading;
 
@@ -43,7 +43,7 @@ const MAX_FINDINGS: usize = 20;
 
 /// How long a hunt lasts.
 #[derive(Debug, Clone, Copy)]
-pub enum Budget {
+pub enum HuntBudget {
     /// This number of plans.
     Plans(u64),
     /// New plans are drawn for this time.
@@ -52,15 +52,15 @@ pub enum Budget {
 
 /// Options of a hunt.
 #[derive(Debug)]
-pub struct Options<'a> {
+pub struct HuntOptions<'a> {
     /// Seed of the plans.
     pub seed: u64,
     /// How long it lasts.
-    pub budget: Budget,
+    pub budget: HuntBudget,
     /// Number of runs at the same time; the result does not depend on it.
     pub jobs: usize,
     /// Kinds of faults that are drawn.
-    pub kinds: Vec<Kind>,
+    pub kinds: Vec<FaultClass>,
     /// Longest time of a fault that does not last for the whole run, simulated seconds.
     pub longest_s: f64,
     /// Expectations that are checked; empty for all.
@@ -75,7 +75,7 @@ pub struct Options<'a> {
 
 /// What a hunt reports while it goes on.
 #[derive(Debug)]
-pub enum Progress<'a> {
+pub enum HuntProgress<'a> {
     /// A batch of plans was played: the number of plans so far, and of features.
     Played(u64, usize),
     /// An expectation has failed; its file is written, and its plan will be shrunk.
@@ -98,9 +98,9 @@ pub struct Finding {
     /// The faults of the plan as it was drawn.
     pub drawn: Vec<PlannedFault>,
     /// The case, shrunk as far as it is.
-    pub case: Case,
+    pub case: FaultCase,
     /// What its faults do.
-    pub cause: Cause,
+    pub cause: FailureSignature,
     /// Number of plans in whose runs the expectation fails and this cause occurs, too.
     pub plans: u64,
     /// The faults of the case in words.
@@ -115,7 +115,7 @@ pub struct Finding {
 
 /// The result of a hunt.
 #[derive(Debug, Serialize)]
-pub struct Report {
+pub struct HuntReport {
     /// The scenario.
     pub scenario: PathBuf,
     /// Seed of the plans.
@@ -141,13 +141,13 @@ pub struct Report {
 /// A hunt in progress.
 struct Hunt<'a> {
     subject: &'a Subject,
-    options: &'a Options<'a>,
+    options: &'a HuntOptions<'a>,
     ground: Ground,
     /// Expectations that are checked.
     wanted: BTreeSet<String>,
     /// Plans that reached something new.
     corpus: Vec<Vec<PlannedFault>>,
-    report: Report,
+    report: HuntReport,
 }
 
 /// Hunts in a scenario.
@@ -156,10 +156,10 @@ struct Hunt<'a> {
 /// If the scenario fails without faults, nothing can be drawn for it, or a file cannot be written.
 pub fn hunt(
     subject: &Subject,
-    options: &Options<'_>,
-    progress: &mut dyn FnMut(Progress<'_>),
-) -> Result<Report, LabError> {
-    let baseline = subject.play(&Case::default(), &BTreeSet::new())?;
+    options: &HuntOptions<'_>,
+    progress: &mut dyn FnMut(HuntProgress<'_>),
+) -> Result<HuntReport, LabError> {
+    let baseline = subject.play(&FaultCase::default(), &BTreeSet::new())?;
     let wanted = wanted(subject, &baseline, &options.expect)?;
     let ground = Ground::new(
         &subject.scenario,
@@ -190,7 +190,7 @@ pub fn hunt(
         subject,
         options,
         ground,
-        report: Report {
+        report: HuntReport {
             scenario: subject.file.clone(),
             seed: options.seed,
             plans: 0,
@@ -212,7 +212,7 @@ pub fn hunt(
 /// The expectations that a hunt checks. None of them fails without faults.
 fn wanted(
     subject: &Subject,
-    baseline: &Played,
+    baseline: &TrialResult,
     expect: &BTreeSet<String>,
 ) -> Result<BTreeSet<String>, LabError> {
     let file = subject.file.display();
@@ -250,14 +250,14 @@ fn wanted(
 }
 
 impl Hunt<'_> {
-    fn go(&mut self, progress: &mut dyn FnMut(Progress<'_>)) -> Result<(), LabError> {
+    fn go(&mut self, progress: &mut dyn FnMut(HuntProgress<'_>)) -> Result<(), LabError> {
         let begun = Instant::now();
         while !self.is_stopped() {
             let first = self.report.plans;
             let count = match self.options.budget {
-                Budget::Plans(plans) => (plans - first).min(BATCH),
-                Budget::Time(time) if begun.elapsed() < time => BATCH,
-                Budget::Time(_) => 0,
+                HuntBudget::Plans(plans) => (plans - first).min(BATCH),
+                HuntBudget::Time(time) if begun.elapsed() < time => BATCH,
+                HuntBudget::Time(_) => 0,
             };
             if count == 0 {
                 return Ok(());
@@ -271,7 +271,7 @@ impl Hunt<'_> {
             });
             let failures = self.note(first, cases, played);
             let features = self.report.coverage.features().count();
-            progress(Progress::Played(self.report.plans, features));
+            progress(HuntProgress::Played(self.report.plans, features));
             for (plan, case, played) in failures {
                 self.note_failures(plan, &case, &played, progress)?;
             }
@@ -284,7 +284,7 @@ impl Hunt<'_> {
     }
 
     /// The plans after the first ones.
-    fn draw(&self, first: u64, count: u64) -> Vec<Case> {
+    fn draw(&self, first: u64, count: u64) -> Vec<FaultCase> {
         let mut cases = Vec::new();
         for plan in first + 1..=first + count {
             let mut chance = stream(self.options.seed, &format!("hunt/{plan}"));
@@ -295,7 +295,7 @@ impl Hunt<'_> {
             } else {
                 self.ground.draw(&mut chance)
             };
-            cases.push(Case::of(faults));
+            cases.push(FaultCase::of(faults));
         }
 
         cases
@@ -305,9 +305,9 @@ impl Hunt<'_> {
     fn note(
         &mut self,
         first: u64,
-        cases: Vec<Case>,
-        results: Vec<Option<Result<Played, LabError>>>,
-    ) -> Vec<(u64, Case, Played)> {
+        cases: Vec<FaultCase>,
+        results: Vec<Option<Result<TrialResult, LabError>>>,
+    ) -> Vec<(u64, FaultCase, TrialResult)> {
         let mut failures = Vec::new();
         for (index, (case, result)) in cases.into_iter().zip(results).enumerate() {
             let Some(result) = result else {
@@ -339,11 +339,11 @@ impl Hunt<'_> {
     fn note_failures(
         &mut self,
         plan: u64,
-        case: &Case,
-        played: &Played,
-        progress: &mut dyn FnMut(Progress<'_>),
+        case: &FaultCase,
+        played: &TrialResult,
+        progress: &mut dyn FnMut(HuntProgress<'_>),
     ) -> Result<(), LabError> {
-        let signs = Cause::of_plan(case, played);
+        let signs = FailureSignature::of_plan(case, played);
         for name in played.failed.keys() {
             if !self.wanted.contains(name) {
                 continue;
@@ -362,7 +362,7 @@ impl Hunt<'_> {
     }
 
     /// The finding whose cause is among these signs.
-    fn known(&mut self, name: &str, signs: &Cause) -> Option<&mut Finding> {
+    fn known(&mut self, name: &str, signs: &FailureSignature) -> Option<&mut Finding> {
         let mut findings = self.report.findings.iter_mut();
         findings.find(|known| known.expectation == name && known.cause.is_part_of(signs))
     }
@@ -372,15 +372,15 @@ impl Hunt<'_> {
         &mut self,
         name: &str,
         plan: u64,
-        case: &Case,
-        played: &Played,
-        progress: &mut dyn FnMut(Progress<'_>),
+        case: &FaultCase,
+        played: &TrialResult,
+        progress: &mut dyn FnMut(HuntProgress<'_>),
     ) -> Result<(), LabError> {
         let mut drawn = self.finding(name, plan, case, played);
         drawn.file = file::reserve(&drawn.file)?;
         self.write(&drawn, played, "It is not shrunk.")?;
-        progress(Progress::Found(&drawn));
-        let world = World {
+        progress(HuntProgress::Found(&drawn));
+        let world = ScenarioParts {
             roster: self.subject.scenario.roster(),
             guests: self.subject.scenario.guests.count,
         };
@@ -411,12 +411,12 @@ impl Hunt<'_> {
         self.write(&finding, &shrunk.played, &sentence)?;
         finding.file = file::keep_one(finding.file, &named)?;
         self.check_file(&finding)?;
-        progress(Progress::Shrunk(&finding));
+        progress(HuntProgress::Shrunk(&finding));
         self.report.findings.push(finding);
         Ok(())
     }
 
-    fn finding(&self, name: &str, plan: u64, case: &Case, played: &Played) -> Finding {
+    fn finding(&self, name: &str, plan: u64, case: &FaultCase, played: &TrialResult) -> Finding {
         let tick_s = self.subject.scenario.tick_s;
         let failure = &played.failed[name];
         let faults = case.faults.iter().map(|fault| fault.in_words(tick_s));
@@ -429,7 +429,7 @@ impl Hunt<'_> {
             plan,
             drawn: case.faults.clone(),
             case: case.clone(),
-            cause: Cause::of_faults(case, played),
+            cause: FailureSignature::of_faults(case, played),
             plans: 1,
             faults: faults.collect(),
             shrink_runs: 0,
@@ -438,7 +438,7 @@ impl Hunt<'_> {
         }
     }
 
-    fn write(&self, finding: &Finding, played: &Played, shrunk: &str) -> Result<(), LabError> {
+    fn write(&self, finding: &Finding, played: &TrialResult, shrunk: &str) -> Result<(), LabError> {
         let heading = Heading {
             expectation: &finding.expectation,
             seed: self.options.seed,
@@ -452,7 +452,7 @@ impl Hunt<'_> {
     fn check_file(&self, finding: &Finding) -> Result<(), LabError> {
         let name = &finding.expectation;
         let written = self.subject.of_file(&finding.file)?;
-        let played = written.play(&Case::default(), &BTreeSet::from([name.clone()]))?;
+        let played = written.play(&FaultCase::default(), &BTreeSet::from([name.clone()]))?;
         if played.failed.contains_key(name) {
             return Ok(());
         }

@@ -28,17 +28,17 @@ mod unit;
 
 pub use observe::Measure;
 
-pub use condition::{Condition, ConditionError, Conditions, Factor, Value};
-pub use contrast::{Contrast, Difference, SHOWN_P, least_p_holm};
+pub use condition::{Condition, ConditionError, Conditions, Factor, FactorValue};
+pub use contrast::{ArmDifference, Contrast, SHOWN_P, least_p_holm};
 pub use engine::is_of_experiment;
-pub use estimate::{Cell, Estimated, Excluded};
+pub use estimate::{ArmMeasure, Estimated, Excluded};
 pub use file::{Arm, Experiment, MAX_UNITS, is_experiment_file};
-pub use outcome::{Failure, Measured, Outcome};
-pub use plan::{Key, LaunchText, PLAN, Plan, Program, Request, Robots, Unit};
+pub use outcome::{FailedUnit, Measured, UnitOutcome};
+pub use plan::{Key, LaunchText, PLAN, Plan, ProgramVersion, Request, Robots, Unit};
 pub use presentation::{Example, Presentation, Shown};
 pub use processes::{Launcher, write_launch};
 pub use provenance::{Machine, Provenance};
-pub use results::{Judged, Results};
+pub use results::{ExpectationResult, Results};
 pub use setting::Setting;
 pub use store::Store;
 pub use unit::{Played, UnitResult};

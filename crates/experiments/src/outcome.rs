@@ -11,7 +11,7 @@ pub use observe::Measured;
 
 /// What was measured in one unit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Outcome {
+pub struct UnitOutcome {
     /// Number of the unit in the plan, from 0.
     pub unit: usize,
     /// Name of the condition.
@@ -35,7 +35,7 @@ pub struct Outcome {
 
 /// A unit that could not be played to its end.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Failure {
+pub struct FailedUnit {
     /// Number of the unit in the plan, from 0.
     pub unit: usize,
     /// Name of the condition.
@@ -48,7 +48,7 @@ pub struct Failure {
     pub reason: String,
 }
 
-impl Outcome {
+impl UnitOutcome {
     /// The outcome of a unit.
     pub(super) fn of(unit: &Unit<'_>, played: &Played) -> Self {
         Self {

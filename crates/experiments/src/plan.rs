@@ -80,7 +80,7 @@ struct Sealed {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct WrittenPlan {
     name: String,
-    program: Program,
+    program: ProgramVersion,
     units: usize,
     duration_s: f64,
     seeds: Vec<u64>,
@@ -117,7 +117,7 @@ pub struct LaunchText {
 
 /// The program that plays the units: another one may give other runs.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Program {
+pub struct ProgramVersion {
     /// Its version.
     pub version: String,
     /// The commit that it was built from, if it is known.
@@ -192,7 +192,7 @@ fn origin_of(source: &Source) -> Option<String> {
     Some(path.display().to_string())
 }
 
-impl Program {
+impl ProgramVersion {
     /// This program.
     #[must_use]
     pub fn this() -> Self {
@@ -203,7 +203,7 @@ impl Program {
     }
 }
 
-impl std::fmt::Display for Program {
+impl std::fmt::Display for ProgramVersion {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match &self.commit {
             Some(commit) => write!(f, "{} ({commit})", self.version),
@@ -272,7 +272,7 @@ impl Plan {
         experiment.report.check_units(experiment.source(), units)?;
         let written = WrittenPlan {
             name: request.name.clone(),
-            program: Program::this(),
+            program: ProgramVersion::this(),
             units,
             duration_s: experiment.duration_s,
             seeds: experiment.seeds.clone(),
@@ -366,7 +366,7 @@ impl Plan {
     /// # Errors
     /// If it is another program.
     pub fn check_program(&self) -> Result<(), LabError> {
-        let this = Program::this();
+        let this = ProgramVersion::this();
         if this != self.written.program {
             return Err(LabError::refused(format!(
                 "the experiment was planned by cars {}, and this is cars {this}",
@@ -488,7 +488,7 @@ impl Plan {
 
     /// The program that plays the units.
     #[must_use]
-    pub fn program(&self) -> &Program {
+    pub fn program(&self) -> &ProgramVersion {
         &self.written.program
     }
 

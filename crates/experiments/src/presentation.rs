@@ -7,7 +7,7 @@ use observe::Measure;
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::condition::{Conditions, Value};
+use super::condition::{Conditions, FactorValue};
 
 /// Most example runs.
 const MAX_RUNS: usize = 8;
@@ -217,8 +217,8 @@ fn check_axis(name: &str, conditions: &Conditions) -> Result<(), String> {
     };
 
     let are_numbers = factor.values.iter().all(|value| match value {
-        Value::Integer(_) | Value::Number(_) | Value::Time(_) => true,
-        Value::Flag(_) | Value::Text(_) => false,
+        FactorValue::Integer(_) | FactorValue::Number(_) | FactorValue::Time(_) => true,
+        FactorValue::Flag(_) | FactorValue::Text(_) => false,
     });
     if !are_numbers || factor.values.len() < 2 {
         return Err(format!(

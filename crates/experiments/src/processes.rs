@@ -13,7 +13,7 @@ use recording::{Recording, Ticks};
 use scenario::Scenario;
 use toml::{Table, Value};
 
-use super::follow::{Ended, Follow};
+use super::follow::{EndedRun, Follow};
 use super::plan::LaunchText;
 use export::draft::unwritable;
 use lab::LabError;
@@ -38,7 +38,7 @@ pub(super) fn follow(
     launch: Option<&LaunchText>,
     launcher: Launcher<'_>,
     follower: &mut impl Follow,
-) -> Result<Ended, LabError> {
+) -> Result<EndedRun, LabError> {
     let folder = Scratch::new().map_err(LabError::failed)?;
     scenario.record.frames = true;
     scenario.record.panels = false;
@@ -67,7 +67,7 @@ pub(super) fn follow(
     };
 
     read(&scenario, &run, follower)?;
-    Ended::of(&summary)
+    EndedRun::of(&summary)
 }
 
 /// The failure of a launch, with what it printed.

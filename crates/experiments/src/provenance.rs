@@ -6,7 +6,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use config::FileError;
 use serde::{Deserialize, Serialize};
 
-use super::plan::{Program, write};
+use super::plan::{ProgramVersion, write};
 
 /// The provenance in the folder of an experiment.
 pub(super) const PROVENANCE: &str = "provenance.json";
@@ -16,7 +16,7 @@ pub(super) const PROVENANCE: &str = "provenance.json";
 pub struct Provenance {
     /// The program.
     #[serde(flatten)]
-    pub program: Program,
+    pub program: ProgramVersion,
     /// Its arguments, after its name.
     pub command: Vec<String>,
     /// When the results were written, seconds since 1970 (UTC).
@@ -48,7 +48,7 @@ impl Provenance {
         // A path need not be UTF-8, and JSON has no other texts.
         let command = std::env::args_os().skip(1);
         Self {
-            program: Program::this(),
+            program: ProgramVersion::this(),
             command: command
                 .map(|arg| arg.to_string_lossy().into_owned())
                 .collect(),

@@ -5,18 +5,18 @@ use std::io::Write;
 use std::path::Path;
 
 use config::FileError;
-use export::csv::{Table, Value};
+use export::csv::{CsvTable, FieldValue};
 use export::draft::{Draft, unwritable};
 use lab::LabError;
 use protocol::messages::Verdict;
 use serde::Serialize;
 
 use super::contrast::Contrast;
-use super::estimate::Cell;
-use super::outcome::{Failure, Outcome};
+use super::estimate::ArmMeasure;
+use super::outcome::{FailedUnit, UnitOutcome};
 use super::plan::Plan;
 use super::store::Store;
-use super::unheard::Unheard;
+use super::unheard::MissingWords;
 
 /// The table with a row for each unit.
 pub(super) const RUNS: &str = "runs.csv";
@@ -29,9 +29,9 @@ pub struct Results {
     /// The plan, with the experiment.
     pub plan: Plan,
     /// The units that were played.
-    pub outcomes: Vec<Outcome>,
+    pub outcomes: Vec<UnitOutcome>,
     /// The units that could not be played.
-    pub failures: Vec<Failure>,
+    pub failures: Vec<FailedUnit>,
     /// Numbers of the units that have not been played yet.
     pub missing: Vec<usize>,
     /// Lines of files that are not as they were written, for people: each with its unit, if that has to be played again.
@@ -44,7 +44,7 @@ pub struct Results {
 
 /// An expectation of an experiment, and the runs that do not meet it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Judged<'a> {
+pub struct ExpectationResult<'a> {
     /// Its name.
     pub expectation: &'a str,
     /// Numbers of the units that fail it.
@@ -57,7 +57,7 @@ pub struct Judged<'a> {
     pub judged: usize,
 }
 
-impl Judged<'_> {
+impl ExpectationResult<'_> {
     /// The worst verdict of a run.
     #[must_use]
     pub fn verdict(&self) -> Verdict {
@@ -81,9 +81,9 @@ struct WrittenResults<'a> {
     question: &'a str,
     units: usize,
     missing: usize,
-    failures: &'a [Failure],
+    failures: &'a [FailedUnit],
     never_occurred: &'a [String],
-    estimates: Vec<Cell>,
+    estimates: Vec<ArmMeasure>,
     contrasts: Vec<Contrast>,
 }
 
@@ -105,7 +105,7 @@ impl Results {
         let mut failures = Vec::new();
         let mut missing = Vec::new();
         let mut conflicts = Vec::new();
-        let mut unheard = Unheard::default();
+        let mut unheard = MissingWords::default();
         let mut all_played = Vec::new();
         for number in 0..plan.units() {
             let unit = plan.unit(number);
@@ -114,9 +114,9 @@ impl Results {
                 Some(Ok(played)) => {
                     unheard.add(played);
                     all_played.push(played);
-                    outcomes.push(Outcome::of(&unit, played));
+                    outcomes.push(UnitOutcome::of(&unit, played));
                 }
-                Some(Err(reason)) => failures.push(Failure {
+                Some(Err(reason)) => failures.push(FailedUnit {
                     unit: number,
                     condition: unit.condition.name.clone(),
                     arm: unit.arm.name.clone(),
@@ -148,7 +148,7 @@ impl Results {
 
     /// Estimates of every measure, for each arm under each condition.
     #[must_use]
-    pub fn estimates(&self) -> Vec<Cell> {
+    pub fn estimates(&self) -> Vec<ArmMeasure> {
         let experiment = &self.plan.experiment;
         experiment.estimate(&self.outcomes, &self.failures)
     }
@@ -163,10 +163,10 @@ impl Results {
     /// How the runs have met each expectation of the experiment file, in its order. What the scenario expects is in the tables
     /// only: an experiment may be about how often that fails.
     #[must_use]
-    pub fn judged(&self) -> Vec<Judged<'_>> {
+    pub fn judged(&self) -> Vec<ExpectationResult<'_>> {
         let mut all = Vec::new();
         for expectation in &self.plan.experiment.expectations {
-            let mut judged = Judged {
+            let mut judged = ExpectationResult {
                 expectation: &expectation.name,
                 failed: Vec::new(),
                 undecided: Vec::new(),
@@ -223,7 +223,7 @@ impl Results {
     /// The table with a row for each unit.
     fn table(&self, path: &Path) -> Result<Draft, FileError> {
         let columns = UnitColumns::of(self);
-        let mut table = Table::create(path, columns.all.clone())?;
+        let mut table = CsvTable::create(path, columns.all.clone())?;
 
         let mut outcomes = self.outcomes.iter().peekable();
         let mut failures = self.failures.iter().peekable();
@@ -308,8 +308,8 @@ impl UnitColumns {
     }
 
     /// The cells that all units have.
-    fn unit(&self, number: usize, levels: &[(String, String)]) -> Vec<(&str, Value<'_>)> {
-        let mut row = vec![("unit", Value::from(number as u64))];
+    fn unit(&self, number: usize, levels: &[(String, String)]) -> Vec<(&str, FieldValue<'_>)> {
+        let mut row = vec![("unit", FieldValue::from(number as u64))];
         for (name, level) in levels {
             let (column, are_numbers) = &self.levels[name];
             let level = match level.parse::<f64>() {
@@ -321,7 +321,7 @@ impl UnitColumns {
         row
     }
 
-    fn row<'a>(&'a self, outcome: &'a Outcome) -> Vec<(&'a str, Value<'a>)> {
+    fn row<'a>(&'a self, outcome: &'a UnitOutcome) -> Vec<(&'a str, FieldValue<'a>)> {
         let mut row = self.unit(outcome.unit, &outcome.levels);
         row.push(("condition", outcome.condition.as_str().into()));
         row.push(("arm", outcome.arm.as_str().into()));

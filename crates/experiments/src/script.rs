@@ -17,11 +17,11 @@ const URGENCY: &str = "urgency";
 
 /// The emotions that robots have shown.
 #[derive(Debug, Default)]
-pub(super) struct Script {
+pub(super) struct EmotionScript {
     robots: BTreeMap<RobotName, Vec<Value>>,
 }
 
-impl Follow for Script {
+impl Follow for EmotionScript {
     /// Notes the emotions that begin in a tick, with their urgencies.
     fn observe(&mut self, observation: &Observation<'_>) {
         for event in observation.events {
@@ -41,7 +41,7 @@ impl Follow for Script {
     }
 }
 
-impl Script {
+impl EmotionScript {
     /// The changes of a scenario that make its robots show these emotions.
     ///
     /// # Errors

@@ -9,14 +9,14 @@ use super::unit::Played;
 
 /// The words that did not occur in units.
 #[derive(Debug, Default)]
-pub(super) struct Unheard {
+pub(super) struct MissingWords {
     /// Number of units.
     units: usize,
     /// For each word, in how many units it did not occur, and one like it that did occur.
     words: BTreeMap<Word, (usize, Option<String>)>,
 }
 
-impl Unheard {
+impl MissingWords {
     pub(super) fn add(&mut self, played: &Played) {
         self.units += 1;
         for unheard in &played.unheard {

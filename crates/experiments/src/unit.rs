@@ -6,16 +6,16 @@ use std::iter::successors;
 use std::panic::AssertUnwindSafe;
 
 use config::Override;
-use observe::words::{Unheard, Words};
+use observe::words::{MissingWord, Words};
 use observe::{Measured, Observation, Probe};
 use protocol::{RobotName, RunName};
 use scenario::Scenario;
 use serde::{Deserialize, Serialize};
 
-use super::follow::{Ended, Follow};
+use super::follow::{EndedRun, Follow};
 use super::plan::{Plan, Robots, Unit};
 use super::processes::{self, Launcher};
-use super::script::Script;
+use super::script::EmotionScript;
 use lab::LabError;
 use lab::run::{Local, check_faults, make_robots, play};
 
@@ -34,7 +34,7 @@ pub struct Played {
     pub verdicts: BTreeMap<String, String>,
     /// Words of the measures and of the experiment's expectations that did not occur.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub unheard: Vec<Unheard>,
+    pub unheard: Vec<MissingWord>,
 }
 
 /// What is measured of a run.
@@ -165,7 +165,7 @@ impl Plan {
         };
 
         let other = self.scenario(cell, seed, Vec::new())?;
-        let mut script = Script::default();
+        let mut script = EmotionScript::default();
         self.follow(other, launcher, &mut script)?;
         let script: Vec<Override> = script.changes().map_err(LabError::refused)?;
         Ok(self.scenario(unit.cell, unit.seed, script)?)
@@ -205,7 +205,7 @@ impl Plan {
         scenario: Scenario,
         launcher: Launcher<'_>,
         follower: &mut impl Follow,
-    ) -> Result<Ended, LabError> {
+    ) -> Result<EndedRun, LabError> {
         match self.robots() {
             Robots::InProcess => follow_in_process(scenario, follower),
             Robots::Programs => processes::follow(scenario, None, launcher, follower),
@@ -231,7 +231,7 @@ fn add_variables(published: &mut BTreeMap<RobotName, BTreeSet<String>>, local: &
     }
 }
 
-fn follow_in_process(scenario: Scenario, follower: &mut impl Follow) -> Result<Ended, LabError> {
+fn follow_in_process(scenario: Scenario, follower: &mut impl Follow) -> Result<EndedRun, LabError> {
     let run = RunName::unknown();
     let mut summary = None;
     let simulation = play(scenario, &run, |simulation, record| {
@@ -250,7 +250,7 @@ fn follow_in_process(scenario: Scenario, follower: &mut impl Follow) -> Result<E
 
     let mut summary = summary.ok_or_else(|| LabError::failed("the run has not begun"))?;
     simulation.finish_summary(&mut summary);
-    Ended::of(&summary)
+    EndedRun::of(&summary)
 }
 
 impl Follow for Gauge<'_> {

@@ -13,46 +13,46 @@ use crate::draft::{Draft, unwritable};
 
 /// A value of a row: the text of its field; `None` is a null.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Value<'a>(Option<Cow<'a, str>>);
+pub struct FieldValue<'a>(Option<Cow<'a, str>>);
 
-impl From<u32> for Value<'_> {
+impl From<u32> for FieldValue<'_> {
     fn from(number: u32) -> Self {
         Self(Some(Cow::Owned(number.to_string())))
     }
 }
 
-impl From<u64> for Value<'_> {
+impl From<u64> for FieldValue<'_> {
     fn from(number: u64) -> Self {
         Self(Some(Cow::Owned(number.to_string())))
     }
 }
 
 /// With a point or an exponent, so that readers that infer types find a floating-point number.
-impl From<f64> for Value<'_> {
+impl From<f64> for FieldValue<'_> {
     fn from(number: f64) -> Self {
         Self(Some(Cow::Owned(format!("{number:?}"))))
     }
 }
 
-impl From<bool> for Value<'_> {
+impl From<bool> for FieldValue<'_> {
     fn from(flag: bool) -> Self {
         Self::from(if flag { "true" } else { "false" })
     }
 }
 
-impl<'a> From<&'a str> for Value<'a> {
+impl<'a> From<&'a str> for FieldValue<'a> {
     fn from(text: &'a str) -> Self {
         Self(Some(Cow::Borrowed(text)))
     }
 }
 
-impl From<String> for Value<'_> {
+impl From<String> for FieldValue<'_> {
     fn from(text: String) -> Self {
         Self(Some(Cow::Owned(text)))
     }
 }
 
-impl<'a, T: Into<Value<'a>>> From<Option<T>> for Value<'a> {
+impl<'a, T: Into<FieldValue<'a>>> From<Option<T>> for FieldValue<'a> {
     fn from(value: Option<T>) -> Self {
         value.map_or(Self(None), Into::into)
     }
@@ -60,12 +60,12 @@ impl<'a, T: Into<Value<'a>>> From<Option<T>> for Value<'a> {
 
 /// A table that is being written. [`Draft::publish`] gives the file its name.
 #[derive(Debug)]
-pub struct Table {
+pub struct CsvTable {
     columns: Vec<String>,
     draft: Draft,
 }
 
-impl Table {
+impl CsvTable {
     /// Begins a table with the names of its columns.
     ///
     /// # Errors
@@ -74,7 +74,7 @@ impl Table {
         let draft = Draft::create(path)?;
         let mut table = Self { columns, draft };
         let names = table.columns.clone();
-        table.write(names.into_iter().map(Value::from))?;
+        table.write(names.into_iter().map(FieldValue::from))?;
         Ok(table)
     }
 
@@ -84,9 +84,9 @@ impl Table {
     /// [`FileError`] if the file cannot be written.
     pub fn add<'a>(
         &mut self,
-        cells: impl IntoIterator<Item = (&'a str, Value<'a>)>,
+        cells: impl IntoIterator<Item = (&'a str, FieldValue<'a>)>,
     ) -> Result<(), FileError> {
-        let mut row = vec![Value(None); self.columns.len()];
+        let mut row = vec![FieldValue(None); self.columns.len()];
         for (name, value) in cells {
             let place = self.columns.iter().position(|column| column == name);
             let Some(place) = place else {
@@ -103,9 +103,12 @@ impl Table {
         self.draft
     }
 
-    fn write<'a>(&mut self, row: impl IntoIterator<Item = Value<'a>>) -> Result<(), FileError> {
+    fn write<'a>(
+        &mut self,
+        row: impl IntoIterator<Item = FieldValue<'a>>,
+    ) -> Result<(), FileError> {
         let mut line = String::new();
-        for (place, Value(text)) in row.into_iter().enumerate() {
+        for (place, FieldValue(text)) in row.into_iter().enumerate() {
             if place > 0 {
                 line.push(',');
             }
@@ -132,7 +135,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("table.csv");
         let columns = ["real", "text"].map(str::to_owned).to_vec();
-        let mut table = Table::create(&path, columns).unwrap();
+        let mut table = CsvTable::create(&path, columns).unwrap();
         for (number, text) in [
             (Some(0.1 + 0.2), Some("a \"b\",\r\nc")),
             (Some(7.0), Some("")),
@@ -141,7 +144,10 @@ mod tests {
             (Some(f64::MAX), Some("=1")),
             (None, Some("NA")),
         ] {
-            let cells = [("text", Value::from(text)), ("real", Value::from(number))];
+            let cells = [
+                ("text", FieldValue::from(text)),
+                ("real", FieldValue::from(number)),
+            ];
             table.add(cells).unwrap();
         }
         table.finish().publish().unwrap();
@@ -162,7 +168,7 @@ mod tests {
     fn a_table_that_is_not_finished_leaves_nothing() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("table.csv");
-        drop(Table::create(&path, vec!["number".to_owned()]).unwrap());
+        drop(CsvTable::create(&path, vec!["number".to_owned()]).unwrap());
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
     }
 }

@@ -22,7 +22,7 @@ use protocol::keys::Keys;
 use protocol::messages::{StateVariables, Variable};
 use protocol::{Event, RobotName, RunName, Tick};
 use record::{Entry, EpochFiles, Record};
-use timeline::{Kind, Span, Stay, Timeline};
+use timeline::{Span, StateKind, StateSpan, Timeline};
 
 use crate::ExportError;
 use terms::{escape, scale_value, token};
@@ -204,10 +204,10 @@ impl<W: Write> Document<'_, W> {
         };
         let is_wanted = self.only.is_none_or(|only| *only == stay.robot);
         let ticks = stay.period.ticks(tick);
-        if stay.kind != Kind::Emotion || !is_wanted || ticks == 0 {
+        if stay.kind != StateKind::Emotion || !is_wanted || ticks == 0 {
             return Ok(());
         }
-        let Stay {
+        let StateSpan {
             robot, name: state, ..
         } = stay;
         if NO_EMOTION.contains(&state.as_str()) {

@@ -13,7 +13,7 @@ use record::{Entry, Record};
 use recording::{PlacedRobot, RecordedTick, Recording, RecordingError, Ticks};
 use serde::Serialize;
 
-use crate::csv::{Table, Value};
+use crate::csv::{CsvTable, FieldValue};
 use crate::draft::{Draft, unwritable};
 
 /// Names of the tables.
@@ -32,7 +32,7 @@ const STATES: &str = "robot generation x_m y_m speed_mps direction_rad emotion b
 const VARIABLES: &str = "robot variable type value number";
 
 /// A cell of a row: the name of its column and the value.
-type Cell<'a> = (&'a str, Value<'a>);
+type Column<'a> = (&'a str, FieldValue<'a>);
 
 /// The tables of a run.
 #[derive(Debug, Default)]
@@ -126,8 +126,8 @@ impl Tables {
     /// Adds the robots of all ticks of an epoch, as far as its recording is undamaged.
     fn add_recording(
         &mut self,
-        states: &mut Table,
-        variables: &mut Table,
+        states: &mut CsvTable,
+        variables: &mut CsvTable,
         files: &EpochFiles,
     ) -> Result<(), FileError> {
         let epoch = files.epoch;
@@ -172,13 +172,13 @@ impl Tables {
     }
 }
 
-fn create(folder: &Path, file: &str, own: &str) -> Result<Table, FileError> {
+fn create(folder: &Path, file: &str, own: &str) -> Result<CsvTable, FileError> {
     let columns = WHEN.split_whitespace().chain(own.split_whitespace());
-    Table::create(&folder.join(file), columns.map(str::to_owned).collect())
+    CsvTable::create(&folder.join(file), columns.map(str::to_owned).collect())
 }
 
 /// The cells with which a row begins.
-fn when(epoch: Epoch, tick: Tick, tick_s: f64) -> [Cell<'static>; 3] {
+fn when(epoch: Epoch, tick: Tick, tick_s: f64) -> [Column<'static>; 3] {
     [
         ("epoch", epoch.into()),
         ("tick", tick.into()),
@@ -187,7 +187,7 @@ fn when(epoch: Epoch, tick: Tick, tick_s: f64) -> [Cell<'static>; 3] {
 }
 
 /// Adds the events of an epoch. Returns the last complete tick, or the end of the run.
-fn add_events(table: &mut Table, files: &EpochFiles) -> Result<Option<Entry>, FileError> {
+fn add_events(table: &mut CsvTable, files: &EpochFiles) -> Result<Option<Entry>, FileError> {
     let mut record = Record::of_events(&files.events)?;
     let mut next = record.next_entry()?;
     let tick_s = match next.as_ref().and_then(|entry| entry.events.first()) {
@@ -233,9 +233,9 @@ fn damage(error: RecordingError) -> Result<RecordingError, FileError> {
 
 /// Adds the robots of a tick.
 fn add_states(
-    states: &mut Table,
-    variables: &mut Table,
-    when: &[Cell<'static>; 3],
+    states: &mut CsvTable,
+    variables: &mut CsvTable,
+    when: &[Column<'static>; 3],
     tick: &RecordedTick,
 ) -> Result<(), FileError> {
     for robot in &tick.frame.robots {
@@ -251,7 +251,7 @@ fn add_states(
     Ok(())
 }
 
-fn state_cells<'a>(robot: &'a PlacedRobot, report: Option<&'a Report>) -> Vec<Cell<'a>> {
+fn state_cells<'a>(robot: &'a PlacedRobot, report: Option<&'a Report>) -> Vec<Column<'a>> {
     let mut cells = vec![
         ("robot", robot.name.as_str().into()),
         ("x_m", robot.location.x.into()),
@@ -275,7 +275,7 @@ fn state_cells<'a>(robot: &'a PlacedRobot, report: Option<&'a Report>) -> Vec<Ce
     cells
 }
 
-fn variable_cells<'a>(robot: &'a RobotName, name: &'a str, value: &'a Variable) -> [Cell<'a>; 5] {
+fn variable_cells<'a>(robot: &'a RobotName, name: &'a str, value: &'a Variable) -> [Column<'a>; 5] {
     let (kind, text, number) = match value {
         Variable::Flag(flag) => ("flag", flag.to_string().into(), Some(f64::from(*flag))),
         Variable::Number(number) => ("number", format!("{number:?}").into(), Some(*number)),
@@ -291,7 +291,7 @@ fn variable_cells<'a>(robot: &'a RobotName, name: &'a str, value: &'a Variable) 
 }
 
 /// The cells of an event. Its fields have the names of `events.jsonl` where these are clear in a table of all events.
-fn event_cells(event: &Event) -> Vec<Cell<'_>> {
+fn event_cells(event: &Event) -> Vec<Column<'_>> {
     match event {
         Event::Init {
             seed,
@@ -420,7 +420,7 @@ fn event_cells(event: &Event) -> Vec<Cell<'_>> {
     }
 }
 
-fn message_cells<'a>(from: &'a RobotName, to: &'a RobotName, seq: Option<Seq>) -> Vec<Cell<'a>> {
+fn message_cells<'a>(from: &'a RobotName, to: &'a RobotName, seq: Option<Seq>) -> Vec<Column<'a>> {
     vec![
         ("from_robot", from.as_str().into()),
         ("to_robot", to.as_str().into()),
@@ -446,7 +446,7 @@ fn blocking_robot(by: &Blocker) -> Option<&str> {
 }
 
 /// The name of one of several kinds, as in `events.jsonl`.
-fn json_name(kind: &impl Serialize) -> Value<'static> {
+fn json_name(kind: &impl Serialize) -> FieldValue<'static> {
     match serde_json::to_value(kind) {
         Ok(serde_json::Value::String(name)) => name.into(),
         _ => unreachable!("a kind is written as its name"),

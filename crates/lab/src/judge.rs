@@ -6,7 +6,7 @@ use observe::{Expectation, Monitors, Observation};
 use protocol::messages::End;
 use protocol::{Event, Tick};
 use record::EpochFiles;
-use record::summary::Judged;
+use record::summary::ExpectationVerdict;
 use record::{Entry, Record};
 use recording::{Recording, Ticks};
 use scenario::Scenario;
@@ -19,7 +19,7 @@ use crate::states::LastStates;
 #[derive(Debug, Default)]
 pub struct Verdicts {
     /// The verdicts by the names of the expectations.
-    pub expectations: BTreeMap<String, Judged>,
+    pub expectations: BTreeMap<String, ExpectationVerdict>,
     /// The last tick that was judged.
     pub tick: Tick,
     /// Whether the record has the end of the run. What was open without one is undecided.
@@ -36,7 +36,7 @@ pub fn judge(
     expectations: &[Expectation],
 ) -> Result<Verdicts, LabError> {
     let mut record = Record::of_events(&files.events)?;
-    let mut recorded = LastReports::open(files, expectations)?;
+    let mut recorded = ReportsByTick::open(files, expectations)?;
     let roster = scenario.roster();
     let mut watches = Monitors::new(expectations, scenario.tick_s, scenario.body_m, &roster);
     let mut verdicts = Verdicts::default();
@@ -64,7 +64,7 @@ pub fn judge(
 fn observe(
     watches: &mut Monitors,
     entry: &Entry,
-    recorded: Option<&LastReports>,
+    recorded: Option<&ReportsByTick>,
     tick_s: f64,
 ) -> Vec<Event> {
     watches.observe(&Observation {
@@ -84,7 +84,7 @@ impl Verdicts {
                 because,
             } = event
             {
-                let judged = Judged {
+                let judged = ExpectationVerdict {
                     verdict: *verdict,
                     tick: self.tick,
                     because: because.clone(),
@@ -96,12 +96,12 @@ impl Verdicts {
 }
 
 /// What robots reported last, tick by tick, from a recording.
-struct LastReports {
+struct ReportsByTick {
     ticks: Ticks,
     last: LastStates,
 }
 
-impl LastReports {
+impl ReportsByTick {
     /// Opens the recording, if the expectations need it.
     fn open(files: &EpochFiles, expectations: &[Expectation]) -> Result<Option<Self>, LabError> {
         let mut needing = expectations.iter().filter(|one| one.needs_states());

@@ -7,8 +7,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use lockstep::{Bulletin, Exchange, Outcome};
-use protocol::messages::{CommandText, FaultKind, News, Report};
+use lockstep::{Bulletin, Exchange, TickOutcome};
+use protocol::messages::{CommandText, FaultKind, Report, TickUpdate};
 use protocol::{Epoch, Event, RobotName, RunName, Tick};
 use record::Entry;
 use record::difference::{Difference, between};
@@ -319,14 +319,14 @@ struct Repeated<'a> {
     reports: &'a mut BTreeMap<RobotName, Report>,
 }
 
-impl Exchange<News, Arc<Report>, CommandText> for Repeated<'_> {
+impl Exchange<TickUpdate, Arc<Report>, CommandText> for Repeated<'_> {
     type Error = RobotError;
 
     fn exchange(
         &mut self,
         tick: Tick,
-        news: &dyn Bulletin<News>,
-    ) -> Result<Outcome<Arc<Report>, CommandText>, RobotError> {
+        news: &dyn Bulletin<TickUpdate>,
+    ) -> Result<TickOutcome<Arc<Report>, CommandText>, RobotError> {
         let mut outcome = self.robots.exchange(tick, news)?;
         for (name, report) in self.recorded.reports.iter().flatten() {
             if self.scripted.contains(name) {

@@ -14,7 +14,7 @@ const SPEED_WINDOW: Duration = Duration::from_secs(2);
 
 /// Progress of a run.
 #[derive(Debug, Clone)]
-pub(super) struct Progress {
+pub(super) struct RunProgress {
     /// Simulated time, s.
     time_s: f64,
     /// Simulated duration of the run, s.
@@ -28,7 +28,7 @@ pub(super) struct Progress {
     at: Instant,
 }
 
-impl From<WorldFrame> for Progress {
+impl From<WorldFrame> for RunProgress {
     fn from(frame: WorldFrame) -> Self {
         Self {
             time_s: frame.time_s,
@@ -41,7 +41,7 @@ impl From<WorldFrame> for Progress {
     }
 }
 
-impl From<Status> for Progress {
+impl From<Status> for RunProgress {
     fn from(status: Status) -> Self {
         Self {
             time_s: status.time_s,
@@ -57,7 +57,7 @@ impl From<Status> for Progress {
 /// The bar on the terminal.
 pub(super) struct Bar {
     bar: ProgressBar,
-    progress: Option<Progress>,
+    progress: Option<RunProgress>,
     speed: Speedometer,
     has_colors: bool,
 }
@@ -94,7 +94,7 @@ impl Bar {
     }
 
     /// Redraws the bar; without a newer progress, only the time for which the clock has been held changes.
-    pub(super) fn update(&mut self, newer: Option<Progress>) {
+    pub(super) fn update(&mut self, newer: Option<RunProgress>) {
         let was_held = self.is_held();
         if let Some(newer) = newer {
             self.speed.add(&newer);
@@ -128,7 +128,7 @@ impl Bar {
     }
 }
 
-fn message(progress: &Progress, factor: Option<f64>, now: Instant, has_colors: bool) -> String {
+fn message(progress: &RunProgress, factor: Option<f64>, now: Instant, has_colors: bool) -> String {
     let phase = progress.phase;
     let time = describe_time(progress);
     match held(&progress.awaiting, now.duration_since(progress.at)) {
@@ -143,8 +143,8 @@ fn message(progress: &Progress, factor: Option<f64>, now: Instant, has_colors: b
     }
 }
 
-fn describe_time(progress: &Progress) -> String {
-    let Progress {
+fn describe_time(progress: &RunProgress) -> String {
+    let RunProgress {
         time_s,
         duration_s,
         tick_s,
@@ -192,7 +192,7 @@ struct Speedometer {
 }
 
 impl Speedometer {
-    fn add(&mut self, progress: &Progress) {
+    fn add(&mut self, progress: &RunProgress) {
         let time_s = progress.time_s;
         let last = self.samples.back();
         let is_new_epoch = last.is_some_and(|(_, before_s)| time_s < *before_s);
@@ -225,8 +225,8 @@ mod tests {
 
     use super::*;
 
-    fn progress(awaiting: Vec<Awaited>) -> Progress {
-        Progress {
+    fn progress(awaiting: Vec<Awaited>) -> RunProgress {
+        RunProgress {
             time_s: 123.5,
             duration_s: 600.0,
             tick_s: 0.5,
@@ -264,7 +264,7 @@ mod tests {
         let begin = Instant::now();
         for tenth in 0..100_u32 {
             let factor = if tenth < 50 { 1.0 } else { 20.0 };
-            speed.add(&Progress {
+            speed.add(&RunProgress {
                 at: begin + Duration::from_millis(100) * tenth,
                 time_s: f64::from(tenth) * 0.1 * factor,
                 ..progress(Vec::new())
@@ -272,7 +272,7 @@ mod tests {
         }
         assert!((speed.factor().unwrap() - 20.0).abs() < 1e-6);
 
-        speed.add(&Progress {
+        speed.add(&RunProgress {
             time_s: 0.0,
             ..progress(Vec::new())
         });

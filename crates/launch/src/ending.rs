@@ -12,14 +12,14 @@ const SIGNALS: u8 = 128;
 
 /// How a process ended.
 #[derive(Debug)]
-pub(crate) enum Ended {
+pub(crate) enum ProcessEnd {
     /// It has exited.
     Exited(ExitStatus),
     /// It could not be started, for this reason.
     NotStarted(String),
 }
 
-impl Ended {
+impl ProcessEnd {
     /// Whether it did not exit with status 0.
     pub(super) fn has_failed(&self) -> bool {
         !matches!(self, Self::Exited(status) if status.success())
@@ -40,7 +40,7 @@ impl Ended {
     }
 }
 
-impl std::fmt::Display for Ended {
+impl std::fmt::Display for ProcessEnd {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let status = match self {
             Self::NotStarted(reason) => return write!(f, "did not start ({reason})"),

@@ -19,7 +19,7 @@ use crate::ending::code_of;
 use crate::error::LaunchError;
 use line::EndReason;
 use program::{ASKING, END_PATIENCE, Program, start_thread};
-use proxy::Proxy;
+use proxy::ProgramRobot;
 use remarks::Remarks;
 
 /// How long to wait for a signal that has killed the program: a signal to the process group reaches this process, too.
@@ -27,7 +27,7 @@ const SAME_SIGNAL: Duration = Duration::from_secs(1);
 
 /// How the run of a program as a robot ended.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Ended {
+pub enum ProgramEnd {
     /// The run is over.
     WithRun,
     /// A signal has ended this process; the exit status that reports it.
@@ -48,7 +48,7 @@ pub fn exec(
     options: HostOptions,
     command: &[OsString],
     silence: &str,
-) -> Result<Ended, LaunchError> {
+) -> Result<ProgramEnd, LaunchError> {
     // All later threads inherit the mask, so only the thread in `listen` receives these signals. So does the program, until
     // `cars child` empties it.
     let asking: SigSet = ASKING.into_iter().collect();
@@ -61,7 +61,7 @@ pub fn exec(
     // From here on a signal ends the program as well. Until then it waits: it is blocked.
     let asked = listen(asking, &program, stopper.clone())?;
     let remarks = Remarks::default();
-    let proxy = Box::new(Proxy::new(
+    let proxy = Box::new(ProgramRobot::new(
         program.clone(),
         events,
         format!("{name}: {silence}"),
@@ -85,7 +85,7 @@ pub fn exec(
     }
     if let Ok(signal) = asked.recv_timeout(patience) {
         let _is_expected = program.end(EndReason::Interrupted);
-        return Ok(Ended::BySignal(code_of(signal)));
+        return Ok(ProgramEnd::BySignal(code_of(signal)));
     }
 
     match outcome {
@@ -94,7 +94,7 @@ pub fn exec(
             if let Some(remark) = program.end(end.into()) {
                 terminal::note(format_args!("{name}: {remark}"));
             }
-            Ok(Ended::WithRun)
+            Ok(ProgramEnd::WithRun)
         }
         Err(error) => {
             let reason = match error {
@@ -105,7 +105,7 @@ pub fn exec(
                 error => error.to_string(),
             };
             let _is_secondary = program.end(EndReason::Failed);
-            Ok(Ended::Failed(reason))
+            Ok(ProgramEnd::Failed(reason))
         }
     }
 }

@@ -21,13 +21,13 @@ use super::file::{self, LaunchFile};
 use super::launched::Launched;
 use super::leftovers::Leftovers;
 use super::link::ProcessLink;
-use super::observe::{Observer, Watch};
+use super::observe::{Observer, ObserverTask};
 use super::options::RunOptions;
 use super::plan::{self, Execution, Part, Planned};
 use super::screen::{Screen, ScreenOptions};
 use super::secure::Secured;
 use super::signals;
-use super::supervise::{Outcome, Supervisor};
+use super::supervise::{LaunchOutcome, Supervisor};
 
 /// Number of ports to try: another process may bind a free port before the simulator does.
 const PORTS: usize = 3;
@@ -364,7 +364,7 @@ impl Launch {
     pub fn play(
         &mut self,
         mut notice: impl FnMut(&str),
-    ) -> Result<(Outcome, RunFolder), LaunchError> {
+    ) -> Result<(LaunchOutcome, RunFolder), LaunchError> {
         // A free port may be taken before the simulator binds it, if only by a connection that has ended since.
         let is_chosen = self.options.connect_port.is_some_and(|port| port != 0);
         let may_choose = self.options.listen.is_none() && !is_chosen;
@@ -417,7 +417,7 @@ impl Launch {
         mut planned: Vec<Planned>,
         endpoint: &str,
         folder: &RunFolder,
-    ) -> Result<Outcome, LaunchError> {
+    ) -> Result<LaunchOutcome, LaunchError> {
         let leftovers = Leftovers::guarded();
         for process in planned.iter_mut().filter(|process| !process.is_extern) {
             if process.part == Part::Robots {
@@ -447,7 +447,7 @@ impl Launch {
             leftovers,
             gone_sender,
         );
-        let watch = Watch {
+        let watch = ObserverTask {
             run: self.run.clone(),
             endpoint: connectable(endpoint),
             config: self.observer_config(),
@@ -472,7 +472,7 @@ impl Launch {
 }
 
 /// Whether the run failed because the simulator could not listen where another process does.
-fn is_port_taken(outcome: &Outcome) -> bool {
+fn is_port_taken(outcome: &LaunchOutcome) -> bool {
     let failure = outcome.failure.as_ref();
     failure.is_some_and(Failure::is_port_taken)
 }

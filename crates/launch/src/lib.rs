@@ -41,4 +41,4 @@ pub use plan::{CommandLine, Part, Planned};
 pub use program::{SIBLINGS, find_sibling};
 pub use restart::Restart;
 pub use secure::Certificates;
-pub use supervise::Outcome;
+pub use supervise::LaunchOutcome;

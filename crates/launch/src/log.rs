@@ -11,10 +11,10 @@ pub(super) const LIMIT_BYTES: u64 = 64 << 20;
 
 /// The log of a process, which its pipes and its restarts share.
 #[derive(Debug, Clone)]
-pub(super) struct ProcessLog(Arc<Mutex<LogFile>>);
+pub(super) struct ProcessLog(Arc<Mutex<OpenLog>>);
 
 #[derive(Debug)]
-struct LogFile {
+struct OpenLog {
     path: PathBuf,
     /// Whether only the owner may read it.
     is_private: bool,
@@ -32,7 +32,7 @@ struct LogFile {
 impl ProcessLog {
     /// The log at `path`. The file is not touched before [`Self::open`].
     pub(super) fn new(path: PathBuf, is_private: bool, limit_bytes: u64) -> Self {
-        Self(Arc::new(Mutex::new(LogFile {
+        Self(Arc::new(Mutex::new(OpenLog {
             path,
             is_private,
             limit_bytes,
@@ -49,7 +49,7 @@ impl ProcessLog {
     /// # Errors
     /// If it cannot be opened.
     pub(super) fn open(&self) -> std::io::Result<()> {
-        self.locked(LogFile::open)
+        self.locked(OpenLog::open)
     }
 
     /// Appends bytes.
@@ -60,12 +60,12 @@ impl ProcessLog {
         self.locked(|log| log.append(bytes))
     }
 
-    fn locked<T>(&self, work: impl FnOnce(&mut LogFile) -> T) -> T {
+    fn locked<T>(&self, work: impl FnOnce(&mut OpenLog) -> T) -> T {
         work(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
-impl LogFile {
+impl OpenLog {
     fn open(&mut self) -> std::io::Result<()> {
         if self.file.is_some() {
             return Ok(());

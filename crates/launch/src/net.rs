@@ -10,7 +10,7 @@ mod play;
 mod proxy;
 mod shape;
 
-pub use plan::Plan;
+pub use plan::FaultPlan;
 pub use play::{Play, Via, play};
 pub use proxy::{AddressError, Proxy, address};
 pub use shape::{Flow, LinkOrder, OrderError, Shape};

@@ -12,7 +12,7 @@ use protocol::messages::{Control, ControlAnswer, FaultOrder, LogRecord, Phase, W
 use protocol::{RobotName, RunName, decode, encode};
 use tokio::sync::mpsc::UnboundedSender;
 
-use super::bar::Progress;
+use super::bar::RunProgress;
 use super::screen::ScreenHandle;
 use super::supervise::{FaultsDone, Gone, SupervisorEvent};
 
@@ -24,7 +24,7 @@ const REPORT_AGAIN: Duration = Duration::from_millis(200);
 const GATHERING: Duration = Duration::from_secs(1);
 
 /// What to observe, and where to report it.
-pub(super) struct Watch {
+pub(super) struct ObserverTask {
     pub(super) run: RunName,
     pub(super) endpoint: String,
     /// The operator's configuration file for a secured run.
@@ -63,7 +63,7 @@ impl Observer {
     ///
     /// # Errors
     /// If the system starts no further thread.
-    pub(super) fn start(watch: Watch) -> std::io::Result<Self> {
+    pub(super) fn start(watch: ObserverTask) -> std::io::Result<Self> {
         let (end, ended) = std::sync::mpsc::channel();
         let state = Arc::new(Mutex::new(ObserverPhase::Connecting));
         let observer = Self {
@@ -94,7 +94,7 @@ fn advance(state: &Mutex<ObserverPhase>, next: ObserverPhase) -> ObserverPhase {
     before
 }
 
-impl Watch {
+impl ObserverTask {
     /// Observes until the launch is over.
     fn observe(self, state: &Mutex<ObserverPhase>, end: &Sender<()>) {
         while advance(state, ObserverPhase::Connecting) != ObserverPhase::Over {
@@ -174,7 +174,7 @@ impl Watch {
         let screen = self.screen.clone();
         bus.subscribe(&keys.world(), move |key, bytes| {
             match decode::<WorldFrame>(key, "the simulator", bytes) {
-                Ok(frame) => screen.progress(Progress::from(frame)),
+                Ok(frame) => screen.progress(RunProgress::from(frame)),
                 Err(error) => tracing::warn!("{error}"),
             }
         })
@@ -203,7 +203,7 @@ impl Watch {
         };
 
         let phase = status.phase;
-        self.screen.progress(Progress::from(*status));
+        self.screen.progress(RunProgress::from(*status));
 
         Ok(Some(phase))
     }

@@ -41,7 +41,7 @@ impl Drop for KillGroup {
 
 /// Where the output of a process goes.
 #[derive(Debug, Clone)]
-pub(super) struct Output {
+pub(super) struct OutputSink {
     pub(super) screen: ScreenHandle,
     /// Index of the process.
     pub(super) index: usize,
@@ -109,7 +109,7 @@ pub(super) async fn watch_stops(group: Group, name: String, screen: ScreenHandle
 
 impl Started {
     /// Waits for the exit of the process and the end of its output.
-    pub(super) async fn run(mut self, output: Output) -> std::io::Result<ExitStatus> {
+    pub(super) async fn run(mut self, output: OutputSink) -> std::io::Result<ExitStatus> {
         output.log.open()?;
         let mut copies = Vec::new();
         if let Some(pipe) = self.child.stdout().take() {
@@ -133,7 +133,7 @@ impl Started {
 }
 
 /// Copies a pipe: bytes to the log, lines to the terminal.
-async fn copy(mut pipe: impl AsyncRead + Unpin, output: Output, is_error: bool) {
+async fn copy(mut pipe: impl AsyncRead + Unpin, output: OutputSink, is_error: bool) {
     let mut buffer = vec![0; 16 * 1024];
     let mut lines = Lines::default();
     while let Ok(read @ 1..) = pipe.read(&mut buffer).await {
@@ -145,7 +145,7 @@ async fn copy(mut pipe: impl AsyncRead + Unpin, output: Output, is_error: bool) 
     lines.finish(|line| show(&output, line, is_error));
 }
 
-fn show(output: &Output, line: String, is_error: bool) {
+fn show(output: &OutputSink, line: String, is_error: bool) {
     if is_error {
         output.tail.push(line.clone());
     }

@@ -38,12 +38,12 @@ const MAX_BACKOFF: Duration = Duration::from_secs(30);
 
 /// The restarts that a process has left, and the wait before the next one.
 #[derive(Debug)]
-pub(super) struct Budget {
+pub(super) struct RestartBudget {
     backoff: Duration,
     recent: VecDeque<Instant>,
 }
 
-impl Budget {
+impl RestartBudget {
     /// A full budget; `backoff` is the first wait.
     pub(super) fn new(backoff: Duration) -> Self {
         Self {
@@ -80,7 +80,7 @@ impl Budget {
 mod tests {
     use super::*;
 
-    fn waits_s(budget: &mut Budget, now: Instant) -> Vec<u64> {
+    fn waits_s(budget: &mut RestartBudget, now: Instant) -> Vec<u64> {
         std::iter::from_fn(|| budget.spend(now))
             .map(|(wait, _)| wait.as_secs())
             .collect()
@@ -89,16 +89,16 @@ mod tests {
     #[test]
     fn the_wait_doubles_until_the_budget_is_exhausted() {
         let now = Instant::now();
-        let mut short = Budget::new(Duration::from_secs(1));
+        let mut short = RestartBudget::new(Duration::from_secs(1));
         assert_eq!(waits_s(&mut short, now), [1, 2, 4, 8, 16]);
 
-        let mut long = Budget::new(Duration::from_secs(10));
+        let mut long = RestartBudget::new(Duration::from_secs(10));
         assert_eq!(waits_s(&mut long, now), [10, 20, 30, 30, 30]);
     }
 
     #[test]
     fn the_budget_is_full_again_after_a_window_without_failures() {
-        let mut budget = Budget::new(Duration::from_secs(1));
+        let mut budget = RestartBudget::new(Duration::from_secs(1));
         let now = Instant::now();
         assert_eq!(waits_s(&mut budget, now).len(), BUDGET);
 

@@ -12,7 +12,7 @@ use protocol::event::log_line;
 use protocol::messages::{LogKind, LogRecord};
 use protocol::plain::{escape_line, escape_text};
 
-use super::bar::{Bar, Progress};
+use super::bar::{Bar, RunProgress};
 
 /// Most lines in the queue; further ones are counted and not shown. The run's folder contains all lines.
 const MAX_WAITING: usize = 10_000;
@@ -28,7 +28,7 @@ enum Show {
     Log(LogRecord),
     Output { index: usize, line: String },
     Notice(String),
-    Progress(Progress),
+    Progress(RunProgress),
     Finish,
 }
 
@@ -91,7 +91,7 @@ impl ScreenHandle {
     }
 
     /// Progress of the run.
-    pub(super) fn progress(&self, progress: Progress) {
+    pub(super) fn progress(&self, progress: RunProgress) {
         self.try_queue(Show::Progress(progress));
     }
 

@@ -12,13 +12,13 @@ use protocol::messages::{FaultKind, ProcessOrder};
 use terminal::RESUME;
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender};
 
-use super::ending::Ended;
+use super::ending::ProcessEnd;
 use super::failure::Failure;
 use super::leftovers::Leftovers;
 use super::log::{LIMIT_BYTES, ProcessLog};
 use super::plan::{Part, Planned, quote};
-use super::process::{self, Group, Output};
-use super::restart::{BUDGET, Budget};
+use super::process::{self, Group, OutputSink};
+use super::restart::{BUDGET, RestartBudget};
 use super::screen::ScreenHandle;
 use super::tail::Tail;
 
@@ -32,7 +32,7 @@ const UNSEEN: Duration = Duration::from_secs(1);
 #[derive(Debug)]
 pub(super) enum SupervisorEvent {
     /// A process has exited and its output has been read.
-    Ended(usize, Ended),
+    Ended(usize, ProcessEnd),
     /// The wait before a restart is over.
     RestartDue(usize),
     /// The scenario orders faults of processes; the sender waits until they are carried out.
@@ -83,7 +83,7 @@ pub(super) enum Shutdown {
 
 /// How a launch ended.
 #[derive(Debug)]
-pub struct Outcome {
+pub struct LaunchOutcome {
     /// The first failure that ended the run.
     pub failure: Option<Failure>,
     /// The first signal to end.
@@ -95,7 +95,7 @@ pub struct Outcome {
 /// A process under supervision.
 struct Supervised {
     planned: Planned,
-    budget: Budget,
+    budget: RestartBudget,
     /// Its process group while it runs.
     group: Option<Group>,
     log: ProcessLog,
@@ -113,7 +113,7 @@ impl Supervised {
         let log = log_of(logs, &planned.name);
 
         Self {
-            budget: Budget::new(planned.backoff),
+            budget: RestartBudget::new(planned.backoff),
             planned,
             group: None,
             log: ProcessLog::new(log, is_private, LIMIT_BYTES),
@@ -146,7 +146,7 @@ pub(super) struct Supervisor {
     queue: UnboundedSender<SupervisorEvent>,
     events: UnboundedReceiver<SupervisorEvent>,
     stage: Shutdown,
-    outcome: Outcome,
+    outcome: LaunchOutcome,
 }
 
 impl Supervisor {
@@ -175,7 +175,7 @@ impl Supervisor {
             queue,
             events,
             stage: Shutdown::Running,
-            outcome: Outcome {
+            outcome: LaunchOutcome {
                 failure: None,
                 asked: None,
                 is_to_resume: false,
@@ -189,7 +189,7 @@ impl Supervisor {
     }
 
     /// Runs all processes until they have exited.
-    pub(super) async fn run(mut self) -> Outcome {
+    pub(super) async fn run(mut self) -> LaunchOutcome {
         for index in 0..self.processes.len() {
             if self.processes[index].planned.is_extern {
                 self.announce_extern(index);
@@ -252,7 +252,7 @@ impl Supervisor {
 
     /// Whether the console stays to show why the run has failed: no process takes it along, unless a person ends the run.
     fn is_explaining(&self) -> bool {
-        let Outcome { failure, asked, .. } = &self.outcome;
+        let LaunchOutcome { failure, asked, .. } = &self.outcome;
         let is_final = failure
             .as_ref()
             .is_some_and(|failure| !failure.is_port_taken());
@@ -305,7 +305,7 @@ impl Supervisor {
             Ok(started) => started,
             Err(error) => {
                 let program = supervised.planned.command.program.display();
-                let ended = Ended::NotStarted(format!("{program} cannot be started: {error}"));
+                let ended = ProcessEnd::NotStarted(format!("{program} cannot be started: {error}"));
                 return report(&queue, SupervisorEvent::Ended(index, ended));
             }
         };
@@ -323,7 +323,7 @@ impl Supervisor {
             tokio::spawn(process::watch_stops(started.group, name, screen));
         }
 
-        let output = Output {
+        let output = OutputSink {
             screen: self.screen.clone(),
             index,
             log: supervised.log.clone(),
@@ -331,14 +331,14 @@ impl Supervisor {
         };
         tokio::spawn(async move {
             let ended = match started.run(output).await {
-                Ok(status) => Ended::Exited(status),
-                Err(error) => Ended::NotStarted(format!("it cannot be supervised: {error}")),
+                Ok(status) => ProcessEnd::Exited(status),
+                Err(error) => ProcessEnd::NotStarted(format!("it cannot be supervised: {error}")),
             };
             report(&queue, SupervisorEvent::Ended(index, ended));
         });
     }
 
-    fn on_ended(&mut self, index: usize, ended: &Ended) {
+    fn on_ended(&mut self, index: usize, ended: &ProcessEnd) {
         // In every case: the number of the group may be given to another one, which must not get its
         // signals.
         self.forget_group(index);
@@ -392,7 +392,7 @@ impl Supervisor {
     }
 
     /// Ends the run after its simulator. A failure after SIGTERM is part of the end that was asked for.
-    fn on_simulator_ended(&mut self, index: usize, ended: &Ended) {
+    fn on_simulator_ended(&mut self, index: usize, ended: &ProcessEnd) {
         let has_failed = ended.has_failed();
         if has_failed && self.stage == Shutdown::Running {
             // Its robots would wait for ever: all others are ended as well.
@@ -419,7 +419,7 @@ impl Supervisor {
     }
 
     /// Handles the exit of a process other than the simulator during the run.
-    fn on_other_ended(&mut self, index: usize, ended: &Ended) {
+    fn on_other_ended(&mut self, index: usize, ended: &ProcessEnd) {
         let restart = self.processes[index].planned.restart;
         // As long as there are restarts left, even a process that is required may fail.
         if restart.applies(ended.has_failed()) && self.restart_later(index, ended) {
@@ -437,7 +437,7 @@ impl Supervisor {
 
     /// Handles the exit of a process that no other one follows. Robots also exit when the run is over, often before the
     /// simulator does, which knows.
-    fn on_gone(&self, index: usize, ended: &Ended) {
+    fn on_gone(&self, index: usize, ended: &ProcessEnd) {
         let Planned {
             part, robots, name, ..
         } = &self.processes[index].planned;
@@ -459,7 +459,7 @@ impl Supervisor {
     }
 
     /// How a process has ended for good, as the predicate of a sentence.
-    fn because(&self, index: usize, ended: &Ended) -> String {
+    fn because(&self, index: usize, ended: &ProcessEnd) -> String {
         let ended: String = ended.to_string().chars().take(MAX_REASON).collect();
         if self.processes[index].budget.is_exhausted() {
             format!("{ended}, and has been restarted {BUDGET} times already")
@@ -469,7 +469,7 @@ impl Supervisor {
     }
 
     /// Schedules a restart; returns whether the process has one left.
-    fn restart_later(&mut self, index: usize, ended: &Ended) -> bool {
+    fn restart_later(&mut self, index: usize, ended: &ProcessEnd) -> bool {
         let spent = self.processes[index].budget.spend(Instant::now());
         let name = self.name(index);
         let Some((wait, number)) = spent else {
@@ -544,7 +544,7 @@ impl Supervisor {
     }
 
     /// Reports a failure and keeps it as the outcome if it is the first one.
-    fn fail(&mut self, index: usize, ended: &Ended) {
+    fn fail(&mut self, index: usize, ended: &ProcessEnd) {
         let name = self.name(index);
         self.notice(format!("{name} {ended}: ending the run"));
 

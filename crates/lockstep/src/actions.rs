@@ -33,7 +33,7 @@ pub enum RobotTimer {
 
 /// What a participant wants done.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub enum Action<N, S, C, R> {
+pub enum ParticipantOutput<N, S, C, R> {
     /// Ask the simulator to be admitted; answer by `Participant::admitted`, `Participant::refused` or
     /// `Participant::unanswered`.
     Join,
@@ -42,7 +42,7 @@ pub enum Action<N, S, C, R> {
     /// Run the robot for a tick; answer by `Participant::done`.
     Run(Turn<N>),
     /// Put what came of a tick, in this order: the commands, the state, the report.
-    Put(Box<Answer<S, C, R>>),
+    Put(Box<TickAnswer<S, C, R>>),
     /// Query the state of another robot as of this tick, and subscribe to it; answer by `Participant::heard`.
     Query {
         /// The other robot.
@@ -95,7 +95,7 @@ pub enum Begin {
 
 /// What came of a tick.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub struct Answer<S, C, R> {
+pub struct TickAnswer<S, C, R> {
     /// The epoch.
     pub epoch: Epoch,
     /// The tick.
@@ -110,7 +110,7 @@ pub struct Answer<S, C, R> {
     pub report: R,
 }
 
-impl<S, C, R> Answer<S, C, R> {
+impl<S, C, R> TickAnswer<S, C, R> {
     /// Epoch and tick, in the order of time.
     pub(crate) fn at(&self) -> (Epoch, Tick) {
         (self.epoch, self.tick)

@@ -9,9 +9,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use protocol::messages::{Clock, End, FaultKind, NEWS_FLAGS, OnLate, Presence, Reason};
 use protocol::{Epoch, Generation, RobotName, Tick};
 
-use crate::exchange::{IncarnationNotice, Membership, Outcome, Sent};
-use crate::member::{Admission, Attendance, Lateness, Member, Received};
-use crate::outputs::{Ignored, Output, Refused, Stamp, Timer, Timing};
+use crate::exchange::{IncarnationNotice, Membership, Sent, TickOutcome};
+use crate::member::{Admission, Attendance, LatePolicy, Member, Received};
+use crate::outputs::{BarrierOutput, Ignored, Refused, Stamp, Timer, Timing};
 
 /// What the barrier is doing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -32,7 +32,7 @@ enum BarrierPhase {
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Barrier<R, C> {
     members: BTreeMap<RobotName, Member<R, C>>,
-    lateness: Lateness,
+    lateness: LatePolicy,
     timing: Timing,
     max_commands: u32,
     phase: BarrierPhase,
@@ -51,7 +51,7 @@ impl<R, C> Barrier<R, C> {
     #[must_use]
     pub fn new(
         roster: impl IntoIterator<Item = RobotName>,
-        lateness: Lateness,
+        lateness: LatePolicy,
         timing: Timing,
         max_commands: u32,
     ) -> Self {
@@ -76,8 +76,13 @@ impl<R, C> Barrier<R, C> {
     }
 
     /// Begins an epoch: waits until every robot of the roster is connected, then asks for tick 0 by
-    /// [`Output::Gathered`]. An open tick is given up.
-    pub fn gather(&mut self, epoch: Epoch, lateness: Lateness, out: &mut Vec<Output<R, C>>) {
+    /// [`BarrierOutput::Gathered`]. An open tick is given up.
+    pub fn gather(
+        &mut self,
+        epoch: Epoch,
+        lateness: LatePolicy,
+        out: &mut Vec<BarrierOutput<R, C>>,
+    ) {
         self.phase = BarrierPhase::Gathering;
         self.epoch = epoch;
         self.tick = 0;
@@ -91,7 +96,10 @@ impl<R, C> Barrier<R, C> {
 
         // Names and tokens outlive an epoch. Where all robots are connected already, no further token
         // comes, so the barrier looks for itself.
-        out.push(Output::SetTimer(Timer::Announce, self.timing.announce));
+        out.push(BarrierOutput::SetTimer(
+            Timer::Announce,
+            self.timing.announce,
+        ));
         self.check_all_joined(out);
     }
 
@@ -110,7 +118,12 @@ impl<R, C> Barrier<R, C> {
     }
 
     /// Grants a tick. `news` are the robots for which the simulation has something new.
-    pub fn open(&mut self, tick: Tick, news: BTreeSet<RobotName>, out: &mut Vec<Output<R, C>>) {
+    pub fn open(
+        &mut self,
+        tick: Tick,
+        news: BTreeSet<RobotName>,
+        out: &mut Vec<BarrierOutput<R, C>>,
+    ) {
         assert!(
             matches!(self.phase, BarrierPhase::Gathered | BarrierPhase::Between),
             "a tick is granted when the one before is complete"
@@ -157,7 +170,7 @@ impl<R, C> Barrier<R, C> {
         &mut self,
         name: &RobotName,
         instance: &str,
-        out: &mut Vec<Output<R, C>>,
+        out: &mut Vec<BarrierOutput<R, C>>,
     ) -> Result<Admission, Refused> {
         if self.phase == BarrierPhase::Over {
             return Err(Refused::Ended);
@@ -174,7 +187,7 @@ impl<R, C> Barrier<R, C> {
         // waits.
         if member.admit(instance) {
             let timer = Timer::Token(name.clone());
-            out.push(Output::SetTimer(timer, self.timing.token));
+            out.push(BarrierOutput::SetTimer(timer, self.timing.token));
         }
 
         // The flag is that of the place in the roster, which is the same for every incarnation.
@@ -186,10 +199,15 @@ impl<R, C> Barrier<R, C> {
     }
 
     /// A robot's liveliness token was declared or undeclared.
-    pub fn token(&mut self, name: &RobotName, is_present: bool, out: &mut Vec<Output<R, C>>) {
+    pub fn token(
+        &mut self,
+        name: &RobotName,
+        is_present: bool,
+        out: &mut Vec<BarrierOutput<R, C>>,
+    ) {
         let is_open = self.phase == BarrierPhase::Open;
         let Some(member) = self.members.get_mut(name) else {
-            out.push(Output::Ignored(Ignored::UnknownRobot, name.clone()));
+            out.push(BarrierOutput::Ignored(Ignored::UnknownRobot, name.clone()));
             return;
         };
 
@@ -221,7 +239,7 @@ impl<R, C> Barrier<R, C> {
         }
         // People were told for whom the clock waits, and that may have changed.
         if self.is_announced {
-            out.push(Output::Held);
+            out.push(BarrierOutput::Held);
         }
     }
 
@@ -232,7 +250,7 @@ impl<R, C> Barrier<R, C> {
         stamp: Stamp,
         number: u32,
         command: Sent<C>,
-        out: &mut Vec<Output<R, C>>,
+        out: &mut Vec<BarrierOutput<R, C>>,
     ) {
         let is_allowed = (1..=self.max_commands).contains(&number);
 
@@ -245,7 +263,7 @@ impl<R, C> Barrier<R, C> {
                     self.settle(out);
                 }
             }
-            Err(ignored) => out.push(Output::Ignored(ignored, from.clone())),
+            Err(ignored) => out.push(BarrierOutput::Ignored(ignored, from.clone())),
         }
     }
 
@@ -256,7 +274,7 @@ impl<R, C> Barrier<R, C> {
         stamp: Stamp,
         commands: u32,
         report: R,
-        out: &mut Vec<Output<R, C>>,
+        out: &mut Vec<BarrierOutput<R, C>>,
     ) {
         // It would be refused as stale below. In the log these are two things: the robot is right and
         // answers in vain, or the message is late.
@@ -264,7 +282,7 @@ impl<R, C> Barrier<R, C> {
             member.is_lost() && member.generation() == stamp.generation
         });
         if is_lost {
-            out.push(Output::Ignored(Ignored::Lost, from.clone()));
+            out.push(BarrierOutput::Ignored(Ignored::Lost, from.clone()));
             return;
         }
 
@@ -278,7 +296,7 @@ impl<R, C> Barrier<R, C> {
                     self.settle(out);
                 }
             }
-            Err(ignored) => out.push(Output::Ignored(ignored, from.clone())),
+            Err(ignored) => out.push(BarrierOutput::Ignored(ignored, from.clone())),
         }
     }
 
@@ -289,13 +307,13 @@ impl<R, C> Barrier<R, C> {
         epoch: Epoch,
         tick: Tick,
         on: &RobotName,
-        out: &mut Vec<Output<R, C>>,
+        out: &mut Vec<BarrierOutput<R, C>>,
     ) {
         if !self.is_open_at(epoch, tick) {
             return;
         }
         let Some(member) = self.members.get_mut(from) else {
-            out.push(Output::Ignored(Ignored::UnknownRobot, from.clone()));
+            out.push(BarrierOutput::Ignored(Ignored::UnknownRobot, from.clone()));
             return;
         };
 
@@ -304,13 +322,13 @@ impl<R, C> Barrier<R, C> {
         // now, and again with each repetition of the clock.
         self.stand_in(on, out);
         if self.is_announced {
-            out.push(Output::Held);
+            out.push(BarrierOutput::Held);
         }
     }
 
     /// A timer that was set has fired. It may be of a tick that is over: a timer is replaced, never withdrawn, so it
     /// decides nothing that the state does not bear out.
-    pub fn timer(&mut self, timer: &Timer, out: &mut Vec<Output<R, C>>) {
+    pub fn timer(&mut self, timer: &Timer, out: &mut Vec<BarrierOutput<R, C>>) {
         let is_open = self.phase == BarrierPhase::Open;
 
         match timer {
@@ -318,7 +336,7 @@ impl<R, C> Barrier<R, C> {
                 let is_waiting = is_open || self.phase == BarrierPhase::Gathering;
                 if is_waiting && !self.is_announced {
                     self.is_announced = true;
-                    out.push(Output::Held);
+                    out.push(BarrierOutput::Held);
                 }
             }
             Timer::Repeat if is_open => {
@@ -327,7 +345,7 @@ impl<R, C> Barrier<R, C> {
                 for name in self.members.keys() {
                     self.stand_in(name, out);
                 }
-                out.push(Output::SetTimer(Timer::Repeat, self.timing.repeat));
+                out.push(BarrierOutput::SetTimer(Timer::Repeat, self.timing.repeat));
             }
             // Where a tick is executed again, its record says who was late, not the time that it takes
             // now.
@@ -343,7 +361,7 @@ impl<R, C> Barrier<R, C> {
 
     /// Puts the last clock and its news again. Between two ticks that is the clock of the complete one: it reaches a
     /// robot that is asked to join again, and changes nothing for any other.
-    pub fn repeat(&mut self, out: &mut Vec<Output<R, C>>) {
+    pub fn repeat(&mut self, out: &mut Vec<BarrierOutput<R, C>>) {
         if matches!(self.phase, BarrierPhase::Open | BarrierPhase::Between) {
             self.grant(out);
         }
@@ -371,7 +389,7 @@ impl<R, C> Barrier<R, C> {
     }
 
     /// Changes what the clock does about late robots.
-    pub fn set_lateness(&mut self, lateness: Lateness, out: &mut Vec<Output<R, C>>) {
+    pub fn set_lateness(&mut self, lateness: LatePolicy, out: &mut Vec<BarrierOutput<R, C>>) {
         self.lateness = lateness;
         // The tick that is open may have no deadline yet, if all robots were waited for.
         if self.phase == BarrierPhase::Open {
@@ -381,7 +399,7 @@ impl<R, C> Barrier<R, C> {
 
     /// What the clock does about late robots.
     #[must_use]
-    pub fn lateness(&self) -> &Lateness {
+    pub fn lateness(&self) -> &LatePolicy {
         &self.lateness
     }
 
@@ -517,28 +535,28 @@ impl<R, C> Barrier<R, C> {
             .push(Membership::Joined(name.clone(), generation));
     }
 
-    fn check_all_joined(&mut self, out: &mut Vec<Output<R, C>>) {
+    fn check_all_joined(&mut self, out: &mut Vec<BarrierOutput<R, C>>) {
         if self.members.values().all(Member::is_ready) {
             self.phase = BarrierPhase::Gathered;
             // People are told that the clock goes on only if they were told that it did not.
             if std::mem::take(&mut self.is_announced) {
-                out.push(Output::Released);
+                out.push(BarrierOutput::Released);
             }
-            out.push(Output::Gathered);
+            out.push(BarrierOutput::Gathered);
         }
     }
 
     /// Has the state of a robot put that cannot answer, because the clock goes on without it in the open tick.
-    fn stand_in(&self, robot: &RobotName, out: &mut Vec<Output<R, C>>) {
+    fn stand_in(&self, robot: &RobotName, out: &mut Vec<BarrierOutput<R, C>>) {
         // Putting it more than once is harmless: a robot keeps the first state that it gets for a tick.
         if self.phase == BarrierPhase::Open && self.is_member(robot, Member::is_given_up) {
-            out.push(Output::StandIn(robot.clone()));
+            out.push(BarrierOutput::StandIn(robot.clone()));
         }
     }
 
     /// Puts the news and the clock of the tick that was granted last. The news are composed anew each time: since the
     /// clock was put last, a robot may have joined, or been asked to.
-    fn grant(&self, out: &mut Vec<Output<R, C>>) {
+    fn grant(&self, out: &mut Vec<BarrierOutput<R, C>>) {
         let mut flags = 0;
         for (index, (name, member)) in self.members.iter().enumerate() {
             let is_named = member.notice(self.tick) != IncarnationNotice::default();
@@ -557,7 +575,7 @@ impl<R, C> Barrier<R, C> {
             }
         }
 
-        out.push(Output::Grant {
+        out.push(BarrierOutput::Grant {
             news,
             clock: Clock {
                 epoch: self.epoch,
@@ -577,17 +595,23 @@ impl<R, C> Barrier<R, C> {
         is_absent && member.notice(self.tick).rejoin.is_none()
     }
 
-    fn set_timers(&self, out: &mut Vec<Output<R, C>>) {
+    fn set_timers(&self, out: &mut Vec<BarrierOutput<R, C>>) {
         // Each replaces the one of the tick before, so none has to be withdrawn when a tick is
         // complete.
-        out.push(Output::SetTimer(Timer::Announce, self.timing.announce));
-        out.push(Output::SetTimer(Timer::Repeat, self.timing.repeat));
+        out.push(BarrierOutput::SetTimer(
+            Timer::Announce,
+            self.timing.announce,
+        ));
+        out.push(BarrierOutput::SetTimer(Timer::Repeat, self.timing.repeat));
         let has_deadline = self
             .members
             .keys()
             .any(|name| self.lateness.of(name) != OnLate::Wait);
         if has_deadline {
-            out.push(Output::SetTimer(Timer::Deadline, self.lateness.deadline));
+            out.push(BarrierOutput::SetTimer(
+                Timer::Deadline,
+                self.lateness.deadline,
+            ));
         }
     }
 
@@ -612,7 +636,7 @@ impl<R, C> Barrier<R, C> {
     }
 
     /// The deadline is over: the scenario decides, robot by robot, what follows.
-    fn judge_late(&mut self, out: &mut Vec<Output<R, C>>) {
+    fn judge_late(&mut self, out: &mut Vec<BarrierOutput<R, C>>) {
         // All are looked at before anything is done: whether the run ends must not depend on the order
         // of names.
         let mut late = Vec::new();
@@ -622,7 +646,7 @@ impl<R, C> Barrier<R, C> {
             }
         }
         if late.iter().any(|(_, policy)| *policy == OnLate::Abort) {
-            out.push(Output::Aborted);
+            out.push(BarrierOutput::Aborted);
             return;
         }
 
@@ -648,7 +672,7 @@ impl<R, C> Barrier<R, C> {
 
     /// Completes the open tick if no robot is awaited any more. Whatever may have been the last thing that it waited
     /// for calls this.
-    fn settle(&mut self, out: &mut Vec<Output<R, C>>) {
+    fn settle(&mut self, out: &mut Vec<BarrierOutput<R, C>>) {
         if self.phase != BarrierPhase::Open || self.members.values().any(Member::is_awaited) {
             return;
         }
@@ -657,9 +681,9 @@ impl<R, C> Barrier<R, C> {
         // those that come between two ticks are for the next one, or stale.
         self.phase = BarrierPhase::Between;
         if std::mem::take(&mut self.is_announced) {
-            out.push(Output::Released);
+            out.push(BarrierOutput::Released);
         }
-        let mut outcome = Outcome {
+        let mut outcome = TickOutcome {
             reports: BTreeMap::new(),
             membership: std::mem::take(&mut self.membership),
         };
@@ -670,7 +694,7 @@ impl<R, C> Barrier<R, C> {
                 outcome.reports.insert(name.clone(), reply);
             }
         }
-        out.push(Output::Complete(outcome));
+        out.push(BarrierOutput::Complete(outcome));
     }
 }
 

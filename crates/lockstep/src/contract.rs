@@ -3,9 +3,9 @@
 use std::str::FromStr;
 
 use protocol::RobotName;
-use protocol::messages::{Command, CommandText, News, Refusal, Report, Welcome};
+use protocol::messages::{Command, CommandText, Refusal, Report, TickUpdate, Welcome};
 
-use crate::actions::Answer;
+use crate::actions::TickAnswer;
 use crate::exchange::{IncarnationNotice, Sent};
 use crate::member::Admission;
 use crate::outputs::{Refused, Stamp};
@@ -31,8 +31,8 @@ impl From<&Command> for Stamp {
     }
 }
 
-impl<S, C, R> From<&Answer<S, C, R>> for Stamp {
-    fn from(answer: &Answer<S, C, R>) -> Self {
+impl<S, C, R> From<&TickAnswer<S, C, R>> for Stamp {
+    fn from(answer: &TickAnswer<S, C, R>) -> Self {
         Self {
             epoch: answer.epoch,
             tick: answer.tick,
@@ -51,8 +51,8 @@ impl From<&Welcome> for Admission {
     }
 }
 
-impl From<&News> for IncarnationNotice {
-    fn from(news: &News) -> Self {
+impl From<&TickUpdate> for IncarnationNotice {
+    fn from(news: &TickUpdate) -> Self {
         Self {
             joined: news.joined,
             rejoin: news.rejoin,
@@ -108,7 +108,7 @@ impl Sent<CommandText> {
     }
 }
 
-impl<S, R> Answer<S, CommandText, R> {
+impl<S, R> TickAnswer<S, CommandText, R> {
     /// The commands as they are put, in their order, each with its target. The first has the number `first`: 1, if no rule is
     /// to be broken.
     pub fn commands_from(&self, first: u32) -> impl Iterator<Item = (&RobotName, Command)> {

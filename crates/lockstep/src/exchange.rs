@@ -19,7 +19,7 @@ pub trait Exchange<N, R, C> {
         &mut self,
         tick: Tick,
         news: &dyn Bulletin<N>,
-    ) -> Result<Outcome<R, C>, Self::Error>;
+    ) -> Result<TickOutcome<R, C>, Self::Error>;
 }
 
 /// The incarnations that a robot's news name.
@@ -52,14 +52,14 @@ impl<N: Clone + Default> Bulletin<N> for BTreeMap<RobotName, N> {
 
 /// What a complete tick came to.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub struct Outcome<R, C> {
+pub struct TickOutcome<R, C> {
     /// Reports with the commands of the tick, by robot; a robot that missed the tick has none.
     pub reports: BTreeMap<RobotName, (R, Vec<Sent<C>>)>,
     /// Robots that began or ceased to take part, in a fixed order.
     pub membership: Vec<Membership>,
 }
 
-impl<R, C> Default for Outcome<R, C> {
+impl<R, C> Default for TickOutcome<R, C> {
     fn default() -> Self {
         Self {
             reports: BTreeMap::new(),

@@ -21,10 +21,10 @@ mod states;
 #[cfg(test)]
 mod tests;
 
-pub use actions::{Action, Answer, Begin, Leave, RobotTimer, Timeouts, Turn};
+pub use actions::{Begin, Leave, ParticipantOutput, RobotTimer, TickAnswer, Timeouts, Turn};
 pub use barrier::Barrier;
-pub use exchange::{Bulletin, Exchange, IncarnationNotice, Membership, Outcome, Sent};
-pub use member::{Admission, Attendance, Lateness};
-pub use outputs::{Ignored, Output, Refused, Stamp, Timer, Timing};
+pub use exchange::{Bulletin, Exchange, IncarnationNotice, Membership, Sent, TickOutcome};
+pub use member::{Admission, Attendance, LatePolicy};
+pub use outputs::{BarrierOutput, Ignored, Refused, Stamp, Timer, Timing};
 pub use participant::Participant;
-pub use states::{NoState, StateQuery, States};
+pub use states::{NoState, RecentStates, StateQuery};

@@ -27,7 +27,7 @@ use crate::exchange::{IncarnationNotice, Sent};
 
 /// What the clock does about robots that are late.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub struct Lateness {
+pub struct LatePolicy {
     /// For robots that have no rule of their own.
     pub on_late: OnLate,
     /// For single robots.
@@ -38,7 +38,7 @@ pub struct Lateness {
     pub lose_after: u32,
 }
 
-impl Lateness {
+impl LatePolicy {
     /// What the clock does when this robot is late.
     #[must_use]
     pub fn of(&self, robot: &RobotName) -> OnLate {

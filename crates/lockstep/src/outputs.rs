@@ -5,7 +5,7 @@ use std::time::Duration;
 use protocol::messages::Clock;
 use protocol::{Epoch, Generation, RobotName, Tick};
 
-use crate::exchange::{IncarnationNotice, Outcome};
+use crate::exchange::{IncarnationNotice, TickOutcome};
 
 /// How long the barrier waits for what.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -43,7 +43,7 @@ pub enum Timer {
 
 /// What the barrier wants done.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub enum Output<R, C> {
+pub enum BarrierOutput<R, C> {
     /// Every robot of the roster is connected: grant tick 0.
     Gathered,
     /// Put these news, each to its robot with the incarnations that it names, then the clock.
@@ -54,7 +54,7 @@ pub enum Output<R, C> {
         clock: Clock,
     },
     /// The tick is complete.
-    Complete(Outcome<R, C>),
+    Complete(TickOutcome<R, C>),
     /// The clock goes on without this robot, and others may wait for its state as of the tick before: put that on its behalf.
     StandIn(RobotName),
     /// The clock is held: tell people for whom, or tell them again because that has changed.

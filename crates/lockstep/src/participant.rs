@@ -10,10 +10,10 @@ use std::time::Duration;
 use protocol::messages::{Clock, Refusal};
 use protocol::{Epoch, Generation, RobotName, Tick};
 
-use crate::actions::{Action, Answer, Begin, Leave, RobotTimer, Timeouts, Turn};
+use crate::actions::{Begin, Leave, ParticipantOutput, RobotTimer, TickAnswer, Timeouts, Turn};
 use crate::exchange::{IncarnationNotice, Sent};
 use crate::member::Admission;
-use crate::states::{NoState, StateQuery, States};
+use crate::states::{NoState, RecentStates, StateQuery};
 
 /// Pause between two requests to join.
 const JOIN_AGAIN: Duration = Duration::from_millis(100);
@@ -64,7 +64,7 @@ enum TickState<S, C, R> {
         asking: Option<Asking>,
     },
     /// It has done a tick, whose answer is kept in case that it is lost.
-    Answered(Box<Answer<S, C, R>>),
+    Answered(Box<TickAnswer<S, C, R>>),
 }
 
 /// A query to another robot that has no answer yet.
@@ -92,21 +92,24 @@ pub struct Participant<N, S, C, R> {
     pending: Option<Clock>,
     /// News of ticks that have not been run.
     news: BTreeMap<(Epoch, Tick), ArrivedNews<N>>,
-    states: States<S>,
+    states: RecentStates<S>,
     /// States of other robots, with the tick when each was last asked for.
-    others: BTreeMap<RobotName, States<S>>,
+    others: BTreeMap<RobotName, RecentStates<S>>,
     followed: BTreeMap<RobotName, Tick>,
     is_simulator_gone: bool,
 }
 
-type Out<N, S, C, R> = Vec<Action<N, S, C, R>>;
+type Out<N, S, C, R> = Vec<ParticipantOutput<N, S, C, R>>;
 
 impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
     /// A robot that asks to join.
     #[must_use]
     pub fn new(timeouts: Timeouts, out: &mut Out<N, S, C, R>) -> Self {
-        out.push(Action::SetTimer(RobotTimer::JoinPatience, timeouts.join));
-        out.push(Action::Join);
+        out.push(ParticipantOutput::SetTimer(
+            RobotTimer::JoinPatience,
+            timeouts.join,
+        ));
+        out.push(ParticipantOutput::Join);
 
         Self {
             timeouts,
@@ -116,7 +119,7 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
             tick: TickState::NotBegun,
             pending: None,
             news: BTreeMap::new(),
-            states: States::default(),
+            states: RecentStates::default(),
             others: BTreeMap::new(),
             followed: BTreeMap::new(),
             is_simulator_gone: false,
@@ -166,7 +169,7 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         // Only now: a token that is declared before the welcome would keep the robot's own request from being
         // admitted. It stays declared for as long as the process lives.
         if before.is_none() {
-            out.push(Action::DeclareToken);
+            out.push(ParticipantOutput::DeclareToken);
         }
         self.run_if_possible(out);
     }
@@ -178,7 +181,7 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
             (JoinState::Joining { is_name_taken }, Refusal::NameTaken) => {
                 // A predecessor that was killed keeps the name until its lease is over.
                 *is_name_taken = true;
-                out.push(Action::SetTimer(RobotTimer::Join, JOIN_AGAIN));
+                out.push(ParticipantOutput::SetTimer(RobotTimer::Join, JOIN_AGAIN));
             }
             // A process that was admitted before is refused its own name only if another one has taken its place.
             (JoinState::Rejoining { .. }, Refusal::NameTaken) => self.leave(Leave::Replaced, out),
@@ -189,7 +192,7 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
     /// No simulator has answered the request to join.
     pub fn unanswered(&mut self, out: &mut Out<N, S, C, R>) {
         if self.is_asking_to_join() {
-            out.push(Action::SetTimer(RobotTimer::Join, JOIN_AGAIN));
+            out.push(ParticipantOutput::SetTimer(RobotTimer::Join, JOIN_AGAIN));
         }
     }
 
@@ -309,7 +312,7 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         // The state can be queried before the report is put: a robot that runs the next tick already may ask for it.
         let (epoch, tick) = *at;
         self.states.add(epoch, tick, state.clone());
-        self.tick = TickState::Answered(Box::new(Answer {
+        self.tick = TickState::Answered(Box::new(TickAnswer {
             epoch,
             tick,
             generation: admission.generation,
@@ -361,13 +364,16 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
                 of: of.clone(),
                 has_told: false,
             });
-            out.push(Action::Query {
+            out.push(ParticipantOutput::Query {
                 of: of.clone(),
                 tick,
                 epoch,
             });
-            out.push(Action::SetTimer(RobotTimer::Query, QUERY_AGAIN));
-            out.push(Action::SetTimer(RobotTimer::Waiting, WAITING_AFTER));
+            out.push(ParticipantOutput::SetTimer(RobotTimer::Query, QUERY_AGAIN));
+            out.push(ParticipantOutput::SetTimer(
+                RobotTimer::Waiting,
+                WAITING_AFTER,
+            ));
         }
         None
     }
@@ -403,7 +409,10 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
     pub fn simulator(&mut self, is_present: bool, out: &mut Out<N, S, C, R>) {
         let was_gone = std::mem::replace(&mut self.is_simulator_gone, !is_present);
         if !is_present && !was_gone {
-            out.push(Action::SetTimer(RobotTimer::Gone, self.timeouts.gone));
+            out.push(ParticipantOutput::SetTimer(
+                RobotTimer::Gone,
+                self.timeouts.gone,
+            ));
         }
     }
 
@@ -415,7 +424,7 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
 
         // A timer is never withdrawn: it decides nothing that the state does not bear out.
         match (timer, &self.join) {
-            (RobotTimer::Join, _) if self.is_asking_to_join() => out.push(Action::Join),
+            (RobotTimer::Join, _) if self.is_asking_to_join() => out.push(ParticipantOutput::Join),
             (RobotTimer::JoinPatience, JoinState::Joining { is_name_taken }) => {
                 let leave = if *is_name_taken {
                     Leave::Refused(Refusal::NameTaken)
@@ -476,7 +485,7 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
     fn leave(&mut self, leave: Leave, out: &mut Out<N, S, C, R>) {
         if !self.has_left() {
             self.join = JoinState::Left(self.admission());
-            out.push(Action::Leave(leave));
+            out.push(ParticipantOutput::Leave(leave));
         }
     }
 
@@ -490,7 +499,7 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
                 later: None,
                 holds_answer: false,
             };
-            out.push(Action::Join);
+            out.push(ParticipantOutput::Join);
         }
     }
 
@@ -544,7 +553,7 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
 
         self.tick = TickState::Running { at, asking: None };
         self.unfollow_unused(clock.tick, out);
-        out.push(Action::Run(Turn {
+        out.push(ParticipantOutput::Run(Turn {
             epoch: clock.epoch,
             tick: clock.tick,
             begin,
@@ -563,14 +572,14 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         for name in unused {
             self.followed.remove(&name);
             self.others.remove(&name);
-            out.push(Action::Unfollow(name));
+            out.push(ParticipantOutput::Unfollow(name));
         }
     }
 
     /// Puts the answer of the last tick, for the first time or again.
     fn put_answer(&self, out: &mut Out<N, S, C, R>) {
         if let TickState::Answered(answer) = &self.tick {
-            out.push(Action::Put(answer.clone()));
+            out.push(ParticipantOutput::Put(answer.clone()));
         }
     }
 
@@ -586,10 +595,10 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         let (epoch, tick, of) = (*epoch, *tick, asking.of.clone());
 
         if timer == RobotTimer::Query {
-            out.push(Action::Query { of, tick, epoch });
-            out.push(Action::SetTimer(RobotTimer::Query, QUERY_AGAIN));
+            out.push(ParticipantOutput::Query { of, tick, epoch });
+            out.push(ParticipantOutput::SetTimer(RobotTimer::Query, QUERY_AGAIN));
         } else if !std::mem::replace(&mut asking.has_told, true) {
-            out.push(Action::PutWaiting {
+            out.push(ParticipantOutput::PutWaiting {
                 tick,
                 epoch,
                 on: of,

@@ -35,17 +35,17 @@ impl std::fmt::Display for NoState {
 /// The last two states of a robot, newest last. During a tick the other robots must see the state of the tick before,
 /// however far this robot already is.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub struct States<S> {
+pub struct RecentStates<S> {
     kept: Vec<(Epoch, Tick, S)>,
 }
 
-impl<S> Default for States<S> {
+impl<S> Default for RecentStates<S> {
     fn default() -> Self {
         Self { kept: Vec::new() }
     }
 }
 
-impl<S: Clone> States<S> {
+impl<S: Clone> RecentStates<S> {
     /// Adds the state of a tick; states may arrive in any order. The first one of a tick counts.
     pub fn add(&mut self, epoch: Epoch, tick: Tick, state: S) {
         let newest_epoch = self.kept.last().map_or(epoch, |(newest, _, _)| *newest);

@@ -4,8 +4,8 @@ mod condition;
 mod rule;
 mod watch;
 
-pub use condition::{Condition, ConditionError};
+pub use condition::{TickCondition, TickConditionError};
 pub use rule::{
     ExpectError, Expectation, MAX_EXPECTATIONS, MAX_NAME_CHARS, Rule, WrongEntry, check_all,
 };
-pub use watch::{Judgment, Monitors, Watch};
+pub use watch::{Judgment, Monitor, Monitors};

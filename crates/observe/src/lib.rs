@@ -9,8 +9,8 @@ pub mod words;
 use protocol::messages::{Point, StateVariables};
 use protocol::{Event, RobotName, Tick};
 
-pub use expect::{Expectation, Judgment, Monitors, Watch};
-pub use measure::{Kind, Measure, MeasureError, Measured};
+pub use expect::{Expectation, Judgment, Monitor, Monitors};
+pub use measure::{Measure, MeasureError, MeasureSource, Measured};
 pub use pattern::{Pattern, PatternError};
 pub use probe::Probe;
 pub use words::Words;

@@ -28,14 +28,14 @@ pub struct Measure {
     /// Whether arms are compared by it.
     pub contrast: bool,
     /// Where the number comes from.
-    pub kind: Kind,
+    pub kind: MeasureSource,
     /// Place of the kind in the file, bytes.
     span: Range<usize>,
 }
 
 /// Where the number of a measure comes from.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Kind {
+pub enum MeasureSource {
     /// Path of a number in the summary, parts joined by `.`. A part `*` is the sum over all entries.
     Summary(String),
     /// Number of events.
@@ -119,12 +119,12 @@ pub struct Share {
     /// The robot.
     pub robot: RobotName,
     /// The states.
-    pub states: States,
+    pub states: StateNames,
 }
 
 /// Emotions or behaviors.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum States {
+pub enum StateNames {
     /// Emotions.
     Emotions(Vec<String>),
     /// Behaviors.
@@ -373,15 +373,21 @@ impl TryFrom<RawMeasure> for Measure {
 
         let when = raw.when;
         let kinds = [
-            raw.summary.map(|path| spanned(path, Kind::Summary)),
-            raw.count
-                .map(|pattern| spanned(pattern, |pattern| Kind::Count(Count { pattern, when }))),
-            raw.time.map(|time| spanned(time, Kind::Time)),
-            raw.between.map(|between| spanned(between, Kind::Between)),
-            raw.share.map(|share| spanned(share, Kind::Share)),
+            raw.summary
+                .map(|path| spanned(path, MeasureSource::Summary)),
+            raw.count.map(|pattern| {
+                spanned(pattern, |pattern| {
+                    MeasureSource::Count(Count { pattern, when })
+                })
+            }),
+            raw.time.map(|time| spanned(time, MeasureSource::Time)),
+            raw.between
+                .map(|between| spanned(between, MeasureSource::Between)),
+            raw.share.map(|share| spanned(share, MeasureSource::Share)),
             raw.variable
-                .map(|variable| spanned(variable, Kind::Variable)),
-            raw.stalled.map(|stalled| spanned(stalled, Kind::Stalled)),
+                .map(|variable| spanned(variable, MeasureSource::Variable)),
+            raw.stalled
+                .map(|stalled| spanned(stalled, MeasureSource::Stalled)),
         ];
         let mut kinds = kinds.into_iter().flatten();
         let (kind, span) = kinds.next().ok_or(MeasureError::NotOne)?;
@@ -417,7 +423,10 @@ fn check_pair(
     Ok(())
 }
 
-fn spanned<T>(raw: Spanned<T>, kind: impl FnOnce(T) -> Kind) -> (Kind, Range<usize>) {
+fn spanned<T>(
+    raw: Spanned<T>,
+    kind: impl FnOnce(T) -> MeasureSource,
+) -> (MeasureSource, Range<usize>) {
     let span = raw.span();
     (kind(raw.into_inner()), span)
 }
@@ -442,9 +451,9 @@ fn word_of(path: &str) -> Option<Word> {
         return None;
     };
     let kind = match table {
-        "emotions_s" => words::Kind::Emotion,
-        "behaviors_s" | "entered" => words::Kind::Behavior,
-        "sent" => words::Kind::Command,
+        "emotions_s" => words::WordKind::Emotion,
+        "behaviors_s" | "entered" => words::WordKind::Behavior,
+        "sent" => words::WordKind::Command,
         _ => return None,
     };
 
@@ -465,8 +474,8 @@ impl TryFrom<RawShare> for Share {
 
     fn try_from(raw: RawShare) -> Result<Self, MeasureError> {
         let states = match (raw.emotion, raw.behavior) {
-            (Some(emotions), None) => States::Emotions(emotions.list()?),
-            (None, Some(behaviors)) => States::Behaviors(behaviors.list()?),
+            (Some(emotions), None) => StateNames::Emotions(emotions.list()?),
+            (None, Some(behaviors)) => StateNames::Behaviors(behaviors.list()?),
             _ => return Err(MeasureError::NoStates),
         };
         Ok(Self {
@@ -526,7 +535,10 @@ impl Measure {
     /// Whether it is a time to an event, which does not come in every run.
     #[must_use]
     pub fn is_time(&self) -> bool {
-        matches!(self.kind, Kind::Time(_) | Kind::Stalled(_))
+        matches!(
+            self.kind,
+            MeasureSource::Time(_) | MeasureSource::Stalled(_)
+        )
     }
 
     /// Head of its column in tables, with the unit; its name if it has no column.
@@ -545,7 +557,7 @@ impl Measure {
         if let Some(what) = &self.what {
             return Some(format!("{}: {what}", self.name));
         }
-        let Kind::Stalled(stalled) = &self.kind else {
+        let MeasureSource::Stalled(stalled) = &self.kind else {
             return None;
         };
 
@@ -568,25 +580,25 @@ impl Measure {
     /// The words that robots choose and that it names.
     pub(crate) fn words(&self) -> Vec<Word> {
         let share = match &self.kind {
-            Kind::Count(count) => return count.pattern.words(),
-            Kind::Time(time) => {
+            MeasureSource::Count(count) => return count.pattern.words(),
+            MeasureSource::Time(time) => {
                 let mut named = time.to.words();
                 named.extend(time.after.iter().flat_map(Pattern::words));
                 return named;
             }
-            Kind::Between(between) => {
+            MeasureSource::Between(between) => {
                 let mut named = between.begin.words();
                 named.extend(between.end.words());
                 return named;
             }
-            Kind::Share(share) => share,
-            Kind::Summary(path) => return word_of(path).into_iter().collect(),
-            Kind::Variable(_) | Kind::Stalled(_) => return Vec::new(),
+            MeasureSource::Share(share) => share,
+            MeasureSource::Summary(path) => return word_of(path).into_iter().collect(),
+            MeasureSource::Variable(_) | MeasureSource::Stalled(_) => return Vec::new(),
         };
 
         let (kind, states) = match &share.states {
-            States::Emotions(states) => (words::Kind::Emotion, states),
-            States::Behaviors(states) => (words::Kind::Behavior, states),
+            StateNames::Emotions(states) => (words::WordKind::Emotion, states),
+            StateNames::Behaviors(states) => (words::WordKind::Behavior, states),
         };
         let mut named = Vec::new();
         for state in states {
@@ -603,10 +615,13 @@ impl Measure {
     #[must_use]
     pub fn expectations(&self) -> Vec<&str> {
         let patterns = match &self.kind {
-            Kind::Count(count) => vec![&count.pattern],
-            Kind::Time(time) => time.after.iter().chain([&time.to]).collect(),
-            Kind::Between(between) => vec![&between.begin, &between.end],
-            Kind::Summary(_) | Kind::Share(_) | Kind::Variable(_) | Kind::Stalled(_) => Vec::new(),
+            MeasureSource::Count(count) => vec![&count.pattern],
+            MeasureSource::Time(time) => time.after.iter().chain([&time.to]).collect(),
+            MeasureSource::Between(between) => vec![&between.begin, &between.end],
+            MeasureSource::Summary(_)
+            | MeasureSource::Share(_)
+            | MeasureSource::Variable(_)
+            | MeasureSource::Stalled(_) => Vec::new(),
         };
         let named = patterns.into_iter().flat_map(Pattern::expectations);
         named.collect()
@@ -616,8 +631,8 @@ impl Measure {
     #[must_use]
     pub fn variables(&self) -> Vec<(&RobotName, &str)> {
         match &self.kind {
-            Kind::Variable(variable) => vec![(&variable.robot, variable.name.as_str())],
-            Kind::Stalled(stalled) => {
+            MeasureSource::Variable(variable) => vec![(&variable.robot, variable.name.as_str())],
+            MeasureSource::Stalled(stalled) => {
                 let progress = stalled.progress.iter();
                 progress
                     .map(|counter| (&counter.robot, counter.variable.as_str()))
@@ -631,24 +646,24 @@ impl Measure {
     #[must_use]
     pub fn robots(&self) -> Vec<&str> {
         match &self.kind {
-            Kind::Summary(path) => path
+            MeasureSource::Summary(path) => path
                 .strip_prefix("robots.")
                 .and_then(|rest| rest.split('.').next())
                 .filter(|robot| *robot != "*")
                 .into_iter()
                 .collect(),
-            Kind::Count(count) => count.pattern.robots().collect(),
-            Kind::Time(time) => {
+            MeasureSource::Count(count) => count.pattern.robots().collect(),
+            MeasureSource::Time(time) => {
                 let after = time.after.iter().flat_map(Pattern::robots);
                 time.to.robots().chain(after).collect()
             }
-            Kind::Between(between) => {
+            MeasureSource::Between(between) => {
                 let ends = between.end.robots();
                 between.begin.robots().chain(ends).collect()
             }
-            Kind::Share(share) => vec![share.robot.as_str()],
-            Kind::Variable(variable) => vec![variable.robot.as_str()],
-            Kind::Stalled(stalled) => {
+            MeasureSource::Share(share) => vec![share.robot.as_str()],
+            MeasureSource::Variable(variable) => vec![variable.robot.as_str()],
+            MeasureSource::Stalled(stalled) => {
                 let progress = stalled.progress.iter();
                 progress.map(|counter| counter.robot.as_str()).collect()
             }

@@ -298,9 +298,9 @@ impl Pattern {
     /// The words that robots choose and that it names.
     pub(crate) fn words(&self) -> Vec<Word> {
         let (kind, of, fields): (_, _, &[&str]) = match self.kind.as_str() {
-            "emotion" => (words::Kind::Emotion, "robot", &["from", "to"]),
-            "behavior" => (words::Kind::Behavior, "robot", &["from", "to"]),
-            "command_sent" => (words::Kind::Command, "from", &["command"]),
+            "emotion" => (words::WordKind::Emotion, "robot", &["from", "to"]),
+            "behavior" => (words::WordKind::Behavior, "robot", &["from", "to"]),
+            "command_sent" => (words::WordKind::Command, "from", &["command"]),
             _ => return Vec::new(),
         };
 

@@ -3,12 +3,12 @@
 use protocol::time::time_s;
 use protocol::{RobotName, Tick};
 use serde_json::Value;
-use timeline::{Kind as StateKind, Span, Timeline};
+use timeline::{Span, StateKind, Timeline};
 
 use crate::Observation;
 use crate::measure::{
-    Between, Count, Kind, Measure, Measured, OfDurations, OfValues, OfVariable, Share, Stalled,
-    States, TimeTo, When,
+    Between, Count, Measure, MeasureSource, Measured, OfDurations, OfValues, OfVariable, Share,
+    Stalled, StateNames, TimeTo, When,
 };
 
 /// Tables of a robot's summary that have entries for what occurred.
@@ -39,32 +39,32 @@ impl<'a> Probe<'a> {
     #[must_use]
     pub fn new(measure: &'a Measure, condition_s: (f64, f64)) -> Self {
         let tally = match &measure.kind {
-            Kind::Summary(path) => Tally::Summary(path),
-            Kind::Count(count) => Tally::Count(CountTally {
+            MeasureSource::Summary(path) => Tally::Summary(path),
+            MeasureSource::Count(count) => Tally::Count(CountTally {
                 definition: count,
                 condition_s,
                 count: 0,
             }),
-            Kind::Time(time) => Tally::Time(TimeTally {
+            MeasureSource::Time(time) => Tally::Time(TimeTally {
                 definition: time,
                 begun: time.after.is_none().then_some(0),
                 reached: None,
             }),
-            Kind::Between(between) => Tally::Between(BetweenTally {
+            MeasureSource::Between(between) => Tally::Between(BetweenTally {
                 definition: between,
                 open: None,
                 durations: Durations::default(),
             }),
-            Kind::Share(share) => Tally::Share(ShareTally {
+            MeasureSource::Share(share) => Tally::Share(ShareTally {
                 definition: share,
                 timeline: Timeline::default(),
                 ticks: 0,
             }),
-            Kind::Variable(variable) => Tally::Variable(VariableTally {
+            MeasureSource::Variable(variable) => Tally::Variable(VariableTally {
                 definition: variable,
                 values: None,
             }),
-            Kind::Stalled(stalled) => Tally::Stalled(StalledTally {
+            MeasureSource::Stalled(stalled) => Tally::Stalled(StalledTally {
                 definition: stalled,
                 values: vec![None; stalled.progress.len()],
                 progress: 0,
@@ -319,8 +319,8 @@ impl ShareTally<'_> {
     /// How many ticks of a span count, up to this tick.
     fn counted(&self, span: &Span, now: Tick) -> Tick {
         let (kind, states) = match &self.definition.states {
-            States::Emotions(states) => (StateKind::Emotion, states),
-            States::Behaviors(states) => (StateKind::Behavior, states),
+            StateNames::Emotions(states) => (StateKind::Emotion, states),
+            StateNames::Behaviors(states) => (StateKind::Behavior, states),
         };
         match span {
             Span::Stay(stay)

@@ -14,7 +14,7 @@ const MAX_HEARD: usize = 1_000;
 /// What a word is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Kind {
+pub enum WordKind {
     /// The name of an emotion.
     Emotion,
     /// The name of a behavior.
@@ -27,7 +27,7 @@ pub enum Kind {
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Word {
     /// What it is.
-    pub kind: Kind,
+    pub kind: WordKind,
     /// The robots one of which may say it; empty for any robot.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub robots: Vec<String>,
@@ -37,7 +37,7 @@ pub struct Word {
 
 /// A word that did not occur in a run.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub struct Unheard {
+pub struct MissingWord {
     /// The word.
     #[serde(flatten)]
     pub word: Word,
@@ -50,7 +50,7 @@ pub struct Unheard {
 #[derive(Debug, Clone, Default)]
 pub struct Words {
     named: BTreeSet<Word>,
-    heard: BTreeMap<(Kind, RobotName), BTreeSet<String>>,
+    heard: BTreeMap<(WordKind, RobotName), BTreeSet<String>>,
 }
 
 impl Words {
@@ -77,17 +77,17 @@ impl Words {
         }
         for event in observation.events {
             match event {
-                Event::Emotion { robot, to, .. } => self.hear(Kind::Emotion, robot, to),
-                Event::Behavior { robot, to, .. } => self.hear(Kind::Behavior, robot, to),
+                Event::Emotion { robot, to, .. } => self.hear(WordKind::Emotion, robot, to),
+                Event::Behavior { robot, to, .. } => self.hear(WordKind::Behavior, robot, to),
                 Event::CommandSent { from, command, .. } => {
-                    self.hear(Kind::Command, from, command);
+                    self.hear(WordKind::Command, from, command);
                 }
                 _ => {}
             }
         }
     }
 
-    fn hear(&mut self, kind: Kind, robot: &RobotName, word: &str) {
+    fn hear(&mut self, kind: WordKind, robot: &RobotName, word: &str) {
         let heard = self.heard.entry((kind, robot.clone())).or_default();
         if heard.len() < MAX_HEARD && !heard.contains(word) {
             heard.insert(word.to_owned());
@@ -96,7 +96,7 @@ impl Words {
 
     /// The words that are named and have not occurred.
     #[must_use]
-    pub fn unheard(&self) -> Vec<Unheard> {
+    pub fn unheard(&self) -> Vec<MissingWord> {
         let mut unheard = Vec::new();
         for word in &self.named {
             let heard = self.heard_of(word);
@@ -109,7 +109,7 @@ impl Words {
                 .map(|other| (distance(&word.word, other), other))
                 .min()
                 .filter(|(_, other)| is_almost(&word.word, other));
-            unheard.push(Unheard {
+            unheard.push(MissingWord {
                 word: word.clone(),
                 like: like.map(|(_, other)| other.to_owned()),
             });
@@ -134,9 +134,9 @@ impl Words {
 impl std::fmt::Display for Word {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let kind = match self.kind {
-            Kind::Emotion => "emotion",
-            Kind::Behavior => "behavior",
-            Kind::Command => "command",
+            WordKind::Emotion => "emotion",
+            WordKind::Behavior => "behavior",
+            WordKind::Command => "command",
         };
         write!(
             f,

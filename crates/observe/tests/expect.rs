@@ -8,7 +8,7 @@
 use std::collections::BTreeMap;
 
 use observe::expect::{MAX_EXPECTATIONS, check_all};
-use observe::{Expectation, Judgment, Monitors, Observation, RobotState, Watch};
+use observe::{Expectation, Judgment, Monitor, Monitors, Observation, RobotState};
 use protocol::messages::{End, Point, StateVariables, Verdict};
 use protocol::{Event, RobotName, Tick};
 use serde::{Deserialize, Serialize};
@@ -50,7 +50,7 @@ struct Stated {
 
 /// A run that is observed.
 struct Run {
-    watch: Watch,
+    watch: Monitor,
     tick: Tick,
     robots: BTreeMap<RobotName, Stated>,
 }
@@ -60,7 +60,7 @@ impl Run {
         let expectation = read(entry).unwrap();
         expectation.check(&roster()).unwrap();
         Self {
-            watch: Watch::new(&expectation, TICK_S, BODY_M, &roster()),
+            watch: Monitor::new(&expectation, TICK_S, BODY_M, &roster()),
             tick: 0,
             robots: BTreeMap::new(),
         }

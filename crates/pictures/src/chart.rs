@@ -5,7 +5,7 @@ use crate::markup::{Markup, number};
 use crate::number::typeset;
 use crate::palette::ARMS;
 use crate::scale::Scale;
-use crate::shapes::{Point, polyline};
+use crate::shapes::{Pixel, polyline};
 
 pub(crate) mod bands;
 pub(crate) mod floor;
@@ -23,7 +23,7 @@ pub(crate) const NAME_LETTERS: usize = 16;
 
 /// An estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Estimate {
+pub struct PlottedEstimate {
     /// The estimate.
     pub value: f64,
     /// Lower and upper end of its interval, if there is one.
@@ -34,7 +34,7 @@ pub struct Estimate {
     pub is_filled: bool,
 }
 
-impl Estimate {
+impl PlottedEstimate {
     /// The least and the most of the estimate and its interval.
     #[must_use]
     pub fn ends(&self) -> [f64; 2] {
@@ -80,7 +80,12 @@ fn line_class(arm: usize) -> String {
 }
 
 /// Draws an arm's estimate with its interval. `at` is the place of a value.
-fn draw_estimate(svg: &mut Markup, arm: usize, estimate: &Estimate, at: impl Fn(f64) -> Point) {
+fn draw_estimate(
+    svg: &mut Markup,
+    arm: usize,
+    estimate: &PlottedEstimate,
+    at: impl Fn(f64) -> Pixel,
+) {
     if let Some((low, high)) = estimate.interval {
         let class = format!("curve solid {}", arm_class(arm));
         svg.line(&class, &[at(low), at(high)]);
@@ -89,16 +94,16 @@ fn draw_estimate(svg: &mut Markup, arm: usize, estimate: &Estimate, at: impl Fn(
 }
 
 /// Draws the marker of an arm around a point: a shape of its own.
-fn draw_marker(svg: &mut Markup, arm: usize, point: Point, is_filled: bool) {
+fn draw_marker(svg: &mut Markup, arm: usize, point: Pixel, is_filled: bool) {
     let fill = if is_filled { "mark" } else { "mark hollow" };
     let class = format!("{fill} {}", arm_class(arm));
     svg.path(&class, &marker_shape(arm, point));
 }
 
-fn marker_shape(arm: usize, (x, y): Point) -> String {
+fn marker_shape(arm: usize, (x, y): Pixel) -> String {
     // Arms after the first ones have the same colors and other shapes.
     let shape = (arm % ARMS + arm / ARMS) % ARMS;
-    let corners: &[Point] = match shape {
+    let corners: &[Pixel] = match shape {
         0 => {
             let (x, y) = (number(x - 4.0), number(y));
             return format!("M{x} {y}a4 4 0 1 0 8 0a4 4 0 1 0 -8 0z");
@@ -115,7 +120,7 @@ fn marker_shape(arm: usize, (x, y): Point) -> String {
         6 => &[(-4.8, 0.0), (3.6, -4.6), (3.6, 4.6)],
         _ => &[(4.8, 0.0), (-3.6, -4.6), (-3.6, 4.6)],
     };
-    let points: Vec<Point> = corners.iter().map(|(dx, dy)| (x + dx, y + dy)).collect();
+    let points: Vec<Pixel> = corners.iter().map(|(dx, dy)| (x + dx, y + dy)).collect();
     polyline(&points) + "z"
 }
 

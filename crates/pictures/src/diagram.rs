@@ -20,10 +20,10 @@ use protocol::{Event, RobotName, Tick};
 use timeline::{Span, Timeline};
 
 use self::draw::draw;
-use self::items::{HeldUp, Items};
-use self::picture::Window;
+use self::items::{HeldTick, Items};
+use self::picture::VisibleTicks;
 
-pub use self::draw::Options;
+pub use self::draw::DiagramOptions;
 
 /// Most things in a diagram: bands, commands, marks. A picture with this many has about 4 MB.
 pub const MAX_ITEMS: usize = 12_000;
@@ -41,8 +41,8 @@ pub struct TooMuch {
 pub struct Diagram {
     timeline: Timeline,
     /// Up to the last tick so far.
-    window: Window,
-    options: Options,
+    window: VisibleTicks,
+    options: DiagramOptions,
     items: Items,
     /// Number of things beyond [`MAX_ITEMS`], which are not kept.
     beyond: usize,
@@ -51,10 +51,10 @@ pub struct Diagram {
 impl Diagram {
     /// A diagram of no tick yet. `timeline` is that after the tick before `from`; a tick lasts `tick_s` simulated seconds.
     #[must_use]
-    pub fn new(timeline: Timeline, tick_s: f64, from: Tick, options: Options) -> Self {
+    pub fn new(timeline: Timeline, tick_s: f64, from: Tick, options: DiagramOptions) -> Self {
         Self {
             timeline,
-            window: Window {
+            window: VisibleTicks {
                 from,
                 to: from,
                 tick_s,
@@ -78,7 +78,7 @@ impl Diagram {
             self.window.has_end |= matches!(event, Event::End { .. });
         }
         let held_up = awaited.iter().cloned();
-        let held_up = held_up.map(|awaited| HeldUp { tick, awaited });
+        let held_up = held_up.map(|awaited| HeldTick { tick, awaited });
         items.held_up.extend(held_up);
 
         if self.items.count() <= MAX_ITEMS {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
-use crate::shapes::{LABEL_PX, Point};
+use crate::shapes::{LABEL_PX, Pixel};
 
 /// Width of the columns by which places are found, pixels.
 const COLUMN_PX: f64 = 64.0;
@@ -99,7 +99,7 @@ pub(crate) struct Area {
 
 impl Area {
     /// A rectangle between two corners.
-    pub(crate) fn between(one: Point, other: Point) -> Self {
+    pub(crate) fn between(one: Pixel, other: Pixel) -> Self {
         Self {
             left: one.0.min(other.0),
             top: one.1.min(other.1),
@@ -193,7 +193,7 @@ impl Labels {
     }
 
     /// Labels are to overlap this line only if they have no other place.
-    pub(crate) fn avoid_line(&mut self, from: Point, to: Point) {
+    pub(crate) fn avoid_line(&mut self, from: Pixel, to: Pixel) {
         const STEP_PX: f64 = 10.0;
         let dx = to.0 - from.0;
         let dy = to.1 - from.1;

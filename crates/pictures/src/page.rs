@@ -59,7 +59,7 @@ impl<T: Into<String>> From<T> for Text {
 
 /// A chart among those of a figure.
 #[derive(Debug, Clone)]
-pub struct Panel {
+pub struct ChartPanel {
     /// Heading above the chart; none if it is empty.
     pub heading: String,
     /// The chart, SVG.
@@ -68,7 +68,7 @@ pub struct Panel {
     pub is_wide: bool,
 }
 
-impl Panel {
+impl ChartPanel {
     /// A chart that has the width of a panel.
     #[must_use]
     pub fn new(heading: impl Into<String>, svg: String) -> Self {
@@ -93,7 +93,7 @@ impl Panel {
 #[derive(Debug, Clone, Default)]
 pub struct Figure {
     /// The charts.
-    pub panels: Vec<Panel>,
+    pub panels: Vec<ChartPanel>,
     /// What is shown, with n and the kind of interval.
     pub caption: Text,
     /// The numbers.
@@ -103,7 +103,7 @@ pub struct Figure {
 impl Figure {
     /// A figure of these charts.
     #[must_use]
-    pub fn new(panels: Vec<Panel>, caption: impl Into<Text>, table: Option<Table>) -> Self {
+    pub fn new(panels: Vec<ChartPanel>, caption: impl Into<Text>, table: Option<Table>) -> Self {
         Self {
             panels,
             caption: caption.into(),

@@ -3,7 +3,7 @@
 //! The emotions of the documented robots have colors of Okabe and Ito (2008), which are told apart by most eyes; they differ in
 //! lightness, too, so that they are told apart in print without colors.
 
-use timeline::Kind;
+use timeline::StateKind;
 
 /// A color in light and in dark surroundings, as `#rrggbb`. Prints are light.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -128,10 +128,10 @@ const fn shade(light: &'static str, dark: &'static str) -> Shade {
 
 /// The class of areas in the color of an emotion or a behavior; text on them has this class after `on-`.
 #[must_use]
-pub fn state_class(kind: Kind, name: &str) -> String {
+pub fn state_class(kind: StateKind, name: &str) -> String {
     match kind {
-        Kind::Emotion => format!("e{}", index(name, &EMOTIONS, EMOTION_SHADES.len())),
-        Kind::Behavior => format!("b{}", index(name, &BEHAVIORS, BEHAVIOR_SHADES.len())),
+        StateKind::Emotion => format!("e{}", index(name, &EMOTIONS, EMOTION_SHADES.len())),
+        StateKind::Behavior => format!("b{}", index(name, &BEHAVIORS, BEHAVIOR_SHADES.len())),
     }
 }
 
@@ -188,8 +188,8 @@ mod tests {
     #[test]
     fn the_color_of_a_name_is_fixed() {
         assert_eq!(fnv1a("a"), 0xe40c_292c);
-        assert_eq!(state_class(Kind::Emotion, "HAPPY"), "e0");
-        assert_eq!(state_class(Kind::Emotion, "HOPEFUL"), "e6");
+        assert_eq!(state_class(StateKind::Emotion, "HAPPY"), "e0");
+        assert_eq!(state_class(StateKind::Emotion, "HOPEFUL"), "e6");
         for name in ["CONFUSED", "", "BORED", "x"] {
             assert!((7..15).contains(&index(name, &EMOTIONS, 15)), "{name}");
             assert!((8..14).contains(&index(name, &BEHAVIORS, 14)), "{name}");
@@ -200,9 +200,9 @@ mod tests {
     #[test]
     fn names_without_a_color_of_their_own_have_that_of_their_hash() {
         for (name, class) in [("CONFUSED", "e13"), ("", "e12"), ("ärgerlich", "e13")] {
-            assert_eq!(state_class(Kind::Emotion, name), class);
+            assert_eq!(state_class(StateKind::Emotion, name), class);
         }
-        assert_eq!(state_class(Kind::Behavior, "DANCE"), "b8");
+        assert_eq!(state_class(StateKind::Behavior, "DANCE"), "b8");
     }
 
     /// WCAG 2.2, 1.4.3 (AA).

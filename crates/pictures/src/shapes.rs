@@ -8,7 +8,7 @@ pub(crate) const LABEL_PX: f64 = 10.5;
 pub(crate) const SMALL_PX: f64 = 9.0;
 
 /// A place in a picture, pixels from its left and upper edge.
-pub(crate) type Point = (f64, f64);
+pub(crate) type Pixel = (f64, f64);
 
 impl Markup {
     /// Begins the start tag of a picture.
@@ -48,12 +48,12 @@ impl Markup {
     }
 
     /// Straight lines through these points.
-    pub(crate) fn line(&mut self, class: &str, points: &[Point]) {
+    pub(crate) fn line(&mut self, class: &str, points: &[Pixel]) {
         self.path(class, &polyline(points));
     }
 
     /// A rectangle.
-    pub(crate) fn rect(&mut self, class: &str, (x, y): Point, width: f64, height: f64) {
+    pub(crate) fn rect(&mut self, class: &str, (x, y): Pixel, width: f64, height: f64) {
         self.tag("rect")
             .class(class)
             .at("x", x)
@@ -64,13 +64,13 @@ impl Markup {
     }
 
     /// A cross.
-    pub(crate) fn cross(&mut self, class: &str, (x, y): Point) {
+    pub(crate) fn cross(&mut self, class: &str, (x, y): Pixel) {
         let (left, top, bottom) = (number(x - 4.0), number(y - 4.0), number(y + 4.0));
         self.path(class, &format!("M{left} {top}l8 8M{left} {bottom}l8 -8"));
     }
 
     /// A filled triangle whose tip is at `tip`, in the direction from `base`.
-    pub(crate) fn triangle(&mut self, class: &str, base: Point, tip: Point) {
+    pub(crate) fn triangle(&mut self, class: &str, base: Pixel, tip: Pixel) {
         const LENGTH_PX: f64 = 7.0;
         const HALF_WIDTH_PX: f64 = 3.0;
         let dx = tip.0 - base.0;
@@ -98,7 +98,7 @@ impl Tag<'_> {
 }
 
 /// Straight lines through these points, as the data of a path.
-pub(crate) fn polyline(points: &[Point]) -> String {
+pub(crate) fn polyline(points: &[Pixel]) -> String {
     let mut data = String::new();
     for (index, (x, y)) in points.iter().enumerate() {
         let command = if index == 0 { 'M' } else { 'L' };

@@ -24,7 +24,7 @@ const STATES: [Palette; 2] = [("e", &EMOTION_SHADES), ("b", &BEHAVIOR_SHADES)];
 /// Colors of arms and quantities.
 const AMOUNTS: [Palette; 2] = [("a", &ARM_SHADES), ("h", &HEAT_SHADES)];
 
-/// The style sheet of diagrams, which a diagram contains unless [`crate::diagram::Options::has_style`] is off. Its rules are for
+/// The style sheet of diagrams, which a diagram contains unless [`crate::diagram::DiagramOptions::has_style`] is off. Its rules are for
 /// elements of the class `cars-diagram` only.
 #[must_use]
 pub fn style() -> String {

@@ -8,11 +8,12 @@
 use std::collections::BTreeMap;
 
 use pictures::{
-    Band, BandRow, Bands, Cell, Curve, Estimate, Figure, Floor, IntervalRow, Intervals, Matrix,
-    MatrixCell, MatrixLabel, Page, Panel, Step, Steps, Table, Text, Trend, TrendLine, state_class,
+    Band, BandRow, Bands, Cell, ChartPanel, Curve, CurveStep, Figure, Floor, IntervalRow,
+    Intervals, Matrix, MatrixCell, MatrixLabel, Page, PlottedEstimate, Steps, Table, Text, Trend,
+    TrendLine, state_class,
 };
 use roxmltree::{Document, Node, ParsingOptions};
-use timeline::Kind;
+use timeline::StateKind;
 
 /// A text that would leave its place if it were not escaped.
 const HOSTILE: &str = "</svg><script>alert(\"1\")</script>&amp;'\u{1b}[31m\u{202e}\u{0}]]>";
@@ -49,8 +50,8 @@ fn of_class<'a>(document: &'a Document<'_>, class: &str) -> Vec<Node<'a, 'a>> {
     document.descendants().filter(has_class).collect()
 }
 
-fn estimate(value: f64) -> Estimate {
-    Estimate {
+fn estimate(value: f64) -> PlottedEstimate {
+    PlottedEstimate {
         value,
         interval: Some((value - 1.0, value + 2.0)),
         n: 32,
@@ -71,7 +72,7 @@ fn bands_are_as_many_as_the_states() {
     }
     let chart = Bands {
         title: HOSTILE.to_owned(),
-        kind: Kind::Emotion,
+        kind: StateKind::Emotion,
         end_s: 40.0,
         rows: vec![BandRow {
             label: HOSTILE.to_owned(),
@@ -100,7 +101,7 @@ fn a_long_row_has_a_bounded_size() {
     }
     let chart = Bands {
         title: "long".to_owned(),
-        kind: Kind::Behavior,
+        kind: StateKind::Behavior,
         end_s: 500_000.0,
         rows: vec![BandRow {
             label: "one".to_owned(),
@@ -118,7 +119,7 @@ fn a_matrix_has_a_cell_for_each_value() {
         let labels: Vec<MatrixLabel> = (0..size)
             .map(|index| MatrixLabel {
                 text: format!("{HOSTILE}{index}"),
-                color: Some(state_class(Kind::Behavior, "WAIT")),
+                color: Some(state_class(StateKind::Behavior, "WAIT")),
             })
             .collect();
         let mut cells = Vec::new();
@@ -183,7 +184,7 @@ fn intervals_have_a_marker_for_each_estimate() {
         rows.push(IntervalRow {
             label: format!("{HOSTILE} {arm}"),
             arm,
-            estimate: (arm != 3).then(|| Estimate {
+            estimate: (arm != 3).then(|| PlottedEstimate {
                 is_filled: arm % 2 == 0,
                 ..estimate(arm as f64)
             }),
@@ -337,7 +338,7 @@ fn curves_are_thinned_to_what_can_be_seen() {
     for index in 0..100_000 {
         let x = f64::from(index) / 100.0;
         let y = 1.0 - x / 1000.0;
-        steps.push(Step {
+        steps.push(CurveStep {
             x,
             y,
             band: Some(((y - 0.1).max(0.0), (y + 0.1).min(1.0))),
@@ -369,7 +370,7 @@ fn curves_are_thinned_to_what_can_be_seen() {
 fn charts_of_nothing_are_drawn() {
     let bands = Bands {
         title: String::new(),
-        kind: Kind::Emotion,
+        kind: StateKind::Emotion,
         end_s: 0.0,
         rows: Vec::new(),
     };
@@ -404,7 +405,7 @@ fn a_page_is_well_formed_and_loads_nothing() {
     table.row([HOSTILE.into(), Cell::Number(0.1 + 0.2, 1)]);
     table.row([Cell::Code(HOSTILE.to_owned()), Cell::Empty]);
     let figure = Figure {
-        panels: vec![Panel {
+        panels: vec![ChartPanel {
             heading: HOSTILE.to_owned(),
             svg: String::new(),
             is_wide: false,

@@ -5,7 +5,7 @@
     reason = "a test that cannot set up its subject fails"
 )]
 
-use pictures::diagram::{Diagram, MAX_ITEMS, Options, TooMuch};
+use pictures::diagram::{Diagram, DiagramOptions, MAX_ITEMS, TooMuch};
 use pictures::{style, width_px};
 use protocol::event::Cause;
 use protocol::messages::{Awaited, FaultKind, Performative, Point, Reason};
@@ -126,7 +126,7 @@ fn draw_with(
     events: &[(Tick, Event)],
     from: Tick,
     to: Tick,
-    options: Options,
+    options: DiagramOptions,
 ) -> Result<String, TooMuch> {
     let of_tick = |tick: Tick| -> Vec<Event> {
         let mut all = if tick == 0 { start() } else { Vec::new() };
@@ -151,7 +151,7 @@ fn draw_with(
 }
 
 fn draw(events: &[(Tick, Event)], from: Tick, to: Tick) -> String {
-    draw_with(events, from, to, Options::default()).unwrap()
+    draw_with(events, from, to, DiagramOptions::default()).unwrap()
 }
 
 /// The elements of a class, in their order.
@@ -495,7 +495,7 @@ fn what_was_over_before_the_window_is_not_in_it() {
 
 #[test]
 fn a_tick_that_was_held_up_names_the_robot_and_that_it_is_not_reproducible() {
-    let mut diagram = Diagram::new(Timeline::default(), 0.5, 0, Options::default());
+    let mut diagram = Diagram::new(Timeline::default(), 0.5, 0, DiagramOptions::default());
     diagram.tick(0, &start(), &[]);
     let awaited = Awaited {
         name: name("Leguin"),
@@ -594,10 +594,10 @@ fn heading_and_legend_fit_however_short_the_window_is() {
     let title = "a title of a run that is not short, seed 17";
 
     for tick_px in [None, Some(3.0)] {
-        let options = Options {
+        let options = DiagramOptions {
             title: title.to_owned(),
             tick_px,
-            ..Options::default()
+            ..DiagramOptions::default()
         };
         let text = draw_with(&events, 5, 5, options).unwrap();
         let document = Document::parse(&text).unwrap();
@@ -627,9 +627,9 @@ fn lost_queries_are_drawn_on_demand() {
         (tick, event)
     };
     let events = [lost(5), lost(6), lost(9)];
-    let with = Options {
+    let with = DiagramOptions {
         queries: true,
-        ..Options::default()
+        ..DiagramOptions::default()
     };
 
     let svg = draw_with(&events, 0, 40, with).unwrap();
@@ -663,9 +663,9 @@ fn quiet_time_of_a_wide_window_is_a_gap_unless_the_whole_is_wanted() {
     let after = x_of(&document, 401) - x_of(&document, 400);
     assert!((before - after).abs() < 0.05, "{before} {after}");
 
-    let whole = Options {
+    let whole = DiagramOptions {
         is_whole: true,
-        ..Options::default()
+        ..DiagramOptions::default()
     };
     let svg = draw_with(&events, 0, 420, whole).unwrap();
     let document = Document::parse(&svg).unwrap();
@@ -705,9 +705,9 @@ fn texts_of_robots_cannot_leave_their_place() {
         (13, behavior("Butler", hostile)),
         (14, sent(2, &"<".repeat(100_000))),
     ];
-    let options = Options {
+    let options = DiagramOptions {
         title: hostile.to_owned(),
-        ..Options::default()
+        ..DiagramOptions::default()
     };
     let svg = draw_with(&events, 0, 300, options).unwrap();
 
@@ -788,7 +788,7 @@ fn ten_thousand_events_are_a_picture_of_a_few_megabytes_without_labels_over_labe
 #[test]
 fn a_window_with_too_much_is_refused() {
     let events = eventful(12_000);
-    let drawn = draw_with(&events, 0, 12_000, Options::default());
+    let drawn = draw_with(&events, 0, 12_000, DiagramOptions::default());
     let refused = drawn.err().unwrap();
     // A band for every third tick, a command for each, the last bands, and the begin of a run.
     assert_eq!(refused.items, 11_999 + 3_999 + 4);
@@ -803,9 +803,9 @@ fn a_window_with_too_much_is_refused() {
 fn a_picture_has_its_style_or_leaves_it_to_the_page() {
     let with = draw(&[], 0, 10);
     assert!(with.contains("prefers-color-scheme:dark") && with.contains("@media screen"));
-    let options = Options {
+    let options = DiagramOptions {
         has_style: false,
-        ..Options::default()
+        ..DiagramOptions::default()
     };
     let without = draw_with(&[], 0, 10, options).unwrap();
     assert!(!without.contains("<style") && !without.contains("style="));

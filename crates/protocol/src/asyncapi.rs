@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 use crate::keys::{Keys, QUERIES, STATE};
 use crate::messages::{
     Answer, Clock, Command, Control, ControlAnswer, FaultOrder, JoinAnswer, JoinRequest, LogRecord,
-    News, Panel, ParametersAnswer, ParametersOffer, PublicState, Report, Waiting, WorldFrame,
+    Panel, ParametersAnswer, ParametersOffer, PublicState, Report, TickUpdate, Waiting, WorldFrame,
 };
 use crate::name::{RobotName, RunName};
 
@@ -304,7 +304,7 @@ fn messages(schemas: &mut SchemaGenerator) -> Map<String, Value> {
         ("panel", one::<Panel>),
         ("parameters_answer", one::<ParametersAnswer>),
         ("parameters_offer", one::<ParametersOffer>),
-        ("news", one::<News>),
+        ("news", one::<TickUpdate>),
         ("public_state", one::<PublicState>),
         ("report", one::<Report>),
         ("waiting", one::<Waiting>),

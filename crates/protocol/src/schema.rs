@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 use schemars::{JsonSchema, Schema, schema_for};
 
 use crate::messages::{
-    Answer, Clock, Command, Control, ControlAnswer, JoinAnswer, JoinRequest, LogRecord, News,
-    Panel, ParametersAnswer, ParametersOffer, PublicState, Report, Waiting, WorldFrame,
+    Answer, Clock, Command, Control, ControlAnswer, JoinAnswer, JoinRequest, LogRecord, Panel,
+    ParametersAnswer, ParametersOffer, PublicState, Report, TickUpdate, Waiting, WorldFrame,
 };
 
 /// The schema of every message, by the name of its file.
@@ -27,7 +27,7 @@ pub fn all() -> BTreeMap<&'static str, Schema> {
         ("fault_order", one::<crate::messages::FaultOrder>()),
         ("join_answer", one::<JoinAnswer>()),
         ("join_request", one::<JoinRequest>()),
-        ("news", one::<News>()),
+        ("news", one::<TickUpdate>()),
         ("log_record", one::<LogRecord>()),
         ("panel", one::<Panel>()),
         ("parameters_answer", one::<ParametersAnswer>()),

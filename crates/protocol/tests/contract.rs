@@ -4,8 +4,8 @@
 
 use protocol::messages::{
     Clock, Command, Control, Correction, Delivery, End, Face, JoinRequest, LogRecord, MAX_ENTRIES,
-    MAX_TEXT_BYTES, NEWS_FLAGS, News, Panel, Performative, Point, Report, SensedBody, SensedKind,
-    SensedRobot, Tone, Variable, Widget,
+    MAX_TEXT_BYTES, NEWS_FLAGS, Panel, Performative, Point, Report, SensedBody, SensedKind,
+    SensedRobot, TickUpdate, Tone, Variable, Widget,
 };
 use protocol::{Message, RobotName, RunName, decode, encode, schema};
 
@@ -34,8 +34,8 @@ fn report() -> Report {
     }
 }
 
-fn news() -> News {
-    News {
+fn news() -> TickUpdate {
+    TickUpdate {
         epoch: 2,
         tick: 7,
         joined: Some(2),
@@ -157,10 +157,10 @@ fn the_size_of_a_clock_does_not_depend_on_the_number_of_robots() {
 
 #[test]
 fn news_of_nothing_are_empty() {
-    let nothing = News {
+    let nothing = TickUpdate {
         epoch: 2,
         tick: 7,
-        ..News::default()
+        ..TickUpdate::default()
     };
     assert_eq!(encode(&nothing), br#"{"epoch":2,"tick":7}"#);
     assert!(nothing.is_empty());
@@ -191,7 +191,7 @@ fn unknown_fields_are_ignored_and_absent_lists_are_empty() {
     let text = br#"{"epoch":1,"tick":2,"weather":"fine"}"#;
     let clock: Clock = decode("key", "sender", text).unwrap();
     assert_eq!((clock.news, clock.end), (0, None));
-    let news: News = decode("key", "sender", text).unwrap();
+    let news: TickUpdate = decode("key", "sender", text).unwrap();
     assert!(news.is_empty());
 }
 
@@ -267,7 +267,7 @@ fn malformed_news_are_named_by_key_sender_and_field() {
     ] {
         assert!(good.contains(from), "{from} is not in {good}");
         let damaged = good.replacen(from, to, 1);
-        let error = decode::<News>(key, "simulator", damaged.as_bytes()).unwrap_err();
+        let error = decode::<TickUpdate>(key, "simulator", damaged.as_bytes()).unwrap_err();
         assert_eq!(
             (error.key.as_str(), error.sender.as_str()),
             (key, "simulator")
@@ -281,7 +281,7 @@ fn news_are_bounded() {
     let with_text = |bytes: usize| {
         let mut long = news();
         long.commands[0].command = "x".repeat(bytes);
-        decode::<News>("key", "simulator", &encode(&long))
+        decode::<TickUpdate>("key", "simulator", &encode(&long))
     };
     assert!(with_text(MAX_TEXT_BYTES).is_ok());
     let error = with_text(MAX_TEXT_BYTES + 1).unwrap_err();
@@ -291,7 +291,7 @@ fn news_are_bounded() {
     let with_commands = |count: usize| {
         let mut many = news();
         many.commands = vec![many.commands[0].clone(); count];
-        decode::<News>("key", "simulator", &encode(&many))
+        decode::<TickUpdate>("key", "simulator", &encode(&many))
     };
     assert!(with_commands(MAX_ENTRIES + 1).is_ok());
     let error = with_commands(100_000).unwrap_err();
@@ -389,7 +389,7 @@ fn garbage_never_panics() {
         assert!(decode::<Report>("key", "x", &bytes).is_err());
         assert!(decode::<JoinRequest>("key", "x", &bytes).is_err());
         assert!(decode::<Clock>("key", "x", &bytes).is_err());
-        assert!(decode::<News>("key", "x", &bytes).is_err());
+        assert!(decode::<TickUpdate>("key", "x", &bytes).is_err());
     }
 }
 

@@ -6,7 +6,7 @@
 use proptest::prelude::*;
 use protocol::messages::{
     Answer, Clock, Command, Control, ControlAnswer, FaultOrder, JoinAnswer, JoinRequest, LogRecord,
-    MAX_ENTRIES, MAX_TEXT_BYTES, MAX_WIDGETS, News, Panel, PublicState, Report, Waiting,
+    MAX_ENTRIES, MAX_TEXT_BYTES, MAX_WIDGETS, Panel, PublicState, Report, TickUpdate, Waiting,
     WorldFrame,
 };
 use protocol::{Message, RobotName, RunName, decode, encode};
@@ -101,7 +101,7 @@ fn survives(bytes: &[u8]) {
     one::<JoinAnswer>(bytes);
     one::<JoinRequest>(bytes);
     one::<LogRecord>(bytes);
-    one::<News>(bytes);
+    one::<TickUpdate>(bytes);
     one::<Panel>(bytes);
     one::<PublicState>(bytes);
     one::<Report>(bytes);
@@ -116,7 +116,7 @@ fn is_bounded(bytes: &[u8]) {
         assert!(report.log.iter().all(|line| line.len() <= MAX_TEXT_BYTES));
         assert!(report.proposal.x.is_finite() && report.speed_mps.is_finite());
     }
-    if let Ok(news) = decode::<News>("key", "a sender", bytes) {
+    if let Ok(news) = decode::<TickUpdate>("key", "a sender", bytes) {
         let texts = news.commands.iter().map(|delivery| &delivery.command);
         assert!(texts.map(String::len).all(|bytes| bytes <= MAX_TEXT_BYTES));
         assert!(news.tick < 1 << 53);

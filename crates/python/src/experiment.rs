@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use config::units::Time;
-use experiments::engine::{self, Options, Queue};
+use experiments::engine::{self, EngineOptions, Queue};
 use experiments::{Experiment, Plan, Provenance, Request, Results, Robots, Store};
 use lab::LabError;
 use protocol::random::MAX_SEED;
@@ -105,7 +105,7 @@ fn play(
     plan.check_begins()?;
     plan.save(folder)?;
 
-    let options = Options {
+    let options = EngineOptions {
         units: 0..plan.units(),
         jobs,
         retries_failed,

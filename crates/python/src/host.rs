@@ -10,7 +10,7 @@ use robot::{End, Host, HostError as RobotHostError, Robot, RobotArgs, RobotName}
 
 use crate::error::HostError;
 use crate::interrupt::interruptible;
-use crate::runner::{Failure, PythonRobot};
+use crate::runner::{FirstException, PythonRobot};
 
 type Robots = Vec<(RobotName, Box<dyn Robot>)>;
 
@@ -36,7 +36,7 @@ pub(crate) fn main(
     }
     print_diagnostics();
 
-    let failure = Failure::default();
+    let failure = FirstException::default();
     let mut robots: Robots = Vec::new();
     for name in &args.names {
         let object = make.call1((name.as_str(),))?;
@@ -63,7 +63,7 @@ pub(crate) fn take_part(
     let args = RobotArgs::try_parse_from(arguments)
         .map_err(|error| PyValueError::new_err(error.to_string()))?;
 
-    let failure = Failure::default();
+    let failure = FirstException::default();
     let mut robots_to_play: Robots = Vec::new();
     for (name, object) in robots {
         let name = RobotName::new(&name).map_err(crate::error::plain)?;
@@ -77,7 +77,7 @@ fn play(
     py: Python<'_>,
     robots: Robots,
     args: &RobotArgs,
-    failure: &Failure,
+    failure: &FirstException,
 ) -> PyResult<&'static str> {
     use_one_thread(py)?;
 
@@ -96,7 +96,7 @@ fn play(
 }
 
 /// What a robot raised, or why it cannot go on.
-fn exception(error: &RobotHostError, failure: &Failure) -> PyErr {
+fn exception(error: &RobotHostError, failure: &FirstException) -> PyErr {
     let raised = failure.take();
     raised.unwrap_or_else(|| HostError::new_err(error.to_string()))
 }

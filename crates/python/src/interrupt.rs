@@ -11,11 +11,11 @@ use pyo3::prelude::*;
 const INTERVAL: Duration = Duration::from_millis(50);
 
 /// Looks for signals now and then, on the thread that calls it.
-pub(crate) struct Watch {
+pub(crate) struct SignalCheck {
     last: Instant,
 }
 
-impl Watch {
+impl SignalCheck {
     /// Begins.
     pub(crate) fn begin() -> Self {
         Self {

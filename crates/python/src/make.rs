@@ -7,17 +7,17 @@ use robot::{Robot, RobotName};
 use scenario::Scenario;
 
 use crate::error::UnknownRobot;
-use crate::runner::{Failure, PythonRobot};
+use crate::runner::{FirstException, PythonRobot};
 
 /// What makes robots of Python, by their names: classes, or functions without arguments.
 pub(crate) struct Makers {
     makers: BTreeMap<String, Py<PyAny>>,
-    failure: Failure,
+    failure: FirstException,
 }
 
 impl Makers {
     /// Takes the makers. What they or their robots raise is kept in `failure`.
-    pub(crate) fn new(makers: BTreeMap<String, Py<PyAny>>, failure: &Failure) -> Self {
+    pub(crate) fn new(makers: BTreeMap<String, Py<PyAny>>, failure: &FirstException) -> Self {
         Self {
             makers,
             failure: failure.clone(),

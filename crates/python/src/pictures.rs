@@ -9,7 +9,7 @@ use lab::moment::Moment;
 use pictures::Page;
 use pyo3::prelude::*;
 use record::RunFolder;
-use reports::diagram::{Options, Window, draw};
+use reports::diagram::{DiagramOptions, Window, draw};
 use reports::{of_experiment, of_runs};
 
 use crate::error::{plain, reported};
@@ -61,11 +61,11 @@ pub(crate) fn diagram(
             title += &format!(", epoch {}", files.epoch);
         }
 
-        let options = Options {
+        let options = DiagramOptions {
             title,
             queries,
             is_whole: whole,
-            ..Options::default()
+            ..DiagramOptions::default()
         };
         draw(&files, window, options)
     });

@@ -17,9 +17,9 @@ use record::{IfTaken, RunFolder};
 use scenario::Scenario;
 
 use crate::error::{argument, plain, read, reported};
-use crate::interrupt::Watch;
+use crate::interrupt::SignalCheck;
 use crate::make::Makers;
-use crate::runner::Failure;
+use crate::runner::FirstException;
 
 /// Changes of a scenario, each as after `--set`.
 pub(crate) fn overrides(set: &[String]) -> PyResult<Vec<Override>> {
@@ -63,7 +63,7 @@ pub(crate) fn run(
         set: overrides(&set)?,
     };
 
-    let failure = Failure::default();
+    let failure = FirstException::default();
     let makers = Makers::new(robots, &failure);
     py.detach(|| play(&file, &options, &makers, &failure))
 }
@@ -72,7 +72,7 @@ fn play(
     file: &Path,
     options: &RunOptions,
     makers: &Makers,
-    failure: &Failure,
+    failure: &FirstException,
 ) -> PyResult<(PathBuf, String)> {
     let scenario = scenario_of(file)?;
     let scenario = Scenario::load(&scenario, &options.changes()).map_err(reported)?;
@@ -83,7 +83,7 @@ fn play(
     let folder = &made.folder;
     let speed = options.speed.and_then(|speed| speed.0);
 
-    let watch = RefCell::new(Watch::begin());
+    let watch = RefCell::new(SignalCheck::begin());
     let goes_on = || {
         watch.borrow_mut().look().map_err(|error| {
             failure.set(error);

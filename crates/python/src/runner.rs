@@ -14,9 +14,9 @@ use crate::values::{read_action, variables};
 
 /// The first exception that a robot of this process raised, or that ended what it takes part in.
 #[derive(Clone, Default)]
-pub(crate) struct Failure(Arc<Mutex<Option<PyErr>>>);
+pub(crate) struct FirstException(Arc<Mutex<Option<PyErr>>>);
 
-impl Failure {
+impl FirstException {
     /// Keeps an exception, unless there is one.
     pub(crate) fn set(&self, error: PyErr) {
         let mut first = self.0.lock().unwrap_or_else(PoisonError::into_inner);
@@ -42,12 +42,12 @@ pub(crate) struct PythonRobot {
     is_quick: bool,
     /// What it is given in every tick of an epoch.
     cars: Option<Py<Cars>>,
-    failure: Failure,
+    failure: FirstException,
 }
 
 impl PythonRobot {
     /// Takes a robot. What it raises is kept in `failure`.
-    pub(crate) fn new(object: &Bound<'_, PyAny>, failure: &Failure) -> PyResult<Self> {
+    pub(crate) fn new(object: &Bound<'_, PyAny>, failure: &FirstException) -> PyResult<Self> {
         Ok(Self {
             senses_bodies: object.getattr("senses_bodies")?.is_truthy()?,
             is_quick: object.getattr("is_quick")?.is_truthy()?,

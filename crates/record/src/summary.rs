@@ -46,9 +46,9 @@ pub struct Summary {
     pub network: NetworkSummary,
     /// The verdicts on what the scenario expects of the run, by the names of the expectations.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub expectations: BTreeMap<String, Judged>,
+    pub expectations: BTreeMap<String, ExpectationVerdict>,
     /// Wall-clock times; they differ from run to run.
-    pub wall: Wall,
+    pub wall: WallSummary,
     #[serde(skip)]
     begun: Option<Instant>,
     #[serde(skip)]
@@ -60,7 +60,7 @@ pub struct Summary {
 
 /// A verdict on an expectation.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Judged {
+pub struct ExpectationVerdict {
     /// The verdict.
     pub verdict: Verdict,
     /// The tick in which it was decided.
@@ -96,7 +96,7 @@ pub struct RobotSummary {
 
 /// Wall-clock times and counts.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Wall {
+pub struct WallSummary {
     /// Duration of the run, seconds.
     pub elapsed_s: f64,
     /// Robots for which the clock was held long enough to be reported.
@@ -202,7 +202,7 @@ impl Summary {
             robots: robots.collect(),
             network: NetworkSummary::default(),
             expectations: BTreeMap::new(),
-            wall: Wall::default(),
+            wall: WallSummary::default(),
             begun: None,
             timeline: Timeline::default(),
             counts: Counts::default(),
@@ -230,7 +230,7 @@ impl Summary {
                 verdict,
                 because,
             } => {
-                let judged = Judged {
+                let judged = ExpectationVerdict {
                     verdict: *verdict,
                     tick,
                     because: because.clone(),

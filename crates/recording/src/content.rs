@@ -80,7 +80,7 @@ pub struct RecordedTick {
     /// The newest panel of each robot from which one arrived during the tick. Not reproducible.
     pub panels: BTreeMap<RobotName, Panel>,
     /// Wall-clock times. Not reproducible.
-    pub wall: Wall,
+    pub wall: WallTimes,
 }
 
 /// Everything that is recorded of one tick, of which nothing is copied: a [`RecordedTick`].
@@ -95,7 +95,7 @@ pub struct TickView<'a> {
     /// The newest panels.
     pub panels: &'a BTreeMap<RobotName, Panel>,
     /// Wall-clock times.
-    pub wall: &'a Wall,
+    pub wall: &'a WallTimes,
 }
 
 impl TickView<'_> {
@@ -131,7 +131,7 @@ impl RecordedTick {
     }
 }
 
-fn log(tick: Tick, events: &[Event], wall: &Wall, header: &Header) -> Vec<LogRecord> {
+fn log(tick: Tick, events: &[Event], wall: &WallTimes, header: &Header) -> Vec<LogRecord> {
     let mut lines = wall.late.clone();
     for event in events {
         lines.extend(event.log_record(header.epoch, tick, header.tick_s));
@@ -151,7 +151,7 @@ pub struct RawTick {
     /// The newest panels.
     pub panels: BTreeMap<RobotName, Json>,
     /// Wall-clock times.
-    pub wall: Wall,
+    pub wall: WallTimes,
 }
 
 impl RawTick {
@@ -304,7 +304,7 @@ pub struct Missed {
 
 /// Wall-clock times of a tick, in nanoseconds since the epoch began. They differ from run to run.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
-pub struct Wall {
+pub struct WallTimes {
     /// When the tick was opened.
     pub opened_ns: u64,
     /// When every awaited report was there.

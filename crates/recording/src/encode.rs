@@ -7,12 +7,12 @@ use protocol::{Event, Line, RobotName, Tick};
 use schemars::{JsonSchema, schema_for};
 use serde::Serialize;
 
-use crate::content::{Frame, Header, TickView, Wall};
+use crate::content::{Frame, Header, TickView, WallTimes};
 use crate::file::{Channels, Chunk, MessageHead};
 use crate::json;
 use crate::protobuf::Protobuf;
 use crate::topic::{Topic, View};
-use crate::viewers::{self, Schema};
+use crate::viewers::{self, ViewerSchema};
 
 /// Simulated time between two pictures for viewers, seconds.
 const VIEW_INTERVAL_S: f64 = 1.0;
@@ -62,12 +62,16 @@ impl Encoder {
             header: add_topic::<Header>(&mut channels, &Topic::Header, "cars.Header"),
             frame: add_topic::<Frame>(&mut channels, &Topic::Frame, "cars.Frame"),
             events: add_topic::<Line>(&mut channels, &Topic::Events, "cars.Event"),
-            wall: add_topic::<Wall>(&mut channels, &Topic::Wall, "cars.Wall"),
-            field: add_view(&mut channels, &View::Field, Schema::SceneUpdate),
-            scene: add_view(&mut channels, &View::Robots, Schema::SceneUpdate),
-            guests: add_view(&mut channels, &View::Guests, Schema::PointCloud),
-            transforms: add_view(&mut channels, &View::Transforms, Schema::FrameTransforms),
-            log: add_view(&mut channels, &View::Log, Schema::Log),
+            wall: add_topic::<WallTimes>(&mut channels, &Topic::Wall, "cars.Wall"),
+            field: add_view(&mut channels, &View::Field, ViewerSchema::SceneUpdate),
+            scene: add_view(&mut channels, &View::Robots, ViewerSchema::SceneUpdate),
+            guests: add_view(&mut channels, &View::Guests, ViewerSchema::PointCloud),
+            transforms: add_view(
+                &mut channels,
+                &View::Transforms,
+                ViewerSchema::FrameTransforms,
+            ),
+            log: add_view(&mut channels, &View::Log, ViewerSchema::Log),
         };
 
         let mut robots = BTreeMap::new();
@@ -78,7 +82,7 @@ impl Encoder {
             let ids = RobotIds {
                 report: add_topic::<Report>(&mut channels, &report, "cars.Report"),
                 panel: add_topic::<Panel>(&mut channels, &panel, "cars.Panel"),
-                pose: add_view(&mut channels, &pose, Schema::PoseInFrame),
+                pose: add_view(&mut channels, &pose, ViewerSchema::PoseInFrame),
             };
             robots.insert(robot.clone(), ids);
         }
@@ -204,7 +208,7 @@ fn add_topic<M: JsonSchema>(channels: &mut Channels, topic: &Topic, schema: &'st
 }
 
 /// Adds a channel that viewers draw.
-fn add_view(channels: &mut Channels, view: &View, schema: Schema) -> u16 {
+fn add_view(channels: &mut Channels, view: &View, schema: ViewerSchema) -> u16 {
     let schema = channels.add_schema(schema.name(), "protobuf", schema.descriptor());
     channels.add_channel(&view.to_string(), schema, "protobuf")
 }

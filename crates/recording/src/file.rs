@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, Write};
 
-use crate::format::{MAGIC, Record, op};
+use crate::format::{MAGIC, RecordBytes, op};
 
 /// Level of compression. From level 3 on `.cargo/config.toml` leaves out what zstd would use, to compile less C code. Level -1 saves
 /// an eighth of the bytes, for a tenth more of the time that recording takes.
@@ -62,7 +62,7 @@ impl Chunk {
             offset: self.content.len() as u64,
         });
 
-        let mut record = Record::begin(&mut self.content, op::MESSAGE);
+        let mut record = RecordBytes::begin(&mut self.content, op::MESSAGE);
         record.u16(head.channel);
         record.u32(head.sequence);
         record.u64(head.time_ns);
@@ -98,7 +98,7 @@ impl Channels {
 
         let id = self.schema_ids.len() as u16 + 1;
         self.schema_ids.insert(name, id);
-        let mut record = Record::begin(&mut self.schemas, op::SCHEMA);
+        let mut record = RecordBytes::begin(&mut self.schemas, op::SCHEMA);
         record.u16(id);
         record.text(name);
         record.text(encoding);
@@ -112,7 +112,7 @@ impl Channels {
     pub(crate) fn add_channel(&mut self, topic: &str, schema: u16, encoding: &str) -> u16 {
         let id = self.channel_count;
         self.channel_count += 1;
-        let mut record = Record::begin(&mut self.channels, op::CHANNEL);
+        let mut record = RecordBytes::begin(&mut self.channels, op::CHANNEL);
         record.u16(id);
         record.u16(schema);
         record.text(topic);
@@ -177,7 +177,7 @@ impl McapFile {
             },
         };
 
-        let mut record = Record::begin(&mut begun.records, op::HEADER);
+        let mut record = RecordBytes::begin(&mut begun.records, op::HEADER);
         record.text(profile);
         record.text("cars");
         record.end();
@@ -191,13 +191,13 @@ impl McapFile {
         name: &str,
         metadata: &BTreeMap<String, String>,
     ) -> io::Result<()> {
-        let mut record = Record::begin(&mut self.records, op::METADATA);
+        let mut record = RecordBytes::begin(&mut self.records, op::METADATA);
         record.text(name);
         record.map(metadata);
         record.end();
 
         self.index.metadata_count += 1;
-        let mut entry = Record::begin(&mut self.index.metadata, op::METADATA_INDEX);
+        let mut entry = RecordBytes::begin(&mut self.index.metadata, op::METADATA_INDEX);
         entry.u64(self.len);
         entry.u64(self.records.len() as u64);
         entry.text(name);
@@ -207,7 +207,7 @@ impl McapFile {
 
     /// Attaches data.
     pub(crate) fn attach(&mut self, name: &str, media_type: &str, data: &[u8]) -> io::Result<()> {
-        let mut record = Record::begin(&mut self.records, op::ATTACHMENT);
+        let mut record = RecordBytes::begin(&mut self.records, op::ATTACHMENT);
         record.u64(0);
         record.u64(0);
         record.text(name);
@@ -220,7 +220,7 @@ impl McapFile {
         record.end();
 
         self.index.attachment_count += 1;
-        let mut entry = Record::begin(&mut self.index.attachments, op::ATTACHMENT_INDEX);
+        let mut entry = RecordBytes::begin(&mut self.index.attachments, op::ATTACHMENT_INDEX);
         entry.u64(self.len);
         entry.u64(self.records.len() as u64);
         entry.u64(0);
@@ -242,7 +242,7 @@ impl McapFile {
         self.compressor
             .compress_to_buffer(&chunk.content, &mut self.compressed)?;
 
-        let mut record = Record::begin(&mut self.records, op::CHUNK);
+        let mut record = RecordBytes::begin(&mut self.records, op::CHUNK);
         record.u64(first_ns);
         record.u64(last_ns);
         record.u64(chunk.content.len() as u64);
@@ -256,7 +256,7 @@ impl McapFile {
         let message_indexes = self.add_message_indexes(chunk);
         let message_indexes_len = self.records.len() as u64 - chunk_len;
 
-        let mut entry = Record::begin(&mut self.index.chunks, op::CHUNK_INDEX);
+        let mut entry = RecordBytes::begin(&mut self.index.chunks, op::CHUNK_INDEX);
         entry.u64(first_ns);
         entry.u64(last_ns);
         entry.u64(self.len);
@@ -291,7 +291,7 @@ impl McapFile {
             offsets.insert(channel, self.len + self.records.len() as u64);
             *self.index.messages.entry(channel).or_default() += messages.len() as u64;
 
-            let mut record = Record::begin(&mut self.records, op::MESSAGE_INDEX);
+            let mut record = RecordBytes::begin(&mut self.records, op::MESSAGE_INDEX);
             record.u16(channel);
             record.u32(messages.len() as u32 * (8 + 8));
             for message in messages {
@@ -310,7 +310,7 @@ impl McapFile {
 
     /// Writes the index and ends the file.
     pub(crate) fn finish(mut self) -> io::Result<()> {
-        let mut record = Record::begin(&mut self.records, op::DATA_END);
+        let mut record = RecordBytes::begin(&mut self.records, op::DATA_END);
         // Of all bytes before this record, which is written only now.
         record.u32(self.crc.clone().finalize());
         record.end();
@@ -336,7 +336,7 @@ impl McapFile {
 
         let offsets_start = summary_start + self.records.len() as u64;
         for (op, start, len) in groups {
-            let mut record = Record::begin(&mut self.records, op::SUMMARY_OFFSET);
+            let mut record = RecordBytes::begin(&mut self.records, op::SUMMARY_OFFSET);
             record.bytes.push(op);
             record.u64(start);
             record.u64(len);
@@ -369,7 +369,7 @@ impl WrittenIndex {
     fn statistics(&self) -> Vec<u8> {
         let (first_ns, last_ns) = self.times_ns.unwrap_or((0, 0));
         let mut bytes = Vec::new();
-        let mut record = Record::begin(&mut bytes, op::STATISTICS);
+        let mut record = RecordBytes::begin(&mut bytes, op::STATISTICS);
 
         record.u64(self.messages.values().sum());
         record.u16(self.channels.schema_ids.len() as u16);

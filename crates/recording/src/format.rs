@@ -26,13 +26,13 @@ pub(crate) mod op {
 }
 
 /// A record that is appended to bytes: an operation code, its length, and fields in little-endian.
-pub(crate) struct Record<'a> {
+pub(crate) struct RecordBytes<'a> {
     pub(crate) bytes: &'a mut Vec<u8>,
     /// Where its body begins.
     body: usize,
 }
 
-impl<'a> Record<'a> {
+impl<'a> RecordBytes<'a> {
     pub(crate) fn begin(bytes: &'a mut Vec<u8>, op: u8) -> Self {
         bytes.push(op);
         bytes.extend_from_slice(&[0; 8]);

@@ -34,7 +34,7 @@ pub(crate) struct Bytes {
 
 /// A chunk of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Chunk {
+pub(crate) struct ChunkLocation {
     pub(crate) offset: u64,
     /// Simulated time of its first message, nanoseconds.
     pub(crate) start_ns: u64,
@@ -47,7 +47,7 @@ pub(crate) struct Chunk {
 /// The parts of a file.
 #[derive(Debug, Default)]
 pub(crate) struct Index {
-    pub(crate) chunks: Vec<Chunk>,
+    pub(crate) chunks: Vec<ChunkLocation>,
     /// Offset of the attached scenario.
     pub(crate) scenario: Option<u64>,
     /// Offsets of the records of metadata.
@@ -328,7 +328,11 @@ impl Bytes {
     }
 
     /// The chunk at an offset, of which only the header is read.
-    fn scanned_chunk(&self, offset: u64, record: &RecordHead) -> Result<Chunk, RecordingError> {
+    fn scanned_chunk(
+        &self,
+        offset: u64,
+        record: &RecordHead,
+    ) -> Result<ChunkLocation, RecordingError> {
         // Three numbers of 8 bytes, a checksum, and the name of a compression with its length.
         let len = record.len.min(3 * 8 + 4 + 4 + 16);
         let body = self.read(record.body, len)?;
@@ -336,7 +340,7 @@ impl Bytes {
         let header =
             header.ok_or_else(|| self.name.damaged(record.body, &"a chunk without a header"))?;
 
-        Ok(Chunk {
+        Ok(ChunkLocation {
             offset,
             start_ns: header.start_ns,
             end_ns: header.end_ns,
@@ -345,7 +349,7 @@ impl Bytes {
     }
 
     /// The content of a chunk: decompressed and compared with its checksum.
-    pub(crate) fn chunk(&self, chunk: &Chunk) -> Result<Vec<u8>, RecordingError> {
+    pub(crate) fn chunk(&self, chunk: &ChunkLocation) -> Result<Vec<u8>, RecordingError> {
         let damaged = |reason: &dyn Display| self.name.damaged(chunk.offset, reason);
 
         let body = self.body_at(chunk.offset, op::CHUNK)?;
@@ -395,7 +399,7 @@ impl Bytes {
 }
 
 /// A chunk as the index has it.
-fn indexed_chunk(fields: &mut Fields<'_>) -> Option<Chunk> {
+fn indexed_chunk(fields: &mut Fields<'_>) -> Option<ChunkLocation> {
     let start_ns = fields.u64()?;
     let end_ns = fields.u64()?;
     let offset = fields.u64()?;
@@ -407,7 +411,7 @@ fn indexed_chunk(fields: &mut Fields<'_>) -> Option<Chunk> {
     fields.text()?;
     let _compressed_size = fields.u64()?;
 
-    Some(Chunk {
+    Some(ChunkLocation {
         offset,
         start_ns,
         end_ns,

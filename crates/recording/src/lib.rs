@@ -20,7 +20,7 @@ mod viewers;
 mod write;
 
 pub use content::{
-    Frame, Header, Json, PlacedRobot, RawTick, RecordedTick, TickEvents, TickView, Wall,
+    Frame, Header, Json, PlacedRobot, RawTick, RecordedTick, TickEvents, TickView, WallTimes,
 };
 pub use damage::RecordingError;
 pub use read::Recording;

@@ -9,10 +9,10 @@ use protocol::{Event, Line, RobotName, Tick};
 use serde::de::DeserializeOwned;
 
 use crate::METADATA;
-use crate::content::{Frame, Header, Json, RawTick, RecordedTick, TickEvents, Wall};
+use crate::content::{Frame, Header, Json, RawTick, RecordedTick, TickEvents, WallTimes};
 use crate::damage::{Name, RecordingError};
 use crate::format::{Fields, op};
-use crate::index::{Bytes, Chunk};
+use crate::index::{Bytes, ChunkLocation};
 use crate::topic::Topic;
 
 /// Ticks that are read from the file in one go.
@@ -36,7 +36,7 @@ pub struct Recording {
 /// A chunk and its first and last tick.
 #[derive(Debug)]
 struct TickChunk {
-    chunk: Chunk,
+    chunk: ChunkLocation,
     first: Tick,
     last: Tick,
 }
@@ -52,7 +52,7 @@ struct ChunkMessage<'a> {
 #[derive(Default)]
 struct Partial {
     frame: Option<Frame>,
-    wall: Option<Wall>,
+    wall: Option<WallTimes>,
     events: Vec<Event>,
     reports: BTreeMap<RobotName, Json>,
     panels: BTreeMap<RobotName, Json>,
@@ -366,7 +366,7 @@ impl Recording {
     /// does the end of a run, and other programs that write the file anew end a chunk anywhere.
     fn add_chunks(
         &mut self,
-        chunks: impl IntoIterator<Item = Chunk>,
+        chunks: impl IntoIterator<Item = ChunkLocation>,
     ) -> Result<(), RecordingError> {
         for chunk in chunks {
             let first = self.header.tick_at(chunk.start_ns);
@@ -420,7 +420,7 @@ struct Preamble {
 }
 
 /// Reads the header and the channels, which are in the first chunk.
-fn read_preamble(bytes: &Bytes, chunk: &Chunk) -> Result<Preamble, RecordingError> {
+fn read_preamble(bytes: &Bytes, chunk: &ChunkLocation) -> Result<Preamble, RecordingError> {
     let damaged = |reason: &dyn Display| bytes.name.damaged(chunk.offset, reason);
 
     let content = bytes.chunk(chunk)?;

@@ -14,7 +14,7 @@ const HEIGHT: f64 = 0.5;
 
 /// A kind of message, with the descriptor of its schema.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Schema {
+pub(crate) enum ViewerSchema {
     SceneUpdate,
     PointCloud,
     PoseInFrame,
@@ -22,7 +22,7 @@ pub(crate) enum Schema {
     Log,
 }
 
-impl Schema {
+impl ViewerSchema {
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::SceneUpdate => "foxglove.SceneUpdate",

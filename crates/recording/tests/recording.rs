@@ -15,7 +15,7 @@ use protocol::messages::{
 use protocol::{Event, RobotName, RunName, Tick};
 use recording::content::Missed;
 use recording::{
-    Frame, Header, PlacedRobot, RecordedTick, Recording, RecordingError, Wall, Writer,
+    Frame, Header, PlacedRobot, RecordedTick, Recording, RecordingError, WallTimes, Writer,
 };
 
 const SCENARIO: &str = "seed = 7\n";
@@ -127,7 +127,7 @@ fn tick(tick: Tick) -> RecordedTick {
         ],
         reports,
         panels,
-        wall: Wall {
+        wall: WallTimes {
             opened_ns: tick * 1000,
             completed_ns: tick * 1000 + 500,
             reports_ns: [(name("Butler"), tick * 1000 + 400)].into(),

@@ -7,7 +7,7 @@ use pictures::Text;
 use statistics::{Estimate, Interval};
 
 use super::study::{Study, is_shown, label};
-use experiments::{Contrast, Difference, SHOWN_P, least_p_holm};
+use experiments::{ArmDifference, Contrast, SHOWN_P, least_p_holm};
 
 /// Most comparisons that a sentence names.
 const MAX_NAMED: usize = 8;
@@ -81,11 +81,11 @@ pub(super) fn sentences(study: &Study<'_>, measure: &Measure) -> Vec<Text> {
 /// The mean difference of a contrast: that of its numbers, or of its times.
 fn mean(contrast: &Contrast) -> Option<&Estimate> {
     match &contrast.difference {
-        Difference::Number { mean, .. } => Some(mean),
-        Difference::Time {
+        ArmDifference::Number { mean, .. } => Some(mean),
+        ArmDifference::Time {
             restricted_mean_s, ..
         } => Some(restricted_mean_s),
-        Difference::NoPair | Difference::NotFinite => None,
+        ArmDifference::NoPair | ArmDifference::NotFinite => None,
     }
 }
 
@@ -132,8 +132,8 @@ fn numbers(measure: &Measure, contrast: &Contrast) -> String {
     let unit = measure.unit.as_ref();
     let unit = unit.map_or_else(String::new, |unit| format!("\u{a0}{unit}"));
     let difference = match &contrast.difference {
-        Difference::Number { mean, .. } => with_interval(mean, &unit),
-        Difference::Time {
+        ArmDifference::Number { mean, .. } => with_interval(mean, &unit),
+        ArmDifference::Time {
             share,
             restricted_mean_s,
             ..
@@ -142,7 +142,7 @@ fn numbers(measure: &Measure, contrast: &Contrast) -> String {
             with_interval(&share.scaled(100.0), " points"),
             with_interval(restricted_mean_s, "\u{a0}s")
         ),
-        Difference::NoPair | Difference::NotFinite => String::new(),
+        ArmDifference::NoPair | ArmDifference::NotFinite => String::new(),
     };
     let p = contrast.p_holm.map_or_else(String::new, p_value);
     format!("{difference}, n = {}, {p}", contrast.n)

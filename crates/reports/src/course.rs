@@ -1,12 +1,12 @@
 //! The course of a run: its states over time and its space-time diagram.
 
-use pictures::{BandRow, Bands, Panel};
+use pictures::{BandRow, Bands, ChartPanel};
 use protocol::{RobotName, Tick};
 use record::EpochFiles;
-use timeline::Kind;
+use timeline::StateKind;
 
 use super::facts::{RobotFacts, RunFacts};
-use crate::diagram::{Options, Window, draw};
+use crate::diagram::{DiagramOptions, Window, draw};
 use lab::LabError;
 use lab::moment::Moment;
 
@@ -25,7 +25,7 @@ const MAX_DIAGRAM_BYTES: usize = 400_000;
 const LINE_PX: f64 = 620.0;
 
 /// The states of the robots of one run over time; `None` if they have none.
-pub(super) fn run_panel(facts: &RunFacts, kind: Kind) -> Option<Panel> {
+pub(super) fn run_panel(facts: &RunFacts, kind: StateKind) -> Option<ChartPanel> {
     let row = |(name, robot): (&RobotName, &RobotFacts)| BandRow {
         label: name.to_string(),
         bands: robot.bands(kind).clone(),
@@ -36,28 +36,33 @@ pub(super) fn run_panel(facts: &RunFacts, kind: Kind) -> Option<Panel> {
 }
 
 /// Rows of states over time.
-pub(super) fn state_panel(rows: Vec<BandRow>, kind: Kind, end_s: f64, heading: &str) -> Panel {
+pub(super) fn state_panel(
+    rows: Vec<BandRow>,
+    kind: StateKind,
+    end_s: f64,
+    heading: &str,
+) -> ChartPanel {
     let chart = Bands {
         title: format!("{} over time {heading}", states_in_words(kind)),
         kind,
         end_s,
         rows,
     };
-    Panel::wide(heading, chart.draw())
+    ChartPanel::wide(heading, chart.draw())
 }
 
 /// What the states are.
-pub(super) fn states_in_words(kind: Kind) -> &'static str {
+pub(super) fn states_in_words(kind: StateKind) -> &'static str {
     match kind {
-        Kind::Emotion => "Emotions",
-        Kind::Behavior => "Behaviors",
+        StateKind::Emotion => "Emotions",
+        StateKind::Behavior => "Behaviors",
     }
 }
 
 /// A space-time diagram in lines.
 pub(super) struct DiagramLines {
     /// The lines, from top to bottom.
-    pub(super) lines: Vec<Panel>,
+    pub(super) lines: Vec<ChartPanel>,
     /// The last tick that they have.
     pub(super) last: Tick,
 }
@@ -81,17 +86,17 @@ pub(super) fn diagram_lines(
             from: Some(Moment::Tick(next)),
             to: Some(Moment::Tick(next + length - 1)),
         };
-        let options = Options {
+        let options = DiagramOptions {
             title: name.to_owned(),
             is_whole: true,
             has_style: false,
             has_legend: false,
             tick_px: Some(LINE_PX / length as f64),
-            ..Options::default()
+            ..DiagramOptions::default()
         };
         let svg = draw(files, window, options)?.svg;
         bytes += svg.len();
-        lines.push(Panel::wide("", svg));
+        lines.push(ChartPanel::wide("", svg));
         next += length;
     }
     Ok(DiagramLines {

@@ -11,7 +11,7 @@ use record::{Entry, Record};
 use recording::{Recording, RecordingError};
 use timeline::Timeline;
 
-pub use pictures::diagram::Options;
+pub use pictures::diagram::DiagramOptions;
 
 use lab::LabError;
 use lab::moment::Moment;
@@ -38,7 +38,11 @@ pub struct Drawn {
 ///
 /// # Errors
 /// If its events cannot be read, it has no tick in the window, or the window has too much for a diagram.
-pub fn draw(files: &EpochFiles, window: Window, mut options: Options) -> Result<Drawn, LabError> {
+pub fn draw(
+    files: &EpochFiles,
+    window: Window,
+    mut options: DiagramOptions,
+) -> Result<Drawn, LabError> {
     let events = files.events.display();
     let mut record = Record::of_events(&files.events)?;
     let mut next = record.next_entry()?;

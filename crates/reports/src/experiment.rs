@@ -6,7 +6,7 @@ use observe::{Measure, Measured};
 use pictures::{Cell, Figure, Page, Table, Text};
 use protocol::RunName;
 use record::{EpochFiles, RunFolder};
-use timeline::Kind;
+use timeline::StateKind;
 
 use super::answer::{lead, sentences};
 use super::course::{READ_DIAGRAM, diagram_lines, run_panel};
@@ -18,7 +18,7 @@ use super::study::{Study, label};
 use super::transitions::transitions;
 use super::words::{capitalized, counted, utc};
 use experiments::shell;
-use experiments::{Example, Outcome, Provenance, Results, Robots, Shown};
+use experiments::{Example, Provenance, Results, Robots, Shown, UnitOutcome};
 use lab::LabError;
 use lab::folder::recorded_epoch;
 use lab::run::execute;
@@ -277,8 +277,8 @@ fn baseline_name<'a>(study: &Study<'a>) -> &'a str {
 fn typical_and_worst<'a>(
     study: &Study<'a>,
     measure: &Measure,
-) -> Option<(&'a Outcome, &'a Outcome)> {
-    let value = |outcome: &Outcome| {
+) -> Option<(&'a UnitOutcome, &'a UnitOutcome)> {
+    let value = |outcome: &UnitOutcome| {
         let measured = outcome.measures.get(&measure.name)?;
         measured
             .value()
@@ -299,7 +299,7 @@ fn typical_and_worst<'a>(
         .filter_map(|outcome| Some((outcome, (value(outcome)? - median).abs())));
     let of_baseline = valued.clone().filter(|(one, _)| one.arm == baseline);
     let typical = of_baseline.min_by(|a, b| a.1.total_cmp(&b.1));
-    let fails = |outcome: &Outcome| {
+    let fails = |outcome: &UnitOutcome| {
         let verdicts = outcome.verdicts.values();
         verdicts.filter(|verdict| *verdict == "fail").count()
     };
@@ -315,7 +315,7 @@ fn write_example(
     page: &mut Page,
     study: &Study<'_>,
     folder: &Path,
-    (measure, outcome): (&Measure, &Outcome),
+    (measure, outcome): (&Measure, &UnitOutcome),
 ) {
     let measured = outcome
         .measures
@@ -342,7 +342,7 @@ fn write_example(
 }
 
 /// Plays a unit again, recorded in a temporary folder, and shows its course.
-fn write_course(page: &mut Page, study: &Study<'_>, outcome: &Outcome) -> Result<(), LabError> {
+fn write_course(page: &mut Page, study: &Study<'_>, outcome: &UnitOutcome) -> Result<(), LabError> {
     let plan = &study.results.plan;
     let unit = plan.unit(outcome.unit);
     let mut scenario =
@@ -388,8 +388,8 @@ fn write_course(page: &mut Page, study: &Study<'_>, outcome: &Outcome) -> Result
 }
 
 /// Emotions over time and the space-time diagram of a unit.
-fn course(outcome: &Outcome, facts: &RunFacts, files: &EpochFiles) -> Result<Figure, LabError> {
-    let mut panels = Vec::from_iter(run_panel(facts, Kind::Emotion));
+fn course(outcome: &UnitOutcome, facts: &RunFacts, files: &EpochFiles) -> Result<Figure, LabError> {
+    let mut panels = Vec::from_iter(run_panel(facts, StateKind::Emotion));
     let diagram = diagram_lines(&format!("unit {}", outcome.unit), facts, files)?;
     panels.extend(diagram.lines);
 

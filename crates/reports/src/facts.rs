@@ -11,7 +11,7 @@ use protocol::{Event, RobotName, Tick};
 use record::EpochFiles;
 use record::Record;
 use recording::{Recording, RecordingError};
-use timeline::{Counts, Kind, LinkCounts, Period, RobotCounts, Span, Stay, Timeline};
+use timeline::{Counts, LinkCounts, Period, RobotCounts, Span, StateKind, StateSpan, Timeline};
 
 /// Parts of the floor along its longer side.
 const PARTS: f64 = 50.0;
@@ -40,7 +40,7 @@ pub(super) struct RunFacts {
     /// Commands by sender and target.
     pub(super) links: BTreeMap<(RobotName, RobotName), LinkCounts>,
     /// Faults, absences, cuts and changes, in the order of their beginnings.
-    pub(super) disturbances: Vec<Disturbance>,
+    pub(super) disturbances: Vec<ScenarioEffect>,
     /// The verdicts about expectations, in the order in which they were decided.
     pub(super) judged: Vec<JudgedFacts>,
     /// Where the robots were, if it was recorded.
@@ -71,7 +71,7 @@ pub(super) struct JudgedFacts {
 
 /// Something that the scenario did to the robots or their network.
 #[derive(Debug)]
-pub(super) struct Disturbance {
+pub(super) struct ScenarioEffect {
     pub(super) what: String,
     pub(super) whom: String,
     pub(super) begin: Tick,
@@ -189,7 +189,7 @@ impl RunFacts {
             Span::Missed(_) | Span::QueriesLost(_) | Span::Command(_) | Span::Joined(_) => return,
         };
 
-        self.disturbances.push(Disturbance {
+        self.disturbances.push(ScenarioEffect {
             what,
             whom,
             begin: period.begin,
@@ -198,7 +198,7 @@ impl RunFacts {
     }
 
     /// Adds a stay of a robot in a state. States last until the last tick.
-    fn add_stay(&mut self, stay: Stay) {
+    fn add_stay(&mut self, stay: StateSpan) {
         let ticks = stay.period.ticks(self.last_tick);
         if ticks == 0 {
             return;
@@ -212,8 +212,8 @@ impl RunFacts {
         };
         let robot = self.robots.entry(stay.robot).or_default();
         let bands = match stay.kind {
-            Kind::Emotion => &mut robot.emotions,
-            Kind::Behavior => &mut robot.behaviors,
+            StateKind::Emotion => &mut robot.emotions,
+            StateKind::Behavior => &mut robot.behaviors,
         };
         bands.push(band);
     }
@@ -279,10 +279,10 @@ impl RunFacts {
 
 impl RobotFacts {
     /// Its states of a kind over time.
-    pub(super) fn bands(&self, kind: Kind) -> &Vec<Band> {
+    pub(super) fn bands(&self, kind: StateKind) -> &Vec<Band> {
         match kind {
-            Kind::Emotion => &self.emotions,
-            Kind::Behavior => &self.behaviors,
+            StateKind::Emotion => &self.emotions,
+            StateKind::Behavior => &self.behaviors,
         }
     }
 }

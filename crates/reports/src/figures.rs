@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use observe::Measure;
 use pictures::{
-    Cell, Curve, Figure, Matrix, MatrixCell, MatrixLabel, Panel, Step, Steps, Table, decimals_for,
-    fixed,
+    Cell, ChartPanel, Curve, CurveStep, Figure, Matrix, MatrixCell, MatrixLabel, Steps, Table,
+    decimals_for, fixed,
 };
 use protocol::messages::Verdict;
 use statistics::{Interval, ecdf};
@@ -14,7 +14,7 @@ use super::limits::panels;
 use super::quantity::{Of, Quantity, difference, widened};
 use super::study::{CellPlace, Study, axis, label, lines};
 use super::words::{capitalized, counted};
-use experiments::{Contrast, Difference, Estimated};
+use experiments::{ArmDifference, Contrast, Estimated};
 
 /// Most rows of a table.
 const MAX_ROWS: usize = 500;
@@ -51,7 +51,7 @@ pub(super) fn estimates(study: &Study<'_>, measure: &Measure) -> Figure {
             caption += &differences_in_words(study, measure, of);
         }
         panels("charts", trends, |(heading, trend)| {
-            Panel::new(heading, trend.draw())
+            ChartPanel::new(heading, trend.draw())
         })
     };
 
@@ -211,7 +211,7 @@ fn horizons(contrasts: &[&Contrast]) -> String {
     let mut least_s = f64::INFINITY;
     let mut most_s: f64 = 0.0;
     for contrast in contrasts {
-        if let Difference::Time { until_s, .. } = contrast.difference {
+        if let ArmDifference::Time { until_s, .. } = contrast.difference {
             least_s = least_s.min(until_s);
             most_s = most_s.max(until_s);
         }
@@ -245,7 +245,7 @@ fn differences_table(study: &Study<'_>, contrasts: &[&Contrast], of: Of) -> Tabl
             }
         });
         row.push(match &contrast.difference {
-            Difference::Number { dominance, .. } => Cell::Number(*dominance, 2),
+            ArmDifference::Number { dominance, .. } => Cell::Number(*dominance, 2),
             _ => Cell::Empty,
         });
         for p in [contrast.difference.p(), contrast.p_holm] {
@@ -274,7 +274,7 @@ pub(super) fn survival(study: &Study<'_>, measure: &Measure) -> Figure {
         let mut censored = Vec::new();
         for step in &survival.curve {
             if step.events > 0 {
-                steps.push(Step {
+                steps.push(CurveStep {
                     x: step.time_s,
                     y: step.share,
                     band: Some((step.low, step.high)),
@@ -324,7 +324,7 @@ pub(super) fn distributions(study: &Study<'_>, measure: &Measure) -> Figure {
 
     let curve = |place: CellPlace| {
         let steps = ecdf(&study.numbers(measure, place));
-        let steps = steps.iter().map(|step| Step {
+        let steps = steps.iter().map(|step| CurveStep {
             x: step.value,
             y: step.share,
             band: None,

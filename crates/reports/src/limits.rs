@@ -1,6 +1,6 @@
 //! Limits that keep a report small, whatever is reported.
 
-use pictures::Panel;
+use pictures::ChartPanel;
 
 /// Most panels of a figure.
 const MAX_PANELS: usize = 24;
@@ -12,8 +12,8 @@ const MAX_FIGURE_BYTES: usize = 600_000;
 pub(super) fn panels<T>(
     what: &str,
     things: Vec<T>,
-    mut draw: impl FnMut(T) -> Panel,
-) -> (Vec<Panel>, String) {
+    mut draw: impl FnMut(T) -> ChartPanel,
+) -> (Vec<ChartPanel>, String) {
     let all = things.len();
     let mut panels = Vec::new();
     let mut bytes = 0;
@@ -41,7 +41,8 @@ mod tests {
     #[test]
     fn what_is_left_out_is_named() {
         let of_sizes = |what, sizes: Vec<usize>| {
-            let (panels, sentence) = panels(what, sizes, |bytes| Panel::new("", "x".repeat(bytes)));
+            let (panels, sentence) =
+                panels(what, sizes, |bytes| ChartPanel::new("", "x".repeat(bytes)));
             (panels.len(), sentence)
         };
         let (count, sentence) = of_sizes("robots", vec![10, 10]);

@@ -3,11 +3,13 @@
 use std::collections::BTreeMap;
 
 use observe::Measure;
-use pictures::{Estimate, IntervalRow, Intervals, Panel, Trend, TrendLine, round_range};
+use pictures::{
+    ChartPanel, IntervalRow, Intervals, PlottedEstimate, Trend, TrendLine, round_range,
+};
 
-use super::study::{CellPlace, Line, Study, axis, drawn, is_shown, label};
+use super::study::{CellPlace, FactorLine, Study, axis, drawn, is_shown, label};
 use super::words::capitalized;
-use experiments::{Contrast, Difference};
+use experiments::{ArmDifference, Contrast};
 
 /// Of what a difference is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,7 +55,7 @@ pub(super) struct Quantity {
     /// A value that is marked.
     reference: Option<f64>,
     /// The number of each arm that is shown; `None` if there is no finite one.
-    cells: BTreeMap<CellPlace, Option<Estimate>>,
+    cells: BTreeMap<CellPlace, Option<PlottedEstimate>>,
 }
 
 impl Quantity {
@@ -82,7 +84,7 @@ impl Quantity {
         let mut cells = BTreeMap::new();
         for place in study.places() {
             if let Some(contrast) = study.contrast(measure, place) {
-                let estimate = difference(contrast, of).map(|estimate| Estimate {
+                let estimate = difference(contrast, of).map(|estimate| PlottedEstimate {
                     is_filled: is_shown(contrast),
                     ..drawn(&estimate)
                 });
@@ -106,12 +108,12 @@ impl Quantity {
     }
 
     /// The number of an arm under a condition.
-    pub(super) fn estimate(&self, place: CellPlace) -> Option<Estimate> {
+    pub(super) fn estimate(&self, place: CellPlace) -> Option<PlottedEstimate> {
         *self.cells.get(&place)?
     }
 
     /// A chart for each condition, with a row for each arm.
-    pub(super) fn intervals(&self, study: &Study<'_>) -> (Vec<Panel>, String) {
+    pub(super) fn intervals(&self, study: &Study<'_>) -> (Vec<ChartPanel>, String) {
         let row = |place: CellPlace| {
             let estimate = *self.cells.get(&place)?;
             let (label, arm) = study.arm(place);
@@ -134,7 +136,11 @@ impl Quantity {
     }
 
     /// A chart over the values of a factor, with a line for each arm, and its heading; `None` if there is nothing to draw.
-    pub(super) fn trend(&self, study: &Study<'_>, line: &Line<'_>) -> Option<(String, Trend)> {
+    pub(super) fn trend(
+        &self,
+        study: &Study<'_>,
+        line: &FactorLine<'_>,
+    ) -> Option<(String, Trend)> {
         let mut lines = Vec::new();
         for arm in 0..study.arms.len() {
             let mut points = Vec::new();
@@ -177,19 +183,19 @@ impl Quantity {
 /// The difference of a contrast, shares in percentage points; `None` if there is none.
 pub(super) fn difference(contrast: &Contrast, of: Of) -> Option<statistics::Estimate> {
     match &contrast.difference {
-        Difference::Number { mean, .. } => Some(*mean),
-        Difference::Time { share, .. } if of == Of::Share => Some(share.scaled(100.0)),
-        Difference::Time {
+        ArmDifference::Number { mean, .. } => Some(*mean),
+        ArmDifference::Time { share, .. } if of == Of::Share => Some(share.scaled(100.0)),
+        ArmDifference::Time {
             restricted_mean_s, ..
         } => Some(*restricted_mean_s),
-        Difference::NoPair | Difference::NotFinite => None,
+        ArmDifference::NoPair | ArmDifference::NotFinite => None,
     }
 }
 
 /// The ends of all intervals.
-fn ends(cells: &BTreeMap<CellPlace, Option<Estimate>>) -> Vec<f64> {
+fn ends(cells: &BTreeMap<CellPlace, Option<PlottedEstimate>>) -> Vec<f64> {
     let estimates = cells.values().flatten();
-    estimates.flat_map(Estimate::ends).collect()
+    estimates.flat_map(PlottedEstimate::ends).collect()
 }
 
 /// A range with round ends around values. If it would begin not far above zero it begins there; one that is not of amounts has

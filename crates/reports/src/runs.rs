@@ -3,12 +3,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
-use pictures::{BandRow, Cell, Figure, Page, Panel, Table, Text};
+use pictures::{BandRow, Cell, ChartPanel, Figure, Page, Table, Text};
 use protocol::messages::{End, Variable};
 use protocol::time::{self, tick_seconds, time_s};
 use protocol::{RobotName, Tick};
 use record::{EpochFiles, RunFolder, Summary};
-use timeline::{Kind, LinkCounts};
+use timeline::{LinkCounts, StateKind};
 
 use super::course::{READ_DIAGRAM, diagram_lines, run_panel, state_panel, states_in_words};
 use super::facts::RunFacts;
@@ -274,7 +274,7 @@ fn variables_table(runs: &[ReportedRun]) -> Table {
 fn write_states(page: &mut Page, runs: &[ReportedRun]) {
     page.section("Emotions and behaviors");
 
-    for kind in [Kind::Emotion, Kind::Behavior] {
+    for kind in [StateKind::Emotion, StateKind::Behavior] {
         let (row, (panels, sentence)) = match runs {
             [run] => {
                 let panel = run_panel(&run.facts, kind);
@@ -301,7 +301,7 @@ fn write_states(page: &mut Page, runs: &[ReportedRun]) {
 }
 
 /// A panel for each robot of several runs, with a row for each run.
-fn state_panels(runs: &[ReportedRun], kind: Kind) -> (Vec<Panel>, String) {
+fn state_panels(runs: &[ReportedRun], kind: StateKind) -> (Vec<ChartPanel>, String) {
     let times_s = runs.iter().map(|run| run.facts.time_s());
     let end_s = times_s.fold(0.0, f64::max);
     let mut robots = Vec::new();
@@ -330,7 +330,7 @@ fn all_robots(runs: &[ReportedRun]) -> BTreeSet<&RobotName> {
 }
 
 /// Time in each state over all runs.
-fn states_table(runs: &[ReportedRun], kind: Kind) -> Table {
+fn states_table(runs: &[ReportedRun], kind: StateKind) -> Table {
     let mut table = Table::new("Robot | state | time, s | share, % | times entered");
     for name in all_robots(runs) {
         let mut times: BTreeMap<String, (f64, u64)> = BTreeMap::new();

@@ -4,11 +4,13 @@ use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
 use observe::{Measure, Measured};
-use pictures::{Estimate, Panel};
-use statistics::TimeTo;
+use pictures::{ChartPanel, PlottedEstimate};
+use statistics::CensoredTime;
 
 use super::limits::panels;
-use experiments::{Arm, Cell, Condition, Contrast, Estimated, Outcome, Results, SHOWN_P, Shown};
+use experiments::{
+    Arm, ArmMeasure, Condition, Contrast, Estimated, Results, SHOWN_P, Shown, UnitOutcome,
+};
 
 /// Most arms that are shown.
 const MAX_ARMS: usize = 24;
@@ -25,10 +27,10 @@ pub(super) struct Study<'a> {
     /// Names of the factors.
     pub(super) factors: Vec<&'a str>,
     /// The estimates, by measure, condition and arm.
-    estimates: BTreeMap<[String; 3], Cell>,
+    estimates: BTreeMap<[String; 3], ArmMeasure>,
     pub(super) contrasts: Vec<Contrast>,
     /// The runs of an arm under a condition, by their indices.
-    cells: BTreeMap<(usize, usize), Vec<&'a Outcome>>,
+    cells: BTreeMap<(usize, usize), Vec<&'a UnitOutcome>>,
 }
 
 /// A cell of the design: indices of a condition and an arm.
@@ -38,7 +40,7 @@ impl<'a> Study<'a> {
     pub(super) fn of(results: &'a Results) -> Self {
         let experiment = &results.plan.experiment;
         let conditions = results.plan.conditions();
-        let mut cells: BTreeMap<CellPlace, Vec<&Outcome>> = BTreeMap::new();
+        let mut cells: BTreeMap<CellPlace, Vec<&UnitOutcome>> = BTreeMap::new();
         for outcome in &results.outcomes {
             let condition = conditions
                 .iter()
@@ -115,7 +117,7 @@ impl<'a> Study<'a> {
         &self,
         of: impl Fn(CellPlace) -> Option<T>,
         draw: impl Fn(&str, Vec<T>) -> String,
-    ) -> (Vec<Panel>, String) {
+    ) -> (Vec<ChartPanel>, String) {
         let mut shown = Vec::new();
         for (condition, name) in self.conditions.iter().enumerate() {
             let arms = 0..self.arms.len();
@@ -126,7 +128,7 @@ impl<'a> Study<'a> {
         }
         panels("conditions", shown, |(heading, of_arms)| {
             let svg = draw(&heading, of_arms);
-            Panel::new(heading, svg)
+            ChartPanel::new(heading, svg)
         })
     }
 
@@ -149,7 +151,7 @@ impl<'a> Study<'a> {
     }
 
     /// The runs of an arm under a condition.
-    pub(super) fn runs(&self, place: CellPlace) -> &[&'a Outcome] {
+    pub(super) fn runs(&self, place: CellPlace) -> &[&'a UnitOutcome] {
         self.cells.get(&place).map_or(&[], Vec::as_slice)
     }
 
@@ -162,19 +164,23 @@ impl<'a> Study<'a> {
     }
 
     /// The times of the runs of a cell.
-    pub(super) fn times(&self, measure: &Measure, place: CellPlace) -> Vec<TimeTo> {
+    pub(super) fn times(&self, measure: &Measure, place: CellPlace) -> Vec<CensoredTime> {
         let mut times = Vec::new();
         for run in self.runs(place) {
             let measured = run.measures.get(&measure.name);
             if let Some((time_s, is_event)) = measured.and_then(Measured::time) {
-                times.push(TimeTo { time_s, is_event });
+                times.push(CensoredTime { time_s, is_event });
             }
         }
         times
     }
 
     /// The estimate of a measure; `None` without runs.
-    pub(super) fn cell(&self, measure: &Measure, (condition, arm): CellPlace) -> Option<&Cell> {
+    pub(super) fn cell(
+        &self,
+        measure: &Measure,
+        (condition, arm): CellPlace,
+    ) -> Option<&ArmMeasure> {
         let condition = self.conditions[condition].name.clone();
         let arm = self.arms[arm].name.clone();
         self.estimates.get(&[measure.name.clone(), condition, arm])
@@ -182,7 +188,7 @@ impl<'a> Study<'a> {
 
     /// The mean of a measure, or the percentage of runs at risk with its event by their end; `None` where there is no
     /// finite number.
-    pub(super) fn estimate(&self, measure: &Measure, place: CellPlace) -> Option<Estimate> {
+    pub(super) fn estimate(&self, measure: &Measure, place: CellPlace) -> Option<PlottedEstimate> {
         let estimate = match &self.cell(measure, place)?.estimate {
             Estimated::Number { mean, .. } => *mean,
             Estimated::Time { share, .. } => share.scaled(100.0),
@@ -229,7 +235,7 @@ impl<'a> Study<'a> {
 }
 
 /// The conditions along a factor whose values are numbers.
-pub(super) struct Line<'a> {
+pub(super) struct FactorLine<'a> {
     /// The factor.
     pub(super) factor: &'a str,
     /// The values of the other factors in words; empty if there are none.
@@ -248,13 +254,13 @@ pub(super) struct Level<'a> {
 
 /// The conditions along the factor that the experiment file names, or the only factor if its values are numbers and enough for
 /// a line: a line for each combination of the other factors. Otherwise there are none.
-pub(super) fn lines<'a>(study: &Study<'a>) -> Vec<Line<'a>> {
+pub(super) fn lines<'a>(study: &Study<'a>) -> Vec<FactorLine<'a>> {
     let is_only = study.factors.len() == 1 && LINE_LEVELS.contains(&study.conditions.len());
     let Some(factor) = study.named_axis().or(is_only.then_some(0)) else {
         return Vec::new();
     };
 
-    let mut lines: Vec<Line<'_>> = Vec::new();
+    let mut lines: Vec<FactorLine<'_>> = Vec::new();
     for (index, condition) in study.conditions.iter().enumerate() {
         let mut others = condition.levels.clone();
         others.remove(factor);
@@ -271,7 +277,7 @@ pub(super) fn lines<'a>(study: &Study<'a>) -> Vec<Line<'a>> {
         };
         match lines.iter_mut().find(|line| line.others == others) {
             Some(line) => line.levels.push(level),
-            None => lines.push(Line {
+            None => lines.push(FactorLine {
                 factor: study.factors[factor],
                 others,
                 levels: vec![level],
@@ -298,8 +304,8 @@ fn named<'a>(levels: impl IntoIterator<Item = &'a (String, String)>) -> String {
 }
 
 /// An estimate as charts take it.
-pub(super) fn drawn(estimate: &statistics::Estimate) -> Estimate {
-    Estimate {
+pub(super) fn drawn(estimate: &statistics::Estimate) -> PlottedEstimate {
+    PlottedEstimate {
         value: estimate.value,
         interval: estimate.bounds(),
         n: estimate.n,

@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use pictures::{Cell, Figure, Matrix, MatrixCell, MatrixLabel, Panel, Table, state_class};
+use pictures::{Cell, ChartPanel, Figure, Matrix, MatrixCell, MatrixLabel, Table, state_class};
 use protocol::RobotName;
-use timeline::Kind;
+use timeline::StateKind;
 
 use super::facts::RunFacts;
 use super::limits::panels;
@@ -16,12 +16,15 @@ type Counts = BTreeMap<(String, String), u64>;
 /// The transitions between emotions and those between behaviors, over these runs: a matrix for each robot. What has no
 /// transition has no figure.
 pub(super) fn transitions(runs: &[&RunFacts]) -> Vec<Figure> {
-    let kinds = [(Kind::Emotion, "emotions"), (Kind::Behavior, "behaviors")];
+    let kinds = [
+        (StateKind::Emotion, "emotions"),
+        (StateKind::Behavior, "behaviors"),
+    ];
     let figures = kinds.map(|(kind, what)| figure(runs, kind, what));
     figures.into_iter().flatten().collect()
 }
 
-fn figure(runs: &[&RunFacts], kind: Kind, what: &str) -> Option<Figure> {
+fn figure(runs: &[&RunFacts], kind: StateKind, what: &str) -> Option<Figure> {
     let mut counts: BTreeMap<&RobotName, Counts> = BTreeMap::new();
     for (name, robot) in runs.iter().flat_map(|run| &run.robots) {
         for (transition, count) in &robot.counts.states(kind).transitions {
@@ -51,10 +54,10 @@ fn figure(runs: &[&RunFacts], kind: Kind, what: &str) -> Option<Figure> {
 fn matrix(
     name: &RobotName,
     title: String,
-    kind: Kind,
+    kind: StateKind,
     counts: &Counts,
     table: &mut Table,
-) -> Panel {
+) -> ChartPanel {
     let mut sums: BTreeMap<&str, u64> = BTreeMap::new();
     let mut states = BTreeSet::new();
     for ((from, to), count) in counts {

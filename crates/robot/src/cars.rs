@@ -5,15 +5,15 @@ use std::sync::Arc;
 
 use lockstep::Sent;
 use protocol::messages::{
-    CommandText, MAX_ENTRIES, MAX_TEXT_BYTES, News, Performative, Point, PublicState, SensedBody,
-    SensedRobot, StateVariables, Welcome,
+    CommandText, MAX_ENTRIES, MAX_TEXT_BYTES, Performative, Point, PublicState, SensedBody,
+    SensedRobot, StateVariables, TickUpdate, Welcome,
 };
 use protocol::plain::cut;
 use protocol::random::Stream;
 use protocol::{RobotName, Tick};
 
 use crate::error::{BadParameters, read_parameters};
-use crate::network::{Network, Undelivered};
+use crate::network::{PeerNetwork, Undelivered};
 
 /// Most lines that a robot may write to the log in a tick. The rest of a report's lines is for those that the SDK adds.
 const MAX_LOG_LINES: usize = MAX_ENTRIES / 2;
@@ -78,14 +78,14 @@ pub struct Cars<'a> {
     pub(crate) tick: Tick,
     pub(crate) location: Point,
     pub(crate) commands: &'a [ReceivedCommand],
-    pub(crate) news: &'a News,
+    pub(crate) news: &'a TickUpdate,
     pub(crate) random: &'a mut Stream,
     pub(crate) senses_bodies: bool,
     pub(crate) outbox: &'a mut Vec<Sent<CommandText>>,
     pub(crate) log: &'a mut Vec<String>,
     pub(crate) left_out: &'a mut LeftOut,
     pub(crate) gave_up: &'a mut Option<String>,
-    pub(crate) network: &'a mut dyn Network,
+    pub(crate) network: &'a mut dyn PeerNetwork,
 }
 
 impl<'a> Cars<'a> {

@@ -14,18 +14,20 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bus::{Bus, BusError, Declared, Inbox, OnArrival, Publisher, Role, Worker, WorkerThread};
-use lockstep::{Action, Admission, Begin, IncarnationNotice, Leave, StateQuery, Timeouts, Turn};
+use lockstep::{
+    Admission, Begin, IncarnationNotice, Leave, ParticipantOutput, StateQuery, Timeouts, Turn,
+};
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{
-    Clock, End, JoinAnswer, JoinRequest, News, ParametersAnswer, ParametersOffer, PublicState,
-    Refusal, Waiting, Welcome,
+    Clock, End, JoinAnswer, JoinRequest, ParametersAnswer, ParametersOffer, PublicState, Refusal,
+    TickUpdate, Waiting, Welcome,
 };
 use protocol::{Malformed, PROTOCOL_VERSION, RobotName, RunName, decode, encode};
 
 use crate::cri::Robot;
 use crate::error::RobotError;
-use crate::network::{Network, Undelivered};
-use crate::runner::{Done, Runner};
+use crate::network::{PeerNetwork, Undelivered};
+use crate::runner::{Runner, TickResult};
 use participants::{Actions, Allowance, Asked, HostAction, HostAnswer, Participants};
 
 /// Most robots for which a publisher of commands is declared. Without one, zenoh compares each command's key with all keys that
@@ -236,7 +238,7 @@ impl Host {
         let news = self
             .bus
             .subscribe(&self.keys.news(name), move |key, bytes| {
-                match decode::<News>(key, "simulator", bytes) {
+                match decode::<TickUpdate>(key, "simulator", bytes) {
                     Ok(news) => participants.with(&own, |participant, actions| {
                         let notice = IncarnationNotice::from(&news);
                         participant.news(news.epoch, news.tick, notice, news, actions);
@@ -365,8 +367,8 @@ impl Host {
         action: HostAction,
     ) -> Result<Option<End>, HostError> {
         match action {
-            Action::Run(turn) => self.run_tick(name, &turn)?,
-            Action::Leave(leave) => return self.leave(name, &leave).map(Some),
+            ParticipantOutput::Run(turn) => self.run_tick(name, &turn)?,
+            ParticipantOutput::Leave(leave) => return self.leave(name, &leave).map(Some),
             other => self.carry_out_io(name, other)?,
         }
 
@@ -376,32 +378,34 @@ impl Host {
     /// The same for everything that does not run a robot or end the process.
     fn carry_out_io(&mut self, name: &RobotName, action: HostAction) -> Result<(), HostError> {
         match action {
-            Action::Join => self.join(name)?,
-            Action::DeclareToken => {
+            ParticipantOutput::Join => self.join(name)?,
+            ParticipantOutput::DeclareToken => {
                 let token = self.bus.token(&self.keys.alive_robot(name))?;
                 if let Some(member) = self.members.get_mut(name) {
                     member.token = Some(token);
                 }
             }
-            Action::Put(answer) => self.put(name, &answer)?,
-            Action::Query { of, tick, epoch } => {
+            ParticipantOutput::Put(answer) => self.put(name, &answer)?,
+            ParticipantOutput::Query { of, tick, epoch } => {
                 let asked = format!("tick={tick};epoch={epoch}");
                 self.query(name, &of, &asked)?;
             }
-            Action::Unfollow(of) => drop(self.followed.remove(&(name.clone(), of))),
-            Action::PutWaiting { tick, epoch, on } => {
+            ParticipantOutput::Unfollow(of) => drop(self.followed.remove(&(name.clone(), of))),
+            ParticipantOutput::PutWaiting { tick, epoch, on } => {
                 let waiting = Waiting { epoch, tick, on };
                 self.bus.put(&self.keys.waiting(name), encode(&waiting))?;
             }
             // Timers are set by the participants' side, and the other two are the caller's.
-            Action::SetTimer(..) | Action::Run(_) | Action::Leave(_) => {}
+            ParticipantOutput::SetTimer(..)
+            | ParticipantOutput::Run(_)
+            | ParticipantOutput::Leave(_) => {}
         }
 
         Ok(())
     }
 
     /// Runs one tick of a robot.
-    fn run_tick(&mut self, name: &RobotName, turn: &Turn<News>) -> Result<(), HostError> {
+    fn run_tick(&mut self, name: &RobotName, turn: &Turn<TickUpdate>) -> Result<(), HostError> {
         let Some(member) = self.members.get_mut(name) else {
             return Ok(());
         };
@@ -428,7 +432,7 @@ impl Host {
         if let Some(failed) = network.failed.take() {
             return Err(failed);
         }
-        let Done {
+        let TickResult {
             commands,
             state,
             report,
@@ -633,7 +637,7 @@ struct HostNetwork<'a> {
     failed: Option<HostError>,
 }
 
-impl Network for HostNetwork<'_> {
+impl PeerNetwork for HostNetwork<'_> {
     fn state_of(&mut self, target: &RobotName) -> Result<Arc<PublicState>, Undelivered> {
         let participants = self.host.participants.clone();
         // A robot of the same process has reported the tick before, or has missed it: there is nothing
@@ -654,10 +658,12 @@ impl Network for HostNetwork<'_> {
             }
 
             // Other robots of the process run later, on this thread.
-            let next = self
-                .host
-                .actions
-                .take_first(|(_, action)| !matches!(action, Action::Run(_) | Action::Leave(_)));
+            let next = self.host.actions.take_first(|(_, action)| {
+                !matches!(
+                    action,
+                    ParticipantOutput::Run(_) | ParticipantOutput::Leave(_)
+                )
+            });
             let Some((name, action)) = next else {
                 // What arrives after the look above ends the wait at once.
                 self.host.actions.wait(participants.next_timer());

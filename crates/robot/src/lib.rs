@@ -53,15 +53,15 @@ pub use error::{BadParameters, ParametersCheck, RobotError, read_parameters};
 pub use figure7::{CarsRobotInterface, Paper};
 pub use host::{Host, HostError, HostOptions, Stopper};
 pub use local::LocalHost;
-pub use network::{Network, Undelivered};
+pub use network::{PeerNetwork, Undelivered};
 pub use protocol::messages::{
-    Clock, Command, CommandText, Correction, End, Face, News, Panel, Parameters, Point,
-    PublicState, Report, SensedBody, SensedKind, SensedRobot, StateVariables, Tone, Variable,
+    Clock, Command, CommandText, Correction, End, Face, Panel, Parameters, Point, PublicState,
+    Report, SensedBody, SensedKind, SensedRobot, StateVariables, TickUpdate, Tone, Variable,
     Welcome, Widget,
 };
 pub use protocol::random::Stream;
 pub use protocol::{RobotName, RunName, Tick};
-pub use runner::{Done, Runner};
+pub use runner::{Runner, TickResult};
 
 /// Rounds an angle to 1e-6 rad, so that languages whose arc tangents differ in the last bit publish the same number.
 #[must_use]

@@ -6,27 +6,27 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use lockstep::{
-    Action, Attendance, Barrier, Bulletin, Exchange, Lateness, Outcome, Output, Participant, Stamp,
-    StateQuery, Timeouts, Timing, Turn,
+    Attendance, Barrier, BarrierOutput, Bulletin, Exchange, LatePolicy, Participant,
+    ParticipantOutput, Stamp, StateQuery, TickOutcome, Timeouts, Timing, Turn,
 };
 use protocol::messages::{
-    CommandText, FaultKind, MAX_ENTRIES, News, OnLate, Panel, Presence, PublicState, Report,
+    CommandText, FaultKind, MAX_ENTRIES, OnLate, Panel, Presence, PublicState, Report, TickUpdate,
     Welcome,
 };
 use protocol::{Generation, RobotName, Tick};
 
 use crate::cri::Robot;
 use crate::error::RobotError;
-use crate::network::{Network, Undelivered};
-use crate::runner::{Done, Runner};
+use crate::network::{PeerNetwork, Undelivered};
+use crate::runner::{Runner, TickResult};
 
-type LocalParticipant = Participant<News, Arc<PublicState>, CommandText, Arc<Report>>;
-type LocalAction = Action<News, Arc<PublicState>, CommandText, Arc<Report>>;
+type LocalParticipant = Participant<TickUpdate, Arc<PublicState>, CommandText, Arc<Report>>;
+type LocalAction = ParticipantOutput<TickUpdate, Arc<PublicState>, CommandText, Arc<Report>>;
 
 /// The robots of a run, all in this process.
 pub struct LocalHost {
     barrier: Barrier<Arc<Report>, CommandText>,
-    outputs: Vec<Output<Arc<Report>, CommandText>>,
+    outputs: Vec<BarrierOutput<Arc<Report>, CommandText>>,
     names: Vec<RobotName>,
     runners: Vec<Runner>,
     participants: Vec<LocalParticipant>,
@@ -42,7 +42,7 @@ struct Others<'a> {
     query: StateQuery,
 }
 
-impl Network for Others<'_> {
+impl PeerNetwork for Others<'_> {
     fn state_of(&mut self, target: &RobotName) -> Result<Arc<PublicState>, Undelivered> {
         let index = self
             .names
@@ -61,7 +61,7 @@ impl LocalHost {
     #[must_use]
     pub fn new(robots: Vec<(Box<dyn Robot>, Welcome)>) -> Self {
         // No robot of this process is ever late, and no timer ever fires.
-        let lateness = Lateness {
+        let lateness = LatePolicy {
             on_late: OnLate::Wait,
             own: BTreeMap::new(),
             deadline: Duration::MAX,
@@ -245,10 +245,10 @@ impl LocalHost {
     }
 
     /// Hands news and clock of a tick to every robot, and collects the ticks that they are to run.
-    fn grant(&mut self, news: &dyn Bulletin<News>) -> Vec<(usize, Turn<News>)> {
+    fn grant(&mut self, news: &dyn Bulletin<TickUpdate>) -> Vec<(usize, Turn<TickUpdate>)> {
         let mut turns = Vec::new();
         for output in std::mem::take(&mut self.outputs) {
-            let Output::Grant { news: to, clock } = output else {
+            let BarrierOutput::Grant { news: to, clock } = output else {
                 continue;
             };
             let mut actions: Vec<LocalAction> = Vec::new();
@@ -268,7 +268,7 @@ impl LocalHost {
                 }
                 participant.clock(clock, &mut actions);
                 for action in actions.drain(..) {
-                    if let Action::Run(turn) = action {
+                    if let ParticipantOutput::Run(turn) = action {
                         turns.push((index, turn));
                     }
                 }
@@ -279,7 +279,7 @@ impl LocalHost {
     }
 
     /// Runs one tick of one robot, and hands what came of it to the barrier.
-    fn run(&mut self, index: usize, turn: &Turn<News>) -> Result<(), RobotError> {
+    fn run(&mut self, index: usize, turn: &Turn<TickUpdate>) -> Result<(), RobotError> {
         let mut others = Others {
             names: &self.names,
             participants: &self.participants,
@@ -288,7 +288,7 @@ impl LocalHost {
                 epoch: Some(turn.epoch),
             },
         };
-        let Done {
+        let TickResult {
             commands,
             state,
             report,
@@ -298,7 +298,7 @@ impl LocalHost {
         self.participants[index].done(commands, state, report, &mut actions);
         let name = self.names[index].clone();
         for action in actions {
-            let Action::Put(answer) = action else {
+            let ParticipantOutput::Put(answer) = action else {
                 continue;
             };
             let stamp = Stamp::from(answer.as_ref());
@@ -314,14 +314,14 @@ impl LocalHost {
     }
 }
 
-impl Exchange<News, Arc<Report>, CommandText> for LocalHost {
+impl Exchange<TickUpdate, Arc<Report>, CommandText> for LocalHost {
     type Error = RobotError;
 
     fn exchange(
         &mut self,
         tick: Tick,
-        news: &dyn Bulletin<News>,
-    ) -> Result<Outcome<Arc<Report>, CommandText>, RobotError> {
+        news: &dyn Bulletin<TickUpdate>,
+    ) -> Result<TickOutcome<Arc<Report>, CommandText>, RobotError> {
         self.barrier.open(tick, news.robots(), &mut self.outputs);
         let complete_at_once = self.take_outcome();
         if let Some(outcome) = complete_at_once {
@@ -347,14 +347,14 @@ impl LocalHost {
         }
     }
 
-    fn take_outcome(&mut self) -> Option<Outcome<Arc<Report>, CommandText>> {
+    fn take_outcome(&mut self) -> Option<TickOutcome<Arc<Report>, CommandText>> {
         let index = self
             .outputs
             .iter()
-            .position(|output| matches!(output, Output::Complete(_)))?;
+            .position(|output| matches!(output, BarrierOutput::Complete(_)))?;
 
         match self.outputs.swap_remove(index) {
-            Output::Complete(outcome) => Some(outcome),
+            BarrierOutput::Complete(outcome) => Some(outcome),
             _ => None,
         }
     }

@@ -6,7 +6,7 @@ use protocol::RobotName;
 use protocol::messages::PublicState;
 
 /// What a robot needs from outside during a tick.
-pub trait Network {
+pub trait PeerNetwork {
     /// The state that `target` reported for the tick before.
     ///
     /// # Errors

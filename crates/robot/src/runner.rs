@@ -5,14 +5,16 @@ use std::sync::Arc;
 
 use lockstep::{Begin, Sent, Turn};
 use protocol::codec::MAX_MESSAGE_BYTES;
-use protocol::messages::{Command, CommandText, News, Panel, Point, PublicState, Report, Welcome};
+use protocol::messages::{
+    Command, CommandText, Panel, Point, PublicState, Report, TickUpdate, Welcome,
+};
 use protocol::random::{Stream, stream};
 use protocol::{FieldError, Message, Tick, encode};
 
 use crate::cars::{Cars, LeftOut, ReceivedCommand};
 use crate::cri::{Action, Robot};
 use crate::error::{BadParameters, RobotError};
-use crate::network::Network;
+use crate::network::PeerNetwork;
 
 /// The line of the log for a change of parameters that a robot refuses. The log is part of the record, and a robot in another
 /// language has other words for the reason: that is a diagnostic.
@@ -27,7 +29,7 @@ const MAX_REST: usize = 1024;
 
 /// What came of a tick.
 #[derive(Debug)]
-pub struct Done {
+pub struct TickResult {
     /// The commands that the robot sent, in this order.
     pub commands: Vec<Sent<CommandText>>,
     /// What the other robots may query.
@@ -98,9 +100,9 @@ impl Runner {
     /// [`RobotError`] if the robot refuses its parameters, gives up, or goes beyond the limits of a message.
     pub fn run(
         &mut self,
-        turn: &Turn<News>,
-        network: &mut dyn Network,
-    ) -> Result<Done, RobotError> {
+        turn: &Turn<TickUpdate>,
+        network: &mut dyn PeerNetwork,
+    ) -> Result<TickResult, RobotError> {
         // Before anything has happened: a scenario whose changes a robot refuses does not begin.
         if turn.begin == Begin::Init {
             self.check_later_parameters()?;
@@ -142,7 +144,7 @@ impl Runner {
     }
 
     /// Whether the robot begins in the middle of an epoch, after its parameters have changed.
-    fn has_earlier_parameters(&self, turn: &Turn<News>) -> bool {
+    fn has_earlier_parameters(&self, turn: &Turn<TickUpdate>) -> bool {
         turn.begin == Begin::TakeOver && !self.welcome.earlier_parameters.is_empty()
     }
 
@@ -158,11 +160,11 @@ impl Runner {
     /// Lets the robot perceive and act. Returns where it stands, and what it does.
     fn act(
         &mut self,
-        turn: &Turn<News>,
-        network: &mut dyn Network,
+        turn: &Turn<TickUpdate>,
+        network: &mut dyn PeerNetwork,
         log: &mut Vec<String>,
     ) -> Result<(Point, Action), RobotError> {
-        let quiet = News::default();
+        let quiet = TickUpdate::default();
         let news = turn.news.as_ref().unwrap_or(&quiet);
         if turn.begin == Begin::Init {
             self.proposal = self.welcome.location;
@@ -229,7 +231,7 @@ impl Runner {
         location: Point,
         mut action: Action,
         mut log: Vec<String>,
-    ) -> Result<Done, RobotError> {
+    ) -> Result<TickResult, RobotError> {
         // JSON has no NaN: a number that is not finite is replaced or dropped, and logged.
         let proposal = action.proposal;
         if !(proposal.x.is_finite() && proposal.y.is_finite()) {
@@ -288,7 +290,7 @@ impl Runner {
                 reason,
             });
         }
-        Ok(Done {
+        Ok(TickResult {
             commands,
             state: Arc::new(state),
             report: Arc::new(report),
@@ -333,7 +335,7 @@ fn check_command(sent: &Sent<CommandText>) -> Result<(), FieldError> {
 }
 
 /// The commands that arrived.
-fn received(news: &News) -> Vec<ReceivedCommand> {
+fn received(news: &TickUpdate) -> Vec<ReceivedCommand> {
     let mut received = Vec::with_capacity(news.commands.len());
     for delivery in &news.commands {
         received.push(ReceivedCommand {

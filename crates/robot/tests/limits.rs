@@ -6,7 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use lockstep::Exchange;
-use protocol::messages::{Correction, JoinAnswer, News, Welcome};
+use protocol::messages::{Correction, JoinAnswer, TickUpdate, Welcome};
 use protocol::{Message, RobotName};
 use robot::{Action, BadParameters, Cars, LocalHost, Point, Robot};
 
@@ -170,14 +170,14 @@ fn robots_that_share_a_news_flag_all_run_also_if_only_one_has_news() {
 
     let moved = RobotName::new("R33").unwrap();
     let place = Point::new(5.0, 6.0);
-    let news = News {
+    let news = TickUpdate {
         epoch: 1,
         tick: 1,
         correction: Some(Correction {
             location: place,
             blocked: false,
         }),
-        ..News::default()
+        ..TickUpdate::default()
     };
     let outcome = host
         .exchange(1, &BTreeMap::from([(moved.clone(), news)]))

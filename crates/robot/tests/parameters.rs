@@ -7,8 +7,8 @@ use std::sync::Arc;
 use lockstep::{Begin, Turn};
 use protocol::messages::JoinAnswer;
 use robot::{
-    Action, BadParameters, Cars, CommandText, Network, Parameters, ParametersCheck, PublicState,
-    Robot, RobotError, RobotName, Runner, Undelivered, Welcome, read_parameters,
+    Action, BadParameters, Cars, CommandText, Parameters, ParametersCheck, PeerNetwork,
+    PublicState, Robot, RobotError, RobotName, Runner, Undelivered, Welcome, read_parameters,
 };
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -55,7 +55,7 @@ impl Robot for Picky {
 
 struct Nobody;
 
-impl Network for Nobody {
+impl PeerNetwork for Nobody {
     fn state_of(&mut self, _: &RobotName) -> Result<Arc<PublicState>, Undelivered> {
         Err(Undelivered::Lost)
     }

@@ -1,9 +1,9 @@
 //! Vera likes parties and is shy: if too many bodies are around her, she returns to her start until she is calm.
 
 use affect::akr::{Agency, Appraisal};
-use affect::{Circumstances, Frame, Schemata, Urgency};
+use affect::{AffectFrame, Circumstances, Schemata, Urgency};
 use robot::{Action, BadParameters, Cars, Panel, Point, Robot, Widget};
-use robots::drive::{Course, Drive};
+use robots::drive::{Drive, StraightDrive};
 
 #[derive(Default, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -58,7 +58,7 @@ impl Robot for Vera {
             SHY => (HIDE, cars.welcome().location),
             _ => (MINGLE, self.parameters.party_m),
         };
-        let course = Course::to(goal, self.parameters.speed_mps);
+        let course = StraightDrive::to(goal, self.parameters.speed_mps);
         let action = self.drive.follow(cars, course);
         robots::frame::publish(self.frame(), action).behavior(behavior)
     }
@@ -84,7 +84,7 @@ impl Robot for Vera {
 
 impl Vera {
     /// What she feels, and how she judges it: the crowd is to blame, and she can always leave.
-    fn frame(&self) -> Option<Frame<'_>> {
+    fn frame(&self) -> Option<AffectFrame<'_>> {
         let crowding = self.near / self.parameters.bearable;
         let crowd = Agency::Other("the crowd".into());
         let appraisal = Appraisal::new(1.0 - 2.0 * crowding, 1.0, 1.0, crowd);

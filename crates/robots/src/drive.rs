@@ -57,7 +57,7 @@ impl Default for Drive {
 
 /// A straight drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Course {
+pub struct StraightDrive {
     /// Where to, meters.
     pub goal: Point,
     /// Distance from the goal at which the drive stops, meters.
@@ -68,7 +68,7 @@ pub struct Course {
     pub look_s: f64,
 }
 
-impl Course {
+impl StraightDrive {
     /// A drive right to this goal, which looks around for [`LOOK_S`] after it was blocked.
     #[must_use]
     pub fn to(goal: Point, speed_mps: f64) -> Self {
@@ -117,7 +117,7 @@ impl Drive {
 
     /// A step of a straight drive. For a while after it was blocked the robot looks around first, and steps aside if a
     /// body is in the way.
-    pub fn follow(&mut self, cars: &mut Cars<'_>, course: Course) -> Action {
+    pub fn follow(&mut self, cars: &mut Cars<'_>, course: StraightDrive) -> Action {
         let here = cars.location();
         let tick_s = cars.tick_s();
         if cars.was_blocked() {

@@ -59,7 +59,7 @@ impl<M, B: PartialEq, E: EmotionLabel> Restore for RuleGenerator<M, B, E> {
 }
 
 /// A generator and its switch. Switched off, the generator never runs and stays in its initial state.
-pub(crate) struct Emotion<G> {
+pub(crate) struct SwitchableGenerator<G> {
     switch: Switch,
     script: Script,
     /// The feeling of the script at this time.
@@ -67,7 +67,7 @@ pub(crate) struct Emotion<G> {
     generator: G,
 }
 
-impl<G: Restore + EmotionGenerator<Emotion = StandardEmotion>> Emotion<G> {
+impl<G: Restore + EmotionGenerator<Emotion = StandardEmotion>> SwitchableGenerator<G> {
     pub(crate) fn new(switch: Switch, script: Script, generator: G) -> Self {
         Self {
             switch,

@@ -1,7 +1,7 @@
 //! Widgets that the panels of the robots share.
 
 use affect::akr::{FacialExpression, Valence};
-use affect::{Circumstances, Frame};
+use affect::{AffectFrame, Circumstances};
 use robot::{Face, Tone, Widget};
 
 use crate::emotion::NEUTRAL;
@@ -11,7 +11,7 @@ pub(crate) const SPARKLINE_LEN: usize = 120;
 
 /// Face, name, intensity and cause of an emotion, and the appraisal that comes with it; `None` without emotions.
 pub(crate) fn affect(
-    frame: Option<&Frame<'_>>,
+    frame: Option<&AffectFrame<'_>>,
     label_cuts: &[f64; 4],
     circumstances: &Circumstances<'_>,
 ) -> Vec<Widget> {
@@ -92,7 +92,7 @@ pub(crate) fn yes(flag: bool) -> &'static str {
 }
 
 /// Color of the badge.
-fn tone(frame: &Frame<'_>) -> Tone {
+fn tone(frame: &AffectFrame<'_>) -> Tone {
     match (frame.affect().valence, frame.name()) {
         (Valence::Positive, "HAPPY") => Tone::Good,
         (Valence::Positive, _) => Tone::Neutral,

@@ -29,7 +29,7 @@ pub struct Peer {
 
 /// What one tick revealed of a peer.
 #[derive(Debug, Clone)]
-pub struct Observation {
+pub struct PeerObservation {
     /// Its answer; `None` if it is unreachable.
     pub state: Option<Arc<PublicState>>,
     /// Seconds since its location was known before, if it is known now.
@@ -61,7 +61,7 @@ impl Peer {
     /// Queries the peer and senses it: once a tick, one round trip. The sensed location takes precedence, because an
     /// answer is a tick old. Without an answer, a peer whose last location is within sensing range and which is not
     /// sensed is missing.
-    pub fn observe(&mut self, cars: &mut Cars<'_>) -> Observation {
+    pub fn observe(&mut self, cars: &mut Cars<'_>) -> PeerObservation {
         self.unanswered_s += cars.tick_s();
         self.unlocated_s += cars.tick_s();
 
@@ -88,7 +88,7 @@ impl Peer {
         self.last = location.or(self.last);
         self.first = self.first.or(self.last);
 
-        Observation {
+        PeerObservation {
             state,
             located_after_s,
         }

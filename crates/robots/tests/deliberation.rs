@@ -236,7 +236,7 @@ fn deliberation_without_sense_is_refused() {
         ),
     ] {
         let text = format!("[deliberation]\n{wrong}");
-        let parameters: robots::butler::Parameters = toml::from_str(&text).unwrap();
+        let parameters: robots::butler::ButlerParameters = toml::from_str(&text).unwrap();
         let error = robots::Butler::new(parameters).err().unwrap_or_default();
         assert!(error.contains(reason), "{error}");
     }

@@ -4,7 +4,7 @@
 
 mod stage;
 
-use robots::butler::{self, Act};
+use robots::butler::{self, ButlerAct};
 use robots::leguin;
 use robots::policy::Urge;
 use stage::{FT_M, Role, Stage, feet, name};
@@ -335,7 +335,7 @@ fn t16_whatever_is_felt_behavior_takes_only_the_ways_of_the_table() {
     for urge in Urge::ALL {
         for bits in 0..32_768_u32 {
             let bit = |index: u32| bits >> index & 1 == 1;
-            let context = butler::Context {
+            let context = butler::ButlerContext {
                 urge,
                 is_happy: bit(0),
                 need: bit(1),
@@ -353,7 +353,7 @@ fn t16_whatever_is_felt_behavior_takes_only_the_ways_of_the_table() {
                 is_stuck: bit(13),
                 rests: bit(14),
             };
-            for state in butler::Behavior::ALL {
+            for state in butler::ButlerBehavior::ALL {
                 let decision = affect::behavior::decide(butler::TABLE, &state, &context);
                 if let Some(next) = decision.next {
                     assert!(
@@ -361,16 +361,16 @@ fn t16_whatever_is_felt_behavior_takes_only_the_ways_of_the_table() {
                         "{state:?} -> {next:?}: {context:?}"
                     );
                     assert!(
-                        next != butler::Behavior::Exchange || context.need,
+                        next != butler::ButlerBehavior::Exchange || context.need,
                         "{context:?}"
                     );
                 }
                 let calls = decision
                     .actions
                     .iter()
-                    .filter(|act| matches!(act, Act::CallRefill | Act::CallHurry));
-                assert!(urge >= Urge::Hurry || !decision.actions.contains(&Act::CallHurry));
-                let begins = decision.next == Some(butler::Behavior::Intercept);
+                    .filter(|act| matches!(act, ButlerAct::CallRefill | ButlerAct::CallHurry));
+                assert!(urge >= Urge::Hurry || !decision.actions.contains(&ButlerAct::CallHurry));
+                let begins = decision.next == Some(butler::ButlerBehavior::Intercept);
                 assert!(!begins || (urge == Urge::Intercept && !context.refiller_is_busy));
                 assert!(calls.count() <= 2);
             }
@@ -513,7 +513,7 @@ fn t23_saved_and_restored_in_mid_run_both_continue_identically() {
         .collect();
     assert_eq!(
         behaviors.len(),
-        leguin::Behavior::ALL.len(),
+        leguin::LeguinBehavior::ALL.len(),
         "the run goes through every behavior"
     );
     for reborn_at in (1..240).step_by(7) {

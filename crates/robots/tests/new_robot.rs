@@ -14,8 +14,8 @@ use std::sync::Arc;
 
 use lockstep::{Begin, Turn};
 use robot::{
-    Network, News, PublicState, RobotName, Runner, SensedBody, SensedKind, Tick, Undelivered,
-    Widget,
+    PeerNetwork, PublicState, RobotName, Runner, SensedBody, SensedKind, Tick, TickUpdate,
+    Undelivered, Widget,
 };
 use stage::{Role, Stage, feet};
 
@@ -150,23 +150,23 @@ fn a_misspelled_parameter_of_vera_is_refused() {
 /// No robot but her.
 struct Alone;
 
-impl Network for Alone {
+impl PeerNetwork for Alone {
     fn state_of(&mut self, _: &RobotName) -> Result<Arc<PublicState>, Undelivered> {
         Err(Undelivered::Lost)
     }
 }
 
 /// A tick with so many guests around her.
-fn turn(tick: Tick, near: usize) -> Turn<News> {
+fn turn(tick: Tick, near: usize) -> Turn<TickUpdate> {
     let guest = SensedBody {
         kind: SensedKind::Guest,
         location: feet(30.0, 30.0),
     };
-    let news = News {
+    let news = TickUpdate {
         epoch: 1,
         tick,
         bodies: vec![guest; near],
-        ..News::default()
+        ..TickUpdate::default()
     };
 
     Turn {

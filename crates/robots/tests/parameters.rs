@@ -71,8 +71,8 @@ fn check_file<P: Default + PartialEq + std::fmt::Debug + Serialize + Deserialize
 
 #[test]
 fn the_shipped_files_hold_every_parameter_and_the_defaults_of_the_code() {
-    check_file::<robots::butler::Parameters>("robots/butler.toml");
-    check_file::<robots::leguin::Parameters>("robots/leguin.toml");
+    check_file::<robots::butler::ButlerParameters>("robots/butler.toml");
+    check_file::<robots::leguin::LeguinParameters>("robots/leguin.toml");
 }
 
 #[test]

@@ -309,7 +309,7 @@ impl Scenario {
             name: "the scenario".to_owned(),
             text: now.to_toml()?,
         };
-        let raw: raw::Scenario = source.parse()?;
+        let raw: raw::ScenarioFile = source.parse()?;
         let mut resolved = raw.check_from(&source, None, at)?.changes;
         if let Some(own) = resolved.get_mut(own) {
             own.is_by_hand = true;

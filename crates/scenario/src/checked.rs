@@ -65,14 +65,14 @@ pub struct Scenario {
     /// What the run is expected to do.
     pub expectations: Vec<Expectation>,
     /// Contents of the record.
-    pub record: Record,
+    pub record: RecordContents,
     /// The run from which this one was forked.
     pub parent: Option<Parent>,
 }
 
 /// Contents of the record beside events and summary.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Record {
+pub struct RecordContents {
     /// Whether the log is written.
     pub log: bool,
     /// Name of the log in the run's folder.
@@ -99,7 +99,7 @@ pub enum SyncPoint {
     End,
 }
 
-impl Record {
+impl RecordContents {
     /// Whether the robots' panels are recorded.
     #[must_use]
     pub fn has_panels(&self) -> bool {
@@ -107,7 +107,7 @@ impl Record {
     }
 }
 
-impl Default for Record {
+impl Default for RecordContents {
     fn default() -> Self {
         Self {
             log: true,

@@ -27,10 +27,10 @@ impl Lateness {
 
     /// The rules as the lock-step takes them.
     #[must_use]
-    pub fn to_lockstep(&self) -> lockstep::Lateness {
+    pub fn to_lockstep(&self) -> lockstep::LatePolicy {
         let deadline = std::time::Duration::try_from_secs_f64(self.deadline_s);
 
-        lockstep::Lateness {
+        lockstep::LatePolicy {
             on_late: self.on_late,
             own: self.own.clone(),
             deadline: deadline.unwrap_or(std::time::Duration::MAX),

@@ -25,7 +25,7 @@ pub use protocol::messages::OnLate;
 
 pub use by_hand::kind_in_words;
 pub use change::{Change, Parent};
-pub use checked::{DEFAULT_SEED, MAX_GUESTS, Record, RobotSpec, Scenario, SyncPoint};
+pub use checked::{DEFAULT_SEED, MAX_GUESTS, RecordContents, RobotSpec, Scenario, SyncPoint};
 pub use checked::{to_wire, to_world};
 pub use fault::{Fault, FaultEnd};
 pub use lateness::Lateness;
@@ -53,13 +53,13 @@ impl Scenario {
         let source = Source::read(path)?;
         let folder = path.parent().unwrap_or(Path::new("."));
         // Parsed before it is changed, so that errors show the lines of the file.
-        let raw: raw::Scenario = source.parse()?;
+        let raw: raw::ScenarioFile = source.parse()?;
         if changes.is_empty() {
             return raw.check(&source, Some(folder));
         }
 
         let source = changes.apply(&source)?;
-        let raw: raw::Scenario = source.parse()?;
+        let raw: raw::ScenarioFile = source.parse()?;
         let mut scenario = raw.check(&source, Some(folder))?;
         scenario.parent = None; // It is no fork of that run any more.
         Ok(scenario)
@@ -75,7 +75,7 @@ impl Scenario {
         if !changes.is_empty() {
             source = changes.apply(&source)?;
         }
-        source.parse::<raw::Scenario>()?.remarks(&source)
+        source.parse::<raw::ScenarioFile>()?.remarks(&source)
     }
 
     /// Reads and checks the text of a scenario. Files that it names are relative to `folder`.
@@ -83,7 +83,9 @@ impl Scenario {
     /// # Errors
     /// [`FileError`] with line and caret.
     pub fn parse(source: &Source, folder: &Path) -> Result<Self, FileError> {
-        source.parse::<raw::Scenario>()?.check(source, Some(folder))
+        source
+            .parse::<raw::ScenarioFile>()?
+            .check(source, Some(folder))
     }
 
     /// Reads and checks an untrusted text of a scenario, which must not name files.
@@ -91,7 +93,7 @@ impl Scenario {
     /// # Errors
     /// [`FileError`] with line and caret.
     pub fn parse_alone(source: &Source) -> Result<Self, FileError> {
-        source.parse::<raw::Scenario>()?.check(source, None)
+        source.parse::<raw::ScenarioFile>()?.check(source, None)
     }
 
     /// The scenario as a file without defaults, which gives the same run.
@@ -99,7 +101,7 @@ impl Scenario {
     /// # Errors
     /// [`FileError`] if a parameter cannot be written as TOML (a JSON `null`).
     pub fn to_toml(&self) -> Result<String, FileError> {
-        toml::to_string(&raw::Scenario::from(self))
+        toml::to_string(&raw::ScenarioFile::from(self))
             .map_err(|error| FileError::new(error.to_string()))
     }
 }

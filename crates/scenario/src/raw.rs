@@ -33,7 +33,7 @@ use unplaced::unplaced;
 pub(super) use expect::Expectations;
 
 use super::change::Parent;
-use super::checked::{self, DEFAULT_SEED, Record, RobotSpec};
+use super::checked::{self, DEFAULT_SEED, RecordContents, RobotSpec};
 use super::lateness::Lateness;
 use super::placing::{self, PlacingCause, PlacingError};
 
@@ -46,7 +46,7 @@ const MAX_ROBOTS: usize = 1024;
 
 #[derive(Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Scenario {
+pub(super) struct ScenarioFile {
     seed: Option<Spanned<u64>>,
     tick: Option<Spanned<Time>>,
     duration: Option<Spanned<Time>>,
@@ -150,7 +150,7 @@ const LOSE_AFTER: u32 = 10;
 /// Sensing range, 6 ft [I].
 const SENSING_RANGE: Length = Length(1.8288);
 
-impl Scenario {
+impl ScenarioFile {
     /// Checks the scenario and fills in defaults. Files that it names are relative to `folder`; without one, which is for
     /// untrusted texts, it must not name files.
     pub(super) fn check(
@@ -359,8 +359,8 @@ impl CheckedNumber for u32 {
     }
 }
 
-fn record(raw: Option<RecordTable>, source: &Source) -> Result<Record, FileError> {
-    let default = Record::default();
+fn record(raw: Option<RecordTable>, source: &Source) -> Result<RecordContents, FileError> {
+    let default = RecordContents::default();
     let Some(raw) = raw else {
         return Ok(default);
     };
@@ -370,7 +370,7 @@ fn record(raw: Option<RecordTable>, source: &Source) -> Result<Record, FileError
             .map_err(|error| FileError::at(source, Some(name.span()), &error.to_string()))?;
     }
 
-    Ok(Record {
+    Ok(RecordContents {
         log: raw.log.unwrap_or(default.log),
         log_name: raw.log_name.map_or(default.log_name, Spanned::into_inner),
         frames: raw.frames.unwrap_or(default.frames),
@@ -454,7 +454,7 @@ struct FilePlaces {
 }
 
 impl FilePlaces {
-    fn of(raw: &Scenario) -> Self {
+    fn of(raw: &ScenarioFile) -> Self {
         let obstacles = raw.obstacles.iter();
         let robots = raw.robots.iter();
         Self {
@@ -529,7 +529,7 @@ fn to_json(value: &toml::Value) -> serde_json::Value {
     }
 }
 
-impl From<&checked::Scenario> for Scenario {
+impl From<&checked::Scenario> for ScenarioFile {
     fn from(scenario: &checked::Scenario) -> Self {
         let tick_s = scenario.tick_s;
         let lateness = &scenario.lateness;

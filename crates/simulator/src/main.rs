@@ -14,13 +14,13 @@ use protocol::messages::End;
 use record::names::{ENDPOINT, OPERATOR_CONFIG};
 use record::{IfTaken, RunFolder, RunLock, Summary};
 use scenario::{Changes, Override, Scenario};
-use simulator::server::{Options, REPEAT_AFTER, ReplayLog, Server, Stay};
+use simulator::server::{KeepAlive, REPEAT_AFTER, ReplayLog, Server, ServerOptions};
 use terminal::ADDRESS_TAKEN;
 
 /// The simulator of the Cooperative Affective Robot Simulator: owns the environment and the clock of one run.
 #[derive(Debug, Parser)]
 #[command(name = "cars-sim", version)]
-struct Args {
+struct SimulatorArgs {
     /// The scenario file, or the name of one that comes with the programs.
     scenario: PathBuf,
     /// Name of the run; its robots must name it, too.
@@ -86,7 +86,7 @@ enum StayMode {
     Viewed,
 }
 
-impl From<StayMode> for Stay {
+impl From<StayMode> for KeepAlive {
     fn from(mode: StayMode) -> Self {
         match mode {
             StayMode::Viewed => Self::Viewed,
@@ -96,7 +96,7 @@ impl From<StayMode> for Stay {
 }
 
 fn main() -> ExitCode {
-    let args: Args = match terminal::arguments() {
+    let args: SimulatorArgs = match terminal::arguments() {
         Ok(args) => args,
         Err(code) => return code,
     };
@@ -116,7 +116,7 @@ fn exit_code(summary: &Summary, no_verdict: bool) -> ExitCode {
     }
 }
 
-fn run(args: &Args) -> Result<ExitCode, Box<dyn Error + Send + Sync>> {
+fn run(args: &SimulatorArgs) -> Result<ExitCode, Box<dyn Error + Send + Sync>> {
     let duration_s = args.duration.map(|duration| duration.0);
     let scenario = Scenario::load(
         &shipped::find(&args.scenario, &[shipped::SCENARIOS]),
@@ -145,11 +145,11 @@ fn run(args: &Args) -> Result<ExitCode, Box<dyn Error + Send + Sync>> {
     };
     let folder = RunFolder::new(&args.out, &args.run);
     let (_lock, past) = open_folder(&folder, &scenario, args)?;
-    let options = Options {
+    let options = ServerOptions {
         run: args.run.clone(),
         speed: args.speed.0,
         is_paused: args.paused,
-        stay: args.stay.map_or(Stay::Never, Stay::from),
+        stay: args.stay.map_or(KeepAlive::Never, KeepAlive::from),
         repeat_after: REPEAT_AFTER,
     };
     let server = Server::open(bus, scenario, options, &folder, past)?;
@@ -180,7 +180,7 @@ fn run(args: &Args) -> Result<ExitCode, Box<dyn Error + Send + Sync>> {
 fn open_folder(
     folder: &RunFolder,
     scenario: &Scenario,
-    args: &Args,
+    args: &SimulatorArgs,
 ) -> Result<(RunLock, Option<ReplayLog>), FileError> {
     if args.resume {
         let (lock, files) = folder.reopen()?;

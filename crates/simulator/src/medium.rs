@@ -86,7 +86,7 @@ type Pair = (RobotName, RobotName);
 
 /// The decisions of the network at the beginning of a tick.
 #[derive(Debug, Default)]
-pub struct Decision {
+pub struct NetworkDecisions {
     /// Commands that arrive in this tick, by target, ordered by sender and number. A duplicated command is in the list twice.
     pub delivered: BTreeMap<RobotName, Vec<Arrival>>,
     /// Robots that each robot cannot query in this tick, in the order of names.
@@ -212,8 +212,8 @@ impl Medium {
     }
 
     /// The decisions at the beginning of `tick`.
-    pub fn decide(&mut self, tick: Tick) -> Decision {
-        let mut decision = Decision::default();
+    pub fn decide(&mut self, tick: Tick) -> NetworkDecisions {
+        let mut decision = NetworkDecisions::default();
         // Cuts come first, so that a command which is sent or arrives in the tick in which a cut begins is lost. Bursts advance before
         // any command draws. What arrives in this tick includes what was decided in it.
         self.update_cuts(tick, &mut decision.events);
@@ -408,7 +408,7 @@ impl Medium {
         (drawn < burst.loss).then_some(Cause::Burst)
     }
 
-    fn deliver(&mut self, tick: Tick, decision: &mut Decision) {
+    fn deliver(&mut self, tick: Tick, decision: &mut NetworkDecisions) {
         let mut arrivals = self.arrivals.remove(&tick).unwrap_or_default();
         // Some were decided in earlier ticks: the order in which a target reads them must not show when.
         arrivals.sort_by(|(one, _), (other, _)| {
@@ -446,7 +446,7 @@ impl Medium {
     }
 
     /// Decides once for each asker, target and tick whether queries are answered, for which both directions are needed.
-    fn decide_queries(&self, tick: Tick, decision: &mut Decision) {
+    fn decide_queries(&self, tick: Tick, decision: &mut NetworkDecisions) {
         let is_perfect = self.cut.is_empty() && !self.network.touches_queries();
         if is_perfect {
             return;

@@ -14,7 +14,7 @@ use protocol::event::log_line;
 use protocol::messages::{Awaited, LogRecord, Panel, Report};
 use protocol::{Line, PROTOCOL_VERSION, RobotName, RunName, Tick};
 use recording::content::Missed;
-use recording::{Frame, Header, PlacedRobot, TickView, Wall, WriteError, Writer};
+use recording::{Frame, Header, PlacedRobot, TickView, WallTimes, WriteError, Writer};
 
 use crate::simulation::{Simulation, TickRecord};
 use record::Record;
@@ -115,16 +115,16 @@ impl Observed {
     }
 
     /// Takes the times of a tick that is complete now, and what is about it alone.
-    fn take(&mut self, tick: Tick, begun: Instant) -> (Wall, BTreeMap<RobotName, Panel>) {
+    fn take(&mut self, tick: Tick, begun: Instant) -> (WallTimes, BTreeMap<RobotName, Panel>) {
         // Each tick has the panels that arrived in it, whether its times are recorded or not.
         let panels = std::mem::take(&mut self.panels);
         let Some(opened) = self.opened.take() else {
-            return (Wall::default(), panels);
+            return (WallTimes::default(), panels);
         };
 
         let since = |time: Instant| time.saturating_duration_since(begun).as_nanos() as u64;
         let reports = self.reports.iter();
-        let wall = Wall {
+        let wall = WallTimes {
             opened_ns: since(opened),
             completed_ns: since(Instant::now()),
             reports_ns: reports
@@ -144,7 +144,7 @@ struct PendingTick {
     lines: Vec<LogRecord>,
     reports: Vec<(RobotName, Arc<Report>)>,
     panels: BTreeMap<RobotName, Panel>,
-    wall: Wall,
+    wall: WallTimes,
 }
 
 /// Writes the record of one epoch.

@@ -38,7 +38,7 @@ mod watchdog;
 
 pub use event::ServerError;
 pub use live::LiveRun;
-pub use options::{Options, REPEAT_AFTER, Stay};
+pub use options::{KeepAlive, REPEAT_AFTER, ServerOptions};
 pub use process::Server;
 pub use recorded::RecordedRun;
 pub use replay_log::ReplayLog;

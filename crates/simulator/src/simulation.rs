@@ -3,20 +3,20 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use lockstep::{Bulletin, Exchange, IncarnationNotice, Membership, Outcome, Sent};
+use lockstep::{Bulletin, Exchange, IncarnationNotice, Membership, Sent, TickOutcome};
 use observe::{Monitors, Observation, RobotState};
 use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::event::{Blocker, Cause, WaitedFor};
 use protocol::messages::{
     CommandText, Correction, Cut, Delivery, End, FaultKind, HeldProcess, Intervention, NEWS_FLAGS,
-    News, OnLate, Parameters, ParametersOffer, Performative, Point, ProcessOrder, PublicState,
-    Report, SensedBody, SensedKind, SensedRobot, Standing, StateVariables, Welcome,
+    OnLate, Parameters, ParametersOffer, Performative, Point, ProcessOrder, PublicState, Report,
+    SensedBody, SensedKind, SensedRobot, Standing, StateVariables, TickUpdate, Welcome,
 };
 use protocol::random::{Stream, stream};
 use protocol::{
     Epoch, Event, Generation, Line, PROTOCOL_VERSION, RobotName, RunName, Seq, Tick, encode,
 };
-use world::{Body, HallError, Verdict, World};
+use world::{Body, HallError, MoveOutcome, World};
 
 use crate::digest::{Digest, TickDigest};
 use crate::medium::{Arrival, Medium, SentCommand};
@@ -29,7 +29,7 @@ const MAX_BODIES: usize = 4096;
 const MAX_OTHER_PARAMETERS: usize = MAX_MESSAGE_BYTES / 4;
 
 /// Reports, commands and membership changes of a tick.
-pub type Reports = Outcome<Arc<Report>, CommandText>;
+pub type Reports = TickOutcome<Arc<Report>, CommandText>;
 
 /// Reports and commands by robot.
 type ReportsByName = BTreeMap<RobotName, (Arc<Report>, Vec<Sent<CommandText>>)>;
@@ -77,7 +77,7 @@ pub struct Simulation {
     /// Robots that each robot cannot query in the tick in progress.
     unreachable: BTreeMap<RobotName, Vec<RobotName>>,
     /// News of the tick in progress; robots without any have no entry.
-    news: BTreeMap<RobotName, News>,
+    news: BTreeMap<RobotName, TickUpdate>,
     /// Events of the tick in progress.
     events: Vec<Event>,
     /// The last report of each robot.
@@ -173,7 +173,7 @@ impl Simulation {
     /// If the exchange is given up.
     pub fn init<E>(&mut self, robots: &mut E) -> Result<TickRecord, E::Error>
     where
-        E: Exchange<News, Arc<Report>, CommandText>,
+        E: Exchange<TickUpdate, Arc<Report>, CommandText>,
     {
         self.begin_init();
         let outcome = robots.exchange(0, self)?;
@@ -187,7 +187,7 @@ impl Simulation {
     /// If the exchange is given up. The tick is then incomplete and the epoch is over.
     pub fn step<E>(&mut self, robots: &mut E) -> Result<TickRecord, E::Error>
     where
-        E: Exchange<News, Arc<Report>, CommandText>,
+        E: Exchange<TickUpdate, Arc<Report>, CommandText>,
     {
         let tick = self.begin_tick();
         let outcome = robots.exchange(tick, self)?;
@@ -489,11 +489,11 @@ impl Simulation {
     /// The news of a robot for the tick in progress, with the incarnations that they name. Those of an incarnation that takes
     /// part from this tick on always contain its location.
     #[must_use]
-    pub fn news(&self, name: &RobotName, notice: IncarnationNotice) -> News {
-        let mut news = self.news.get(name).cloned().unwrap_or(News {
+    pub fn news(&self, name: &RobotName, notice: IncarnationNotice) -> TickUpdate {
+        let mut news = self.news.get(name).cloned().unwrap_or(TickUpdate {
             epoch: self.epoch,
             tick: self.now,
-            ..News::default()
+            ..TickUpdate::default()
         });
 
         news.joined = notice.joined;
@@ -529,7 +529,7 @@ impl Simulation {
         proposals
     }
 
-    fn note_moves(&mut self, verdicts: &[Verdict]) {
+    fn note_moves(&mut self, verdicts: &[MoveOutcome]) {
         for (index, verdict) in verdicts.iter().enumerate() {
             let by = self.blocker(*verdict);
             self.blocked[index] = by.is_some();
@@ -584,11 +584,11 @@ impl Simulation {
     }
 
     /// What has blocked a move; `None` if it was not blocked.
-    fn blocker(&self, verdict: Verdict) -> Option<Blocker> {
+    fn blocker(&self, verdict: MoveOutcome) -> Option<Blocker> {
         let by = match verdict {
-            Verdict::Advanced | Verdict::Stayed => return None,
-            Verdict::TooFast | Verdict::NotFinite => return Some(Blocker::TooFast),
-            Verdict::Blocked { by } => by,
+            MoveOutcome::Advanced | MoveOutcome::Stayed => return None,
+            MoveOutcome::TooFast | MoveOutcome::NotFinite => return Some(Blocker::TooFast),
+            MoveOutcome::Blocked { by } => by,
         };
 
         Some(match by {
@@ -600,14 +600,14 @@ impl Simulation {
     }
 
     /// Composes the news of the tick in progress, which contain exceptions only.
-    fn compose_news(&mut self, verdicts: &[Verdict]) {
+    fn compose_news(&mut self, verdicts: &[MoveOutcome]) {
         let mut all = BTreeMap::new();
         for (index, name) in self.names.iter().enumerate() {
             let is_refused = !verdicts.is_empty() && self.blocked[index];
             // What a robot proposed that has missed the last tick did not count. An incarnation that takes part from this tick
             // on is named: see `Self::news`.
             let is_corrected = is_refused || self.silent.contains(name);
-            let news = News {
+            let news = TickUpdate {
                 epoch: self.epoch,
                 tick: self.now,
                 joined: None,
@@ -1090,12 +1090,12 @@ impl Simulation {
     }
 }
 
-impl Bulletin<News> for Simulation {
+impl Bulletin<TickUpdate> for Simulation {
     fn robots(&self) -> BTreeSet<RobotName> {
         self.robots_with_news()
     }
 
-    fn compose(&self, robot: &RobotName, notice: IncarnationNotice) -> News {
+    fn compose(&self, robot: &RobotName, notice: IncarnationNotice) -> TickUpdate {
         self.news(robot, notice)
     }
 }

@@ -7,11 +7,11 @@ use std::convert::Infallible;
 use std::path::Path;
 use std::sync::Arc;
 
-use lockstep::{Bulletin, Exchange, Outcome, Sent};
+use lockstep::{Bulletin, Exchange, Sent, TickOutcome};
 use protocol::event::Cause;
 use protocol::messages::{
-    CommandText, Cut, FaultKind, Intervention, News, OnLate, Performative, Point, Report,
-    StateVariables,
+    CommandText, Cut, FaultKind, Intervention, OnLate, Performative, Point, Report, StateVariables,
+    TickUpdate,
 };
 use protocol::{RobotName, Tick};
 use scenario::Scenario;
@@ -56,15 +56,15 @@ impl Robots {
     }
 }
 
-impl Exchange<News, Arc<Report>, CommandText> for Robots {
+impl Exchange<TickUpdate, Arc<Report>, CommandText> for Robots {
     type Error = Infallible;
 
     fn exchange(
         &mut self,
         tick: Tick,
-        _news: &dyn Bulletin<News>,
-    ) -> Result<Outcome<Arc<Report>, CommandText>, Infallible> {
-        let mut outcome = Outcome::default();
+        _news: &dyn Bulletin<TickUpdate>,
+    ) -> Result<TickOutcome<Arc<Report>, CommandText>, Infallible> {
+        let mut outcome = TickOutcome::default();
         for (robot, at) in &self.0 {
             let mut commands = Vec::new();
             if robot.as_str() == "A" {

@@ -10,7 +10,7 @@ use protocol::messages::{CommandText, Performative};
 use protocol::{Event, RobotName};
 use scenario::Scenario;
 use scenario::diagnostic::{FileError, Source};
-use simulator::medium::{Decision, Medium, SentCommand};
+use simulator::medium::{Medium, NetworkDecisions, SentCommand};
 
 const ROBOTS: &str = "[[robot]]\nname = \"A\"\nat = [\"2 m\", \"2 m\"]\n[[robot]]\nname = \"B\"\nat = [\"4 m\", \"2 m\"]\n\
                       [[robot]]\nname = \"C\"\nat = [\"6 m\", \"2 m\"]\n";
@@ -49,7 +49,11 @@ fn command(from: &str, to: &str, seq: u64) -> SentCommand {
 }
 
 /// One command from A to B a tick, sent in the ticks from 1 on; what the network decides at the ticks from 2 on.
-fn play(network: &str, ticks: u64, also: impl Fn(u64, &mut Medium)) -> BTreeMap<u64, Decision> {
+fn play(
+    network: &str,
+    ticks: u64,
+    also: impl Fn(u64, &mut Medium),
+) -> BTreeMap<u64, NetworkDecisions> {
     let mut medium = medium(network);
     let one = |tick: u64| {
         medium.accept(command("A", "B", tick));
@@ -60,7 +64,7 @@ fn play(network: &str, ticks: u64, also: impl Fn(u64, &mut Medium)) -> BTreeMap<
 }
 
 /// Numbers of the commands from A that were lost, with the cause.
-fn lost(decisions: &BTreeMap<u64, Decision>) -> Vec<(u64, Cause)> {
+fn lost(decisions: &BTreeMap<u64, NetworkDecisions>) -> Vec<(u64, Cause)> {
     let dropped = |event: &Event| match event {
         Event::CommandDropped {
             from, seq, because, ..
@@ -75,8 +79,8 @@ fn lost(decisions: &BTreeMap<u64, Decision>) -> Vec<(u64, Cause)> {
 }
 
 /// When the commands from A to B arrived: tick and number.
-fn arrived(decisions: &BTreeMap<u64, Decision>) -> Vec<(u64, u64)> {
-    let at_b = |(tick, decision): (&u64, &Decision)| {
+fn arrived(decisions: &BTreeMap<u64, NetworkDecisions>) -> Vec<(u64, u64)> {
+    let at_b = |(tick, decision): (&u64, &NetworkDecisions)| {
         let arrivals = decision
             .delivered
             .get(&name("B"))
@@ -225,7 +229,7 @@ fn a_link_can_be_worse_than_the_rest() {
 }
 
 /// Who cannot ask whom at each tick, as one text.
-fn cut_off(decision: &Decision) -> String {
+fn cut_off(decision: &NetworkDecisions) -> String {
     let one = |(asker, targets): (&RobotName, &Vec<RobotName>)| {
         format!(
             "{asker}:{}",

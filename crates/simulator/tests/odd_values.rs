@@ -7,10 +7,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use config::shipped;
-use lockstep::{Bulletin, Exchange, Outcome};
+use lockstep::{Bulletin, Exchange, TickOutcome};
 use proptest::prelude::*;
 use protocol::Tick;
-use protocol::messages::{CommandText, News, Report};
+use protocol::messages::{CommandText, Report, TickUpdate};
 use scenario::Scenario;
 use scenario::diagnostic::{FileError, Source};
 use simulator::Simulation;
@@ -65,15 +65,15 @@ const VALUES: [&str; 22] = [
 /// Robots that never report.
 struct Nobody;
 
-impl Exchange<News, Arc<Report>, CommandText> for Nobody {
+impl Exchange<TickUpdate, Arc<Report>, CommandText> for Nobody {
     type Error = Infallible;
 
     fn exchange(
         &mut self,
         _: Tick,
-        _: &dyn Bulletin<News>,
-    ) -> Result<Outcome<Arc<Report>, CommandText>, Infallible> {
-        Ok(Outcome::default())
+        _: &dyn Bulletin<TickUpdate>,
+    ) -> Result<TickOutcome<Arc<Report>, CommandText>, Infallible> {
+        Ok(TickOutcome::default())
     }
 }
 

@@ -7,8 +7,8 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use lockstep::{Bulletin, Exchange, Outcome};
-use protocol::messages::{CommandText, End, News, Report};
+use lockstep::{Bulletin, Exchange, TickOutcome};
+use protocol::messages::{CommandText, End, Report, TickUpdate};
 use protocol::{RunName, Tick};
 use record::RunFolder;
 use record::RunLock;
@@ -20,15 +20,15 @@ use simulator::{Recorder, Simulation};
 /// Robots that miss every tick.
 struct Absent;
 
-impl Exchange<News, Arc<Report>, CommandText> for Absent {
+impl Exchange<TickUpdate, Arc<Report>, CommandText> for Absent {
     type Error = Infallible;
 
     fn exchange(
         &mut self,
         _tick: Tick,
-        _news: &dyn Bulletin<News>,
-    ) -> Result<Outcome<Arc<Report>, CommandText>, Infallible> {
-        Ok(Outcome::default())
+        _news: &dyn Bulletin<TickUpdate>,
+    ) -> Result<TickOutcome<Arc<Report>, CommandText>, Infallible> {
+        Ok(TickOutcome::default())
     }
 }
 

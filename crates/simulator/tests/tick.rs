@@ -7,10 +7,10 @@ use std::convert::Infallible;
 use std::path::Path;
 use std::sync::Arc;
 
-use lockstep::{Bulletin, Exchange, IncarnationNotice, Outcome, Sent};
+use lockstep::{Bulletin, Exchange, IncarnationNotice, Sent, TickOutcome};
 use protocol::event::{Blocker, Cause, log_line};
 use protocol::messages::{
-    CommandText, Delivery, End, News, Performative, Point, Report, SensedKind, StateVariables,
+    CommandText, Delivery, End, Performative, Point, Report, SensedKind, StateVariables, TickUpdate,
 };
 use protocol::{RobotName, RunName, Tick};
 use scenario::Scenario;
@@ -18,7 +18,7 @@ use scenario::diagnostic::Source;
 use simulator::{Event, Simulation, TickRecord};
 
 /// News of a tick, by robot.
-type AllNews = BTreeMap<RobotName, News>;
+type AllNews = BTreeMap<RobotName, TickUpdate>;
 type Commands = Vec<Sent<CommandText>>;
 
 /// Robots that do as a closure says, and the news they got.
@@ -66,7 +66,7 @@ impl<F: FnMut(&RobotName, &mut Report, &mut Commands)> Puppets<F> {
     }
 }
 
-impl<F> Exchange<News, Arc<Report>, CommandText> for Puppets<F>
+impl<F> Exchange<TickUpdate, Arc<Report>, CommandText> for Puppets<F>
 where
     F: FnMut(&RobotName, &mut Report, &mut Commands),
 {
@@ -75,14 +75,14 @@ where
     fn exchange(
         &mut self,
         tick: Tick,
-        bulletin: &dyn Bulletin<News>,
-    ) -> Result<Outcome<Arc<Report>, CommandText>, Infallible> {
+        bulletin: &dyn Bulletin<TickUpdate>,
+    ) -> Result<TickOutcome<Arc<Report>, CommandText>, Infallible> {
         let mut news = AllNews::new();
         for name in bulletin.robots() {
             let of_robot = bulletin.compose(&name, IncarnationNotice::default());
             news.insert(name, of_robot);
         }
-        let mut outcome = Outcome::default();
+        let mut outcome = TickOutcome::default();
         let names: Vec<RobotName> = self.proposals.keys().cloned().collect();
         for name in names {
             let mut report = self.stay(&name, tick, &news);

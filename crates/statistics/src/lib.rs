@@ -23,4 +23,4 @@ pub use holm::holm;
 pub use paired_times::PairedTimes;
 pub use sample::{Step, ecdf, quantile};
 pub use sign_flip::{FLIPS, SignFlip, dominance, least_p};
-pub use survival::{Survival, SurvivalStep, TimeTo};
+pub use survival::{CensoredTime, Survival, SurvivalStep};

@@ -1,6 +1,6 @@
 //! Times of pairs of runs, as numbers whose differences can be tested and have intervals.
 
-use crate::survival::{Counts, TimeTo, tally};
+use crate::survival::{CensoredTime, RiskCounts, tally};
 
 /// The differences between the times of two arms, pair by pair.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,12 +19,12 @@ impl PairedTimes {
     /// pseudo-value in the sample of all runs of both arms (Andersen, Hansen and Klein 2004, Regression analysis of restricted
     /// mean survival time based on pseudo-observations, Lifetime Data Analysis 10).
     #[must_use]
-    pub fn of(arm: &[TimeTo], baseline: &[TimeTo]) -> Self {
+    pub fn of(arm: &[CensoredTime], baseline: &[CensoredTime]) -> Self {
         let longest_s = longest_s(arm).max(longest_s(baseline));
         let known_s = known_until_s(arm).min(known_until_s(baseline));
         let until_s = known_s.min(longest_s);
 
-        let both: Vec<TimeTo> = arm.iter().chain(baseline).copied().collect();
+        let both: Vec<CensoredTime> = arm.iter().chain(baseline).copied().collect();
         let values_s = restricted_s(&both, until_s);
         let (of_arm, of_baseline) = values_s.split_at(arm.len());
         let pairs = of_arm.iter().zip(of_baseline);
@@ -36,16 +36,16 @@ impl PairedTimes {
 }
 
 /// The time of each run up to `until_s`, or what it is expected to be.
-fn restricted_s(times: &[TimeTo], until_s: f64) -> Vec<f64> {
+fn restricted_s(times: &[CensoredTime], until_s: f64) -> Vec<f64> {
     let mut restricted = Vec::new();
     for time in times {
-        restricted.push(TimeTo {
+        restricted.push(CensoredTime {
             time_s: time.time_s.min(until_s),
             is_event: time.is_event && time.time_s < until_s,
         });
     }
 
-    let is_known = |time: &TimeTo| time.is_event || time.time_s >= until_s;
+    let is_known = |time: &CensoredTime| time.is_event || time.time_s >= until_s;
     if restricted.iter().all(is_known) {
         return restricted.iter().map(|time| time.time_s).collect();
     }
@@ -53,7 +53,7 @@ fn restricted_s(times: &[TimeTo], until_s: f64) -> Vec<f64> {
 }
 
 /// n times the restricted mean of the sample, less n - 1 times that of the sample without the run.
-fn pseudo_values(times: &[TimeTo], until_s: f64) -> Vec<f64> {
+fn pseudo_values(times: &[CensoredTime], until_s: f64) -> Vec<f64> {
     let steps = tally(times);
     let rest_s = rest_s(&steps, until_s);
     let before = before_with_one_fewer(&steps);
@@ -72,7 +72,7 @@ fn pseudo_values(times: &[TimeTo], until_s: f64) -> Vec<f64> {
 }
 
 /// What follows each step until the end, as seen from there: the area under the curve divided by its height.
-fn rest_s(steps: &[Counts], until_s: f64) -> Vec<f64> {
+fn rest_s(steps: &[RiskCounts], until_s: f64) -> Vec<f64> {
     let mut rest_s = vec![0.0; steps.len()];
     for index in (0..steps.len()).rev() {
         rest_s[index] = match steps.get(index + 1) {
@@ -88,7 +88,7 @@ fn rest_s(steps: &[Counts], until_s: f64) -> Vec<f64> {
 
 /// The area under the curve until each step and its height there, with one run fewer at risk: a run is at risk until its own
 /// step.
-fn before_with_one_fewer(steps: &[Counts]) -> Vec<(f64, f64)> {
+fn before_with_one_fewer(steps: &[RiskCounts]) -> Vec<(f64, f64)> {
     let mut before = Vec::new();
     let mut area_s = 0.0;
     let mut share = 1.0;
@@ -110,14 +110,14 @@ fn stays(events: usize, at_risk: usize) -> f64 {
     1.0 - events as f64 / at_risk as f64
 }
 
-fn longest_s(times: &[TimeTo]) -> f64 {
+fn longest_s(times: &[CensoredTime]) -> f64 {
     times.iter().map(|time| time.time_s).fold(0.0, f64::max)
 }
 
 /// Up to which time a curve is known, seconds: without an end if it reaches zero.
-fn known_until_s(times: &[TimeTo]) -> f64 {
+fn known_until_s(times: &[CensoredTime]) -> f64 {
     let longest_s = longest_s(times);
-    let is_open = |time: &TimeTo| time.time_s >= longest_s && !time.is_event;
+    let is_open = |time: &CensoredTime| time.time_s >= longest_s && !time.is_event;
     if times.iter().any(is_open) {
         longest_s
     } else {
@@ -132,22 +132,22 @@ mod tests {
     use super::*;
     use crate::Survival;
 
-    fn event(time_s: f64) -> TimeTo {
-        TimeTo {
+    fn event(time_s: f64) -> CensoredTime {
+        CensoredTime {
             time_s,
             is_event: true,
         }
     }
 
-    fn open(time_s: f64) -> TimeTo {
-        TimeTo {
+    fn open(time_s: f64) -> CensoredTime {
+        CensoredTime {
             time_s,
             is_event: false,
         }
     }
 
     /// The area under the curve of Kaplan and Meier.
-    fn area_s(times: &[TimeTo], until_s: f64) -> f64 {
+    fn area_s(times: &[CensoredTime], until_s: f64) -> f64 {
         let mut area_s = 0.0;
         let mut since_s = 0.0;
         let mut share = 1.0;
@@ -195,9 +195,9 @@ mod tests {
         fn pseudo_values_are_those_of_the_definition(
             times in prop::collection::vec((0_u8..12, any::<bool>()), 2..14),
         ) {
-            let times: Vec<TimeTo> = times
+            let times: Vec<CensoredTime> = times
                 .iter()
-                .map(|(time, is_event)| TimeTo { time_s: f64::from(*time), is_event: *is_event })
+                .map(|(time, is_event)| CensoredTime { time_s: f64::from(*time), is_event: *is_event })
                 .collect();
             let until_s = longest_s(&times);
 
@@ -215,9 +215,9 @@ mod tests {
         fn differences_turn_with_the_arms(
             times in prop::collection::vec(((0_u8..12, any::<bool>()), (0_u8..12, any::<bool>())), 1..14),
         ) {
-            let time = |(time, is_event): (u8, bool)| TimeTo { time_s: f64::from(time), is_event };
-            let arm: Vec<TimeTo> = times.iter().map(|pair| time(pair.0)).collect();
-            let baseline: Vec<TimeTo> = times.iter().map(|pair| time(pair.1)).collect();
+            let time = |(time, is_event): (u8, bool)| CensoredTime { time_s: f64::from(time), is_event };
+            let arm: Vec<CensoredTime> = times.iter().map(|pair| time(pair.0)).collect();
+            let baseline: Vec<CensoredTime> = times.iter().map(|pair| time(pair.1)).collect();
             let found = PairedTimes::of(&arm, &baseline);
             let turned = PairedTimes::of(&baseline, &arm);
             prop_assert_eq!(found.until_s, turned.until_s);

@@ -7,7 +7,7 @@ use crate::shares::wilson;
 
 /// A time, seconds, and whether it ends with the event; otherwise the run ends then, without the event (right-censored).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TimeTo {
+pub struct CensoredTime {
     /// The time, seconds.
     pub time_s: f64,
     /// Whether the event occurs then.
@@ -57,7 +57,7 @@ pub struct SurvivalStep {
 impl Survival {
     /// The estimate from independent runs.
     #[must_use]
-    pub fn of(times: &[TimeTo]) -> Self {
+    pub fn of(times: &[CensoredTime]) -> Self {
         let mut curve: Vec<SurvivalStep> = Vec::new();
         let mut share = 1.0;
         // Greenwood's sum.
@@ -110,7 +110,7 @@ impl std::fmt::Display for Survival {
 }
 
 /// What happens to a sample at one time.
-pub(super) struct Counts {
+pub(super) struct RiskCounts {
     pub(super) time_s: f64,
     pub(super) at_risk: usize,
     pub(super) events: usize,
@@ -118,14 +118,14 @@ pub(super) struct Counts {
 }
 
 /// The times of a sample in their order, each once.
-pub(super) fn tally(times: &[TimeTo]) -> Vec<Counts> {
+pub(super) fn tally(times: &[CensoredTime]) -> Vec<RiskCounts> {
     let mut sorted = times.to_vec();
     sorted.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
 
-    let mut tally: Vec<Counts> = Vec::new();
+    let mut tally: Vec<RiskCounts> = Vec::new();
     for (before, time) in sorted.iter().enumerate() {
         if tally.last().is_none_or(|last| last.time_s != time.time_s) {
-            tally.push(Counts {
+            tally.push(RiskCounts {
                 time_s: time.time_s,
                 at_risk: sorted.len() - before,
                 events: 0,
@@ -158,16 +158,16 @@ mod tests {
     use super::*;
     use crate::{Estimate, ecdf};
 
-    fn sample(events: &[f64], censored: &[f64]) -> Vec<TimeTo> {
+    fn sample(events: &[f64], censored: &[f64]) -> Vec<CensoredTime> {
         let mut times = Vec::new();
         for time_s in events {
-            times.push(TimeTo {
+            times.push(CensoredTime {
                 time_s: *time_s,
                 is_event: true,
             });
         }
         for time_s in censored {
-            times.push(TimeTo {
+            times.push(CensoredTime {
                 time_s: *time_s,
                 is_event: false,
             });
@@ -176,7 +176,7 @@ mod tests {
     }
 
     /// Weeks of remission of children with leukemia (Freireich et al. 1963), with 6-mercaptopurine.
-    fn mercaptopurine() -> Vec<TimeTo> {
+    fn mercaptopurine() -> Vec<CensoredTime> {
         sample(
             &[6.0, 6.0, 6.0, 7.0, 10.0, 13.0, 16.0, 22.0, 23.0],
             &[
@@ -268,7 +268,7 @@ mod tests {
         ) {
             let mut values = Vec::new();
             for (time, is_event) in times {
-                values.push(TimeTo { time_s: f64::from(time), is_event });
+                values.push(CensoredTime { time_s: f64::from(time), is_event });
             }
             let survival = Survival::of(&values);
             for step in &survival.curve {

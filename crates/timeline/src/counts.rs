@@ -6,7 +6,7 @@ use protocol::event::Cause;
 use protocol::{Event, RobotName, Tick};
 use serde::{Deserialize, Serialize};
 
-use crate::span::{Kind, Span};
+use crate::span::{Span, StateKind};
 
 /// Counts of the events of a run. Memory is bounded by the names of robots, states and the texts of commands.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -122,8 +122,8 @@ impl Counts {
         if ticks > 0 {
             let robot = self.robot(&stay.robot);
             let states = match stay.kind {
-                Kind::Emotion => &mut robot.emotions,
-                Kind::Behavior => &mut robot.behaviors,
+                StateKind::Emotion => &mut robot.emotions,
+                StateKind::Behavior => &mut robot.behaviors,
             };
             *states.ticks.entry(stay.name.clone()).or_default() += ticks;
         }
@@ -141,10 +141,10 @@ impl Counts {
 impl RobotCounts {
     /// The counts of its states of a kind.
     #[must_use]
-    pub fn states(&self, kind: Kind) -> &StateCounts {
+    pub fn states(&self, kind: StateKind) -> &StateCounts {
         match kind {
-            Kind::Emotion => &self.emotions,
-            Kind::Behavior => &self.behaviors,
+            StateKind::Emotion => &self.emotions,
+            StateKind::Behavior => &self.behaviors,
         }
     }
 }

@@ -7,8 +7,8 @@ use protocol::messages::FaultKind;
 use protocol::{Event, RobotName, Seq, Tick};
 
 use crate::span::{
-    Absence, Change, Command, CommandEnd, Cut, Fault, Joined, Kind, Missed, Period, QueriesLost,
-    Span, Stay,
+    Absence, ChangeSpan, CommandEnd, CommandSpan, CutSpan, FaultSpan, Joined, MissedTicks, Period,
+    QueriesLost, Span, StateKind, StateSpan,
 };
 
 /// What is in progress after an event of a run. Memory is bounded by what is in progress, whatever the length of the run.
@@ -16,8 +16,8 @@ use crate::span::{
 pub struct Timeline {
     robots: BTreeMap<RobotName, RobotProgress>,
     /// Commands under way, by sender and number.
-    commands: BTreeMap<(RobotName, Seq), Command>,
-    cuts: BTreeMap<(RobotName, RobotName), Cut>,
+    commands: BTreeMap<(RobotName, Seq), CommandSpan>,
+    cuts: BTreeMap<(RobotName, RobotName), CutSpan>,
     /// The last lost queries of each pair.
     queries: BTreeMap<(RobotName, RobotName), QueriesLost>,
     /// The last change of each part of the scenario, by its path.
@@ -67,8 +67,8 @@ impl Timeline {
     /// Applies an event of a tick. Returns what is over with it.
     pub fn apply(&mut self, tick: Tick, event: &Event) -> Vec<Span> {
         match event {
-            Event::Emotion { robot, to, .. } => self.enter(robot, Kind::Emotion, to, tick),
-            Event::Behavior { robot, to, .. } => self.enter(robot, Kind::Behavior, to, tick),
+            Event::Emotion { robot, to, .. } => self.enter(robot, StateKind::Emotion, to, tick),
+            Event::Behavior { robot, to, .. } => self.enter(robot, StateKind::Behavior, to, tick),
             Event::Joined {
                 robot, generation, ..
             } => {
@@ -99,7 +99,7 @@ impl Timeline {
             } => {
                 // A cut that goes on with another scope is another span.
                 let over = self.heal(from, to, tick);
-                let cut = Cut {
+                let cut = CutSpan {
                     from: from.clone(),
                     to: to.clone(),
                     commands: *commands,
@@ -118,7 +118,7 @@ impl Timeline {
                 performative,
                 command,
             } => {
-                let sent = Command {
+                let sent = CommandSpan {
                     from: from.clone(),
                     to: to.clone(),
                     seq: *seq,
@@ -151,7 +151,7 @@ impl Timeline {
                 let end = CommandEnd { tick, lost };
                 self.change_command(from, *seq, |command| command.ends.push(end))
             }
-            Event::Changed { set, .. } => vec![Span::Change(Change {
+            Event::Changed { set, .. } => vec![Span::Change(ChangeSpan {
                 tick,
                 before: self.replace_setting(set),
                 set: set.clone(),
@@ -190,7 +190,7 @@ impl Timeline {
 
     /// The emotion or behavior that a robot has reported last, whether it takes part or not.
     #[must_use]
-    pub fn state(&self, robot: &RobotName, kind: Kind) -> Option<&str> {
+    pub fn state(&self, robot: &RobotName, kind: StateKind) -> Option<&str> {
         let state = self.robots.get(robot)?.state(kind);
         state.map(|state| state.name.as_str())
     }
@@ -210,7 +210,7 @@ impl Timeline {
 
     /// A command of which a copy is under way, by its sender and number.
     #[must_use]
-    pub fn command(&self, from: &RobotName, seq: Seq) -> Option<&Command> {
+    pub fn command(&self, from: &RobotName, seq: Seq) -> Option<&CommandSpan> {
         self.commands.get(&(from.clone(), seq))
     }
 
@@ -218,11 +218,11 @@ impl Timeline {
         self.robots.entry(name.clone()).or_default()
     }
 
-    fn enter(&mut self, name: &RobotName, kind: Kind, to: &str, tick: Tick) -> Vec<Span> {
+    fn enter(&mut self, name: &RobotName, kind: StateKind, to: &str, tick: Tick) -> Vec<Span> {
         let robot = self.robot(name);
         let state = match kind {
-            Kind::Emotion => &mut robot.emotion,
-            Kind::Behavior => &mut robot.behavior,
+            StateKind::Emotion => &mut robot.emotion,
+            StateKind::Behavior => &mut robot.behavior,
         };
         let before = state.replace(StateSince {
             name: to.to_owned(),
@@ -243,7 +243,7 @@ impl Timeline {
 
         robot.lost = Some(tick);
         let mut over = Vec::new();
-        for kind in [Kind::Emotion, Kind::Behavior] {
+        for kind in [StateKind::Emotion, StateKind::Behavior] {
             let state = robot.state(kind).cloned();
             over.extend(state.and_then(|state| state.until(name, kind, tick)));
         }
@@ -279,7 +279,7 @@ impl Timeline {
 
         let before = last.replace(Period::only(tick));
         let robot = name.clone();
-        let over = before.map(|period| Span::Missed(Missed { robot, period }));
+        let over = before.map(|period| Span::Missed(MissedTicks { robot, period }));
         over.into_iter().collect()
     }
 
@@ -289,7 +289,7 @@ impl Timeline {
         // A fault that begins while one of its kind lasts ends that one: a process has each kind once.
         if let Some(index) = faults.iter().position(|(other, _)| *other == kind) {
             let (_, begin) = faults.remove(index);
-            over.push(Span::Fault(Fault {
+            over.push(Span::Fault(FaultSpan {
                 robot: name.clone(),
                 kind,
                 period: Period {
@@ -343,7 +343,7 @@ impl Timeline {
         &mut self,
         from: &RobotName,
         seq: Seq,
-        change: impl FnOnce(&mut Command),
+        change: impl FnOnce(&mut CommandSpan),
     ) -> Vec<Span> {
         let key = (from.clone(), seq);
         let Some(command) = self.commands.get_mut(&key) else {
@@ -367,10 +367,10 @@ impl Timeline {
 }
 
 impl RobotProgress {
-    fn state(&self, kind: Kind) -> Option<&StateSince> {
+    fn state(&self, kind: StateKind) -> Option<&StateSince> {
         match kind {
-            Kind::Emotion => self.emotion.as_ref(),
-            Kind::Behavior => self.behavior.as_ref(),
+            StateKind::Emotion => self.emotion.as_ref(),
+            StateKind::Behavior => self.behavior.as_ref(),
         }
     }
 
@@ -383,9 +383,9 @@ impl RobotProgress {
                 period: Period::since(begin),
             })),
             None => {
-                for kind in [Kind::Emotion, Kind::Behavior] {
+                for kind in [StateKind::Emotion, StateKind::Behavior] {
                     spans.extend(self.state(kind).map(|state| {
-                        Span::Stay(Stay {
+                        Span::Stay(StateSpan {
                             robot: robot(),
                             kind,
                             name: state.name.clone(),
@@ -397,13 +397,13 @@ impl RobotProgress {
         }
 
         spans.extend(self.missed.map(|period| {
-            Span::Missed(Missed {
+            Span::Missed(MissedTicks {
                 robot: robot(),
                 period,
             })
         }));
         for (kind, begin) in &self.faults {
-            spans.push(Span::Fault(Fault {
+            spans.push(Span::Fault(FaultSpan {
                 robot: robot(),
                 kind: *kind,
                 period: Period::since(*begin),
@@ -415,9 +415,9 @@ impl RobotProgress {
 
 impl StateSince {
     /// The stay that is over in a tick; `None` if it has lasted for no tick.
-    fn until(self, robot: &RobotName, kind: Kind, end: Tick) -> Option<Span> {
+    fn until(self, robot: &RobotName, kind: StateKind, end: Tick) -> Option<Span> {
         (self.begin < end).then(|| {
-            Span::Stay(Stay {
+            Span::Stay(StateSpan {
                 robot: robot.clone(),
                 kind,
                 name: self.name,

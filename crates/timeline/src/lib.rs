@@ -16,8 +16,8 @@ mod span;
 pub use counts::{Counts, LinkCounts, RobotCounts, StateCounts};
 pub use fold::Timeline;
 pub use span::{
-    Absence, Change, Command, CommandEnd, Cut, Fault, Joined, Kind, Missed, Period, QueriesLost,
-    Span, Stay,
+    Absence, ChangeSpan, CommandEnd, CommandSpan, CutSpan, FaultSpan, Joined, MissedTicks, Period,
+    QueriesLost, Span, StateKind, StateSpan,
 };
 
 #[cfg(test)]

@@ -44,28 +44,28 @@ impl Period {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Span {
     /// A robot was in a state.
-    Stay(Stay),
+    Stay(StateSpan),
     /// A robot took no part.
     Absence(Absence),
     /// A robot missed ticks.
-    Missed(Missed),
+    Missed(MissedTicks),
     /// A process had a fault.
-    Fault(Fault),
+    Fault(FaultSpan),
     /// A link was cut.
-    Cut(Cut),
+    Cut(CutSpan),
     /// A robot could not have queried another one, by chance.
     QueriesLost(QueriesLost),
     /// A command was sent.
-    Command(Command),
+    Command(CommandSpan),
     /// A robot joined after the beginning of the run: a moment.
     Joined(Joined),
     /// The scenario changed: a moment.
-    Change(Change),
+    Change(ChangeSpan),
 }
 
 /// What a state is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Kind {
+pub enum StateKind {
     /// What the robot feels.
     Emotion,
     /// What it does.
@@ -74,11 +74,11 @@ pub enum Kind {
 
 /// A time without a break in which a robot was in one state.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Stay {
+pub struct StateSpan {
     /// The robot.
     pub robot: RobotName,
     /// What the state is about.
-    pub kind: Kind,
+    pub kind: StateKind,
     /// Name of the state.
     pub name: String,
     /// When. One that is over lasted for at least one tick.
@@ -96,7 +96,7 @@ pub struct Absence {
 
 /// Consecutive ticks that a robot missed.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Missed {
+pub struct MissedTicks {
     /// The robot.
     pub robot: RobotName,
     /// When; it always has an end so far.
@@ -105,7 +105,7 @@ pub struct Missed {
 
 /// A fault of a robot's process.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Fault {
+pub struct FaultSpan {
     /// The robot.
     pub robot: RobotName,
     /// The fault.
@@ -116,7 +116,7 @@ pub struct Fault {
 
 /// A link that was cut, in one direction. If what is cut changes, another cut follows.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Cut {
+pub struct CutSpan {
     /// The robot that cannot reach the other.
     pub from: RobotName,
     /// The other one.
@@ -144,7 +144,7 @@ pub struct QueriesLost {
 
 /// A command and its fate.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Command {
+pub struct CommandSpan {
     /// The sender.
     pub from: RobotName,
     /// The target.
@@ -165,7 +165,7 @@ pub struct Command {
     pub ends: Vec<CommandEnd>,
 }
 
-impl Command {
+impl CommandSpan {
     /// Whether a copy of it was lost.
     #[must_use]
     pub fn is_lost(&self) -> bool {
@@ -208,7 +208,7 @@ pub struct Joined {
 
 /// The scenario is another one from a tick on.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Change {
+pub struct ChangeSpan {
     /// The tick.
     pub tick: Tick,
     /// What is set, as `path=value`.

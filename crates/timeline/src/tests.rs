@@ -202,7 +202,7 @@ fn a_robot_that_is_lost_at_the_end_is_in_no_state() {
 
     let (timeline, _) = folded(&events);
     assert_eq!(timeline.lost_since(&a()), Some(7));
-    assert_eq!(timeline.state(&a(), Kind::Emotion), Some("X"));
+    assert_eq!(timeline.state(&a(), StateKind::Emotion), Some("X"));
     assert!(timeline.has_missed(&a(), 7) && !timeline.has_missed(&a(), 8));
     assert_eq!(timeline.robots().collect::<Vec<_>>(), [&a()]);
 
@@ -333,9 +333,9 @@ fn counts_are_by_robot_and_by_link() {
     let one = &counts.robots[&a()];
     assert_eq!((one.returns, one.missed, one.blocked), (1, 1, 1));
     assert_eq!(one.sent["go"], 2);
-    assert_eq!(one.states(Kind::Behavior).entered.len(), 2);
+    assert_eq!(one.states(StateKind::Behavior).entered.len(), 2);
     let transition = ("SERVE".to_owned(), "WAIT".to_owned());
-    assert_eq!(one.states(Kind::Behavior).transitions[&transition], 1);
+    assert_eq!(one.states(StateKind::Behavior).transitions[&transition], 1);
     assert_eq!(counts.robots.len(), 2);
     let other = &counts.robots[&name("B")];
     assert_eq!((other.received, other.dropped), (1, 1));

@@ -70,6 +70,6 @@ pub use bodies::{Blocker, Body, Near};
 pub use error::{HallError, TriangularError};
 pub use guests::Course;
 pub use hall::{BODIES_MAX, BODY_MIN_M, Field, Guests, Hall, SIDE_MAX_M, TOLERANCE_M};
-pub use motion::{Verdict, World};
+pub use motion::{MoveOutcome, World};
 pub use point::Point;
 pub use triangular::Triangular;

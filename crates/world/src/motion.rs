@@ -10,7 +10,7 @@ use rand::Rng;
 
 /// The outcome of a robot's proposal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
+pub enum MoveOutcome {
     /// The robot is at the location it proposed.
     Advanced,
     /// The robot proposed no location and has not moved.
@@ -72,7 +72,7 @@ impl<R: Rng> World<R> {
     /// # Panics
     ///
     /// Panics unless there is exactly one proposal for each robot.
-    pub fn advance(&mut self, proposals: &[Option<Point>]) -> Vec<Verdict> {
+    pub fn advance(&mut self, proposals: &[Option<Point>]) -> Vec<MoveOutcome> {
         assert_eq!(
             proposals.len(),
             self.robots().len(),
@@ -89,22 +89,22 @@ impl<R: Rng> World<R> {
         verdicts
     }
 
-    fn advance_robot(&mut self, index: usize, proposal: Option<Point>) -> Verdict {
+    fn advance_robot(&mut self, index: usize, proposal: Option<Point>) -> MoveOutcome {
         let Some(to) = proposal else {
-            return Verdict::Stayed;
+            return MoveOutcome::Stayed;
         };
         if !to.is_finite() {
-            return Verdict::NotFinite;
+            return MoveOutcome::NotFinite;
         }
 
         let distance_m = self.robots()[index].distance_m(to);
         if distance_m > self.stride_m + TOLERANCE_M {
-            return Verdict::TooFast;
+            return MoveOutcome::TooFast;
         }
 
         match self.bodies.advance_robot(index, to) {
-            Ok(()) => Verdict::Advanced,
-            Err(by) => Verdict::Blocked { by },
+            Ok(()) => MoveOutcome::Advanced,
+            Err(by) => MoveOutcome::Blocked { by },
         }
     }
 }

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::AtomicBool;
 
-use experiments::hunt::{Budget, Kind, Options, Subject, hunt};
+use experiments::hunt::{FaultClass, HuntBudget, HuntOptions, Subject, hunt};
 use scenario::Changes;
 
 fn main() -> Result<ExitCode, Box<dyn std::error::Error>> {
@@ -19,11 +19,11 @@ fn main() -> Result<ExitCode, Box<dyn std::error::Error>> {
 
     let changes = Changes::default();
     let subject = Subject::load_by(Path::new(scenario), &changes, system_tests::planted::make)?;
-    let options = Options {
+    let options = HuntOptions {
         seed: seed.parse()?,
-        budget: Budget::Plans(plans.parse()?),
+        budget: HuntBudget::Plans(plans.parse()?),
         jobs: jobs.parse()?,
-        kinds: Kind::ALL.to_vec(),
+        kinds: FaultClass::ALL.to_vec(),
         longest_s: 60.0,
         expect: BTreeSet::new(),
         shrink_runs: 1000,

@@ -1,7 +1,7 @@
 //! What was used before, for comparison: the bootstrap (BCa), Greenwood's band, the log-rank test.
 
 use protocol::random;
-use statistics::TimeTo;
+use statistics::CensoredTime;
 
 /// Resamples of an interval. It had 10,000; the coverage is the same.
 const RESAMPLES: usize = 1_000;
@@ -69,13 +69,17 @@ pub(crate) fn greenwood(events: usize, n: usize) -> (f64, f64) {
 }
 
 /// The difference of the areas under the curves of Kaplan and Meier up to a time, of the pairs with these indices.
-pub(crate) fn restricted_s(pairs: &[(TimeTo, TimeTo)], indices: &[usize], until_s: f64) -> f64 {
-    let mut arm: Vec<TimeTo> = indices.iter().map(|index| pairs[*index].0).collect();
-    let mut baseline: Vec<TimeTo> = indices.iter().map(|index| pairs[*index].1).collect();
+pub(crate) fn restricted_s(
+    pairs: &[(CensoredTime, CensoredTime)],
+    indices: &[usize],
+    until_s: f64,
+) -> f64 {
+    let mut arm: Vec<CensoredTime> = indices.iter().map(|index| pairs[*index].0).collect();
+    let mut baseline: Vec<CensoredTime> = indices.iter().map(|index| pairs[*index].1).collect();
     area_s(&mut arm, until_s) - area_s(&mut baseline, until_s)
 }
 
-fn area_s(times: &mut [TimeTo], until_s: f64) -> f64 {
+fn area_s(times: &mut [CensoredTime], until_s: f64) -> f64 {
     times.sort_by(|a, b| {
         let by_time = a.time_s.total_cmp(&b.time_s);
         by_time.then(b.is_event.cmp(&a.is_event))
@@ -98,7 +102,7 @@ fn area_s(times: &mut [TimeTo], until_s: f64) -> f64 {
 }
 
 /// The p value of the log-rank test, which takes no account of pairs.
-pub(crate) fn log_rank(pairs: &[(TimeTo, TimeTo)]) -> f64 {
+pub(crate) fn log_rank(pairs: &[(CensoredTime, CensoredTime)]) -> f64 {
     let both = pairs.iter().flat_map(|(arm, base)| [arm, base]);
     let mut events_s: Vec<f64> = both
         .filter(|time| time.is_event)
@@ -110,8 +114,9 @@ pub(crate) fn log_rank(pairs: &[(TimeTo, TimeTo)]) -> f64 {
     let mut excess = 0.0;
     let mut variance = 0.0;
     for time_s in events_s {
-        let at_risk = |time: &TimeTo| f64::from(u8::from(time.time_s >= time_s));
-        let event = |time: &TimeTo| f64::from(u8::from(time.is_event && time.time_s == time_s));
+        let at_risk = |time: &CensoredTime| f64::from(u8::from(time.time_s >= time_s));
+        let event =
+            |time: &CensoredTime| f64::from(u8::from(time.is_event && time.time_s == time_s));
         let mut counts = [0.0; 4];
         for (arm, base) in pairs {
             for (count, one) in

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use protocol::random;
-use statistics::{Estimate, PairedTimes, TimeTo};
+use statistics::{CensoredTime, Estimate, PairedTimes};
 
 use crate::population::{NUMBERS, Population, TIMES, draw};
 use crate::{ERRORS, MIN_COVERED, SIZES, before, error};
@@ -20,7 +20,7 @@ pub(crate) enum Kind {
     Difference(Vec<f64>),
     Share(Vec<bool>),
     DifferenceOfShares(Vec<(bool, bool)>),
-    RestrictedMeans(Vec<(TimeTo, TimeTo)>),
+    RestrictedMeans(Vec<(CensoredTime, CensoredTime)>),
 }
 
 /// An interval, if there is one, and the truth.
@@ -110,14 +110,14 @@ pub(crate) fn kinds(population: &Population) -> Vec<(String, Kind)> {
 }
 
 /// The median.
-fn middle_s(times: &[TimeTo]) -> f64 {
+fn middle_s(times: &[CensoredTime]) -> f64 {
     let mut times_s: Vec<f64> = times.iter().map(|time| time.time_s).collect();
     times_s.sort_by(f64::total_cmp);
     times_s[times_s.len() / 2]
 }
 
 /// Whether the event comes by this time.
-fn comes(time: &TimeTo, by_s: f64) -> bool {
+fn comes(time: &CensoredTime, by_s: f64) -> bool {
     time.is_event && time.time_s <= by_s
 }
 
@@ -228,7 +228,8 @@ impl Kind {
             }
             Self::RestrictedMeans(all) => {
                 let sample = draw(all, n, stream);
-                let (arm, baseline): (Vec<TimeTo>, Vec<TimeTo>) = sample.iter().copied().unzip();
+                let (arm, baseline): (Vec<CensoredTime>, Vec<CensoredTime>) =
+                    sample.iter().copied().unzip();
                 let times = PairedTimes::of(&arm, &baseline);
                 let until_s = times.until_s;
                 let ends = if is_now {

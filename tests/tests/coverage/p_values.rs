@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use protocol::random;
-use statistics::{PairedTimes, SignFlip, TimeTo};
+use statistics::{CensoredTime, PairedTimes, SignFlip};
 
 use crate::population::{NUMBERS, Population, TIMES, draw};
 use crate::{ERRORS, before, error};
@@ -16,7 +16,7 @@ const LIMITS: [f64; 3] = [0.05, 0.1, 0.5];
 /// Pairs of numbers, or of times.
 pub(crate) enum Pairs {
     Numbers(Vec<f64>),
-    Times(Vec<(TimeTo, TimeTo)>),
+    Times(Vec<(CensoredTime, CensoredTime)>),
 }
 
 /// Pairs with their name, and whether it is drawn by lot which run of a pair is that of the arm.
@@ -114,7 +114,8 @@ impl Pairs {
                         *pair = (pair.1, pair.0);
                     }
                 }
-                let (arm, baseline): (Vec<TimeTo>, Vec<TimeTo>) = sample.iter().copied().unzip();
+                let (arm, baseline): (Vec<CensoredTime>, Vec<CensoredTime>) =
+                    sample.iter().copied().unzip();
                 let times = PairedTimes::of(&arm, &baseline);
                 let now = SignFlip::of(&times.differences_s).p;
                 [before::log_rank(&sample), now]

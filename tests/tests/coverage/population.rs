@@ -1,9 +1,9 @@
 //! A population of runs, and samples of it.
 
-use experiments::engine::{self, Options, Queue};
+use experiments::engine::{self, EngineOptions, Queue};
 use experiments::{Experiment, Measured, Plan, Request, Results, Robots, Store};
 use protocol::random::{self, Stream};
-use statistics::TimeTo;
+use statistics::CensoredTime;
 use system_tests::root;
 
 /// The experiment whose runs they are.
@@ -40,7 +40,7 @@ impl Population {
 
         let folder = tempfile::tempdir().unwrap();
         plan.save(folder.path()).unwrap();
-        let options = Options {
+        let options = EngineOptions {
             units: 0..plan.units(),
             jobs: std::thread::available_parallelism().map_or(1, usize::from),
             retries_failed: false,
@@ -77,7 +77,7 @@ impl Population {
     }
 
     /// The times of an arm.
-    pub(crate) fn times(&self, arm: &str, measure: &str) -> Vec<TimeTo> {
+    pub(crate) fn times(&self, arm: &str, measure: &str) -> Vec<CensoredTime> {
         let measured = self.measured(arm, measure).into_iter();
         measured.filter_map(time_of).collect()
     }
@@ -89,7 +89,11 @@ impl Population {
     }
 
     /// The times of an arm and of the baseline.
-    pub(crate) fn pairs_of_times(&self, arm: &str, measure: &str) -> Vec<(TimeTo, TimeTo)> {
+    pub(crate) fn pairs_of_times(
+        &self,
+        arm: &str,
+        measure: &str,
+    ) -> Vec<(CensoredTime, CensoredTime)> {
         self.pairs(arm, measure, time_of)
     }
 
@@ -106,9 +110,9 @@ impl Population {
     }
 }
 
-fn time_of(measured: &Measured) -> Option<TimeTo> {
+fn time_of(measured: &Measured) -> Option<CensoredTime> {
     let (time_s, is_event) = measured.time()?;
-    Some(TimeTo { time_s, is_event })
+    Some(CensoredTime { time_s, is_event })
 }
 
 /// A sample with replacement.

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use lockstep::Lateness;
+use lockstep::LatePolicy;
 use protocol::messages::{FaultKind, OnLate};
 use protocol::{Epoch, RobotName, Tick};
 use scenario::{Fault, FaultEnd, Scenario};
@@ -78,7 +78,7 @@ pub(crate) enum What {
     /// The operator starts the next epoch.
     Init,
     /// The operator changes what the clock does about late robots.
-    Late(Box<Lateness>),
+    Late(Box<LatePolicy>),
     /// The operator commands a robot.
     Command(RobotName, String),
 }
@@ -143,7 +143,7 @@ pub(crate) struct Plan {
     pub(crate) compute: Micros,
     /// After this long without a sign of life the router closes a link.
     pub(crate) lease: Micros,
-    pub(crate) lateness: Lateness,
+    pub(crate) lateness: LatePolicy,
     pub(crate) blows: Vec<Blow>,
     pub(crate) death: Option<Death>,
     pub(crate) stop: Option<Stop>,
@@ -397,7 +397,7 @@ fn draw_links(chance: &mut Chance) -> Links {
     }
 }
 
-fn draw_lateness(chance: &mut Chance, roster: &[RobotName]) -> Lateness {
+fn draw_lateness(chance: &mut Chance, roster: &[RobotName]) -> LatePolicy {
     let policies = [
         OnLate::Continue,
         OnLate::Continue,
@@ -421,8 +421,8 @@ fn draw_lateness(chance: &mut Chance, roster: &[RobotName]) -> Lateness {
     drawn
 }
 
-fn lateness(on_late: OnLate, deadline: Micros, lose_after: u32) -> Lateness {
-    Lateness {
+fn lateness(on_late: OnLate, deadline: Micros, lose_after: u32) -> LatePolicy {
+    LatePolicy {
         on_late,
         own: std::collections::BTreeMap::new(),
         deadline: Duration::from_micros(deadline),

@@ -9,14 +9,14 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use lockstep::{
-    Action, Admission, Answer, Begin, IncarnationNotice, Leave, Participant, RobotTimer, Timeouts,
-    Turn,
+    Admission, Begin, IncarnationNotice, Leave, Participant, ParticipantOutput, RobotTimer,
+    TickAnswer, Timeouts, Turn,
 };
 use protocol::messages::{
-    CommandText, JoinAnswer, JoinRequest, News, PublicState, Waiting, Welcome,
+    CommandText, JoinAnswer, JoinRequest, PublicState, TickUpdate, Waiting, Welcome,
 };
 use protocol::{Epoch, PROTOCOL_VERSION, RobotName, RunName, Tick, decode, encode};
-use robot::{Done, Network, Robot, Runner, Undelivered};
+use robot::{PeerNetwork, Robot, Runner, TickResult, Undelivered};
 
 use crate::hall::make;
 use crate::plan::{Flaw, Micros, Point, S};
@@ -28,8 +28,8 @@ const GET_TIMEOUT: Micros = 2 * S;
 /// How long a robot tries to join, and waits for a simulator that is gone.
 pub(crate) const PATIENCE: std::time::Duration = std::time::Duration::from_secs(120);
 
-type RobotParticipant = Participant<News, Arc<PublicState>, CommandText, Bytes>;
-type RobotAction = Action<News, Arc<PublicState>, CommandText, Bytes>;
+type RobotParticipant = Participant<TickUpdate, Arc<PublicState>, CommandText, Bytes>;
+type RobotAction = ParticipantOutput<TickUpdate, Arc<PublicState>, CommandText, Bytes>;
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Life {
@@ -43,7 +43,7 @@ pub(crate) enum Life {
 struct Running {
     epoch: Epoch,
     tick: Tick,
-    done: Done,
+    done: TickResult,
     /// The states that the robot has been given and that have not arrived yet.
     asked: VecDeque<(RobotName, Arc<PublicState>)>,
     /// What an answer had to be and was not.
@@ -80,7 +80,7 @@ struct Recorded<'a> {
     asked: VecDeque<(RobotName, Arc<PublicState>)>,
 }
 
-impl Network for Recorded<'_> {
+impl PeerNetwork for Recorded<'_> {
     fn state_of(&mut self, target: &RobotName) -> Result<Arc<PublicState>, Undelivered> {
         let before = self.tick - 1;
         let state = self
@@ -160,7 +160,7 @@ impl World {
     }
 
     fn file(&mut self, process: usize, action: RobotAction) {
-        let Action::SetTimer(timer, after) = action else {
+        let ParticipantOutput::SetTimer(timer, after) = action else {
             self.processes[process].actions.push_back(action);
             return;
         };
@@ -193,8 +193,12 @@ impl World {
                 }
                 // Meanwhile the host carries out what neither runs a robot nor ends the process.
                 let actions = &mut self.processes[process].actions;
-                let is_io =
-                    |action: &RobotAction| !matches!(action, Action::Run(_) | Action::Leave(_));
+                let is_io = |action: &RobotAction| {
+                    !matches!(
+                        action,
+                        ParticipantOutput::Run(_) | ParticipantOutput::Leave(_)
+                    )
+                };
                 let index = actions.iter().position(is_io);
                 index.and_then(|index| actions.remove(index))
             } else {
@@ -220,14 +224,14 @@ impl World {
 
     fn carry_out(&mut self, process: usize, action: RobotAction) {
         match action {
-            Action::Join => self.join(process),
-            Action::DeclareToken => {
+            ParticipantOutput::Join => self.join(process),
+            ParticipantOutput::DeclareToken => {
                 self.processes[process].has_token = true;
                 self.send(process, Way::Up, Message::Token);
             }
-            Action::Run(turn) => self.run_tick(process, &turn),
-            Action::Put(answer) => self.put(process, &answer),
-            Action::Query { of, tick, epoch } => {
+            ParticipantOutput::Run(turn) => self.run_tick(process, &turn),
+            ParticipantOutput::Put(answer) => self.put(process, &answer),
+            ParticipantOutput::Query { of, tick, epoch } => {
                 let query = lockstep::StateQuery {
                     tick: Some(tick),
                     epoch: Some(epoch),
@@ -242,16 +246,16 @@ impl World {
                     self.send(process, Way::Up, Message::Follow(of));
                 }
             }
-            Action::Unfollow(of) => {
+            ParticipantOutput::Unfollow(of) => {
                 self.processes[process].followed.remove(&of);
                 self.send(process, Way::Up, Message::Unfollow(of));
             }
-            Action::PutWaiting { tick, epoch, on } => {
+            ParticipantOutput::PutWaiting { tick, epoch, on } => {
                 let waiting = Waiting { epoch, tick, on };
                 self.send(process, Way::Up, Message::Waiting(encode(&waiting).into()));
             }
-            Action::SetTimer(..) => unreachable!("timers are filed"),
-            Action::Leave(leave) => {
+            ParticipantOutput::SetTimer(..) => unreachable!("timers are filed"),
+            ParticipantOutput::Leave(leave) => {
                 self.leave_star(process);
                 self.processes[process].life = Life::Left(leave);
             }
@@ -293,7 +297,7 @@ impl World {
         self.advance(process);
     }
 
-    fn run_tick(&mut self, process: usize, turn: &Turn<News>) {
+    fn run_tick(&mut self, process: usize, turn: &Turn<TickUpdate>) {
         if self.dies(process, turn.epoch, turn.tick, Point::BeforeRun) {
             return;
         }
@@ -406,7 +410,7 @@ impl World {
     }
 
     /// Puts what came of a tick: commands, state, report.
-    fn put(&mut self, process: usize, answer: &Answer<Arc<PublicState>, CommandText, Bytes>) {
+    fn put(&mut self, process: usize, answer: &TickAnswer<Arc<PublicState>, CommandText, Bytes>) {
         for (to, command) in answer.commands_from(1) {
             let to = to.clone();
             let bytes = encode(&command).into();
@@ -450,7 +454,7 @@ impl World {
 
         match message {
             Message::News(bytes) => {
-                let news: News = self.read(&bytes);
+                let news: TickUpdate = self.read(&bytes);
                 let notice = IncarnationNotice::from(&news);
                 self.feed(process, |participant, out| {
                     participant.news(news.epoch, news.tick, notice, news, out);

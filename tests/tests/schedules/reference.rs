@@ -4,17 +4,17 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use lockstep::{Begin, IncarnationNotice, Membership, Outcome, Sent, Turn};
+use lockstep::{Begin, IncarnationNotice, Membership, Sent, TickOutcome, Turn};
 use protocol::messages::{CommandText, PublicState, Report};
 use protocol::{Generation, RobotName, RunName, Tick};
-use robot::{Done, Network, Runner, Undelivered};
+use robot::{PeerNetwork, Runner, TickResult, Undelivered};
 use scenario::Scenario;
 use simulator::{Simulation, TickRecord};
 
 use crate::hall::make;
 
 /// What a tick comes to.
-pub(crate) type Reports = Outcome<Arc<Report>, CommandText>;
+pub(crate) type Reports = TickOutcome<Arc<Report>, CommandText>;
 
 pub(crate) struct Reference {
     simulation: Simulation,
@@ -26,7 +26,7 @@ pub(crate) struct Reference {
 
 struct Others<'a>(&'a BTreeMap<RobotName, Arc<PublicState>>);
 
-impl Network for Others<'_> {
+impl PeerNetwork for Others<'_> {
     fn state_of(&mut self, target: &RobotName) -> Result<Arc<PublicState>, Undelivered> {
         self.0.get(target).cloned().ok_or(Undelivered::Lost)
     }
@@ -58,7 +58,7 @@ impl Reference {
         let mut reports = BTreeMap::new();
         let mut states = BTreeMap::new();
         for name in self.simulation.names().to_vec() {
-            let Done {
+            let TickResult {
                 commands,
                 state,
                 report,
@@ -68,13 +68,13 @@ impl Reference {
             reports.insert(name, (report, commands));
         }
         self.states = states;
-        self.simulation.end_tick(Outcome {
+        self.simulation.end_tick(TickOutcome {
             reports,
             membership: outcome.membership.clone(),
         })
     }
 
-    fn run(&mut self, name: &RobotName, tick: Tick, outcome: &Reports) -> Done {
+    fn run(&mut self, name: &RobotName, tick: Tick, outcome: &Reports) -> TickResult {
         let mut joined = None;
         for change in &outcome.membership {
             if let Membership::Joined(robot, generation) = change

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
-use lockstep::{Barrier, Lateness, Membership, Output, Sent, Stamp, Timer, Timing};
+use lockstep::{Barrier, BarrierOutput, LatePolicy, Membership, Sent, Stamp, Timer, Timing};
 use protocol::messages::{
     Clock, Command, CommandText, End, JoinAnswer, JoinRequest, MAX_ENTRIES, OnLate, PublicState,
     Report, Waiting,
@@ -35,7 +35,7 @@ enum Stage {
 
 pub(crate) struct Simulator {
     pub(crate) barrier: Barrier<Arc<Report>, CommandText>,
-    outputs: Vec<Output<Arc<Report>, CommandText>>,
+    outputs: Vec<BarrierOutput<Arc<Report>, CommandText>>,
     pub(crate) simulation: Simulation,
     timers: BTreeMap<Timer, Micros>,
     stage: Stage,
@@ -201,30 +201,30 @@ impl World {
         self.on_opened(tick);
     }
 
-    fn carry_out_simulator(&mut self, output: Output<Arc<Report>, CommandText>) {
+    fn carry_out_simulator(&mut self, output: BarrierOutput<Arc<Report>, CommandText>) {
         if self.simulator.ended.is_some() {
             return;
         }
         match output {
-            Output::Gathered => {
+            BarrierOutput::Gathered => {
                 let simulator = &mut self.simulator;
                 simulator.simulation.begin_init();
                 let news = simulator.simulation.robots_with_news();
                 simulator.barrier.open(0, news, &mut simulator.outputs);
                 self.on_opened(0);
             }
-            Output::Grant { news, clock } => {
+            BarrierOutput::Grant { news, clock } => {
                 for (name, notice) in news {
                     let news = self.simulator.simulation.news(&name, notice);
                     self.put_down(Some(&name), &Message::News(encode(&news).into()));
                 }
                 self.put_down(None, &Message::Clock(encode(&clock).into()));
             }
-            Output::StandIn(robot) => self.stand_in(&robot),
-            Output::Complete(outcome) => self.complete(&outcome),
-            Output::Aborted => self.end(End::Aborted),
-            Output::SetTimer(timer, after) => self.set_timer(timer, after),
-            Output::Held | Output::Released | Output::Ignored(..) => {}
+            BarrierOutput::StandIn(robot) => self.stand_in(&robot),
+            BarrierOutput::Complete(outcome) => self.complete(&outcome),
+            BarrierOutput::Aborted => self.end(End::Aborted),
+            BarrierOutput::SetTimer(timer, after) => self.set_timer(timer, after),
+            BarrierOutput::Held | BarrierOutput::Released | BarrierOutput::Ignored(..) => {}
         }
     }
 
@@ -480,7 +480,7 @@ impl World {
         }
     }
 
-    pub(crate) fn set_lateness(&mut self, lateness: Lateness) {
+    pub(crate) fn set_lateness(&mut self, lateness: LatePolicy) {
         if self.simulator.ended.is_none() {
             let simulator = &mut self.simulator;
             simulator
@@ -545,7 +545,7 @@ impl World {
         let outputs = &self.simulator.outputs;
         let is_complete = outputs
             .iter()
-            .any(|output| matches!(output, Output::Complete(_)));
+            .any(|output| matches!(output, BarrierOutput::Complete(_)));
         let has_counted = self.simulator.barrier.is_open() && !self.is_awaited(robot);
         if !is_complete && !has_counted {
             return;

@@ -6,7 +6,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::process::Command;
 
-use conform::{CheckSetting, PAGE, RULES, Rule};
+use conform::{CheckSetting, PAGE, ProtocolRule, RULES};
 use system_tests::tools::has_python;
 use system_tests::{Lab, objections, programs, root, side_by_side};
 
@@ -195,7 +195,7 @@ fn rule_of(how: &str) -> &str {
 }
 
 /// What is wrong with the verdict on a robot that breaks a rule in this way: it must fail by that rule alone.
-fn misjudged(how: &str, rules: &[Rule]) -> Option<String> {
+fn misjudged(how: &str, rules: &[ProtocolRule]) -> Option<String> {
     let name = rule_of(how);
     let report = match conform::check(&wrong(how), &setting(), rules) {
         Ok(report) => report,
@@ -206,20 +206,20 @@ fn misjudged(how: &str, rules: &[Rule]) -> Option<String> {
         return Some(format!("{how} fails by {failed:?}: {report}"));
     }
 
-    let reference = Rule::named(name).unwrap().reference();
+    let reference = ProtocolRule::named(name).unwrap().reference();
     let is_referred = report.to_tap().contains(&format!("see: \"{reference}\""));
     (!is_referred).then(|| format!("{how}: no reference to the page: {report}"))
 }
 
 /// Judges robots side by side.
-fn judge(robots: &[(&str, Vec<Rule>)]) {
+fn judge(robots: &[(&str, Vec<ProtocolRule>)]) {
     let misjudgments = objections(robots, KITS, |(how, rules)| misjudged(how, rules));
     assert!(misjudgments.is_empty(), "{}", misjudgments.join("\n"));
 }
 
 #[test]
 fn a_wrong_robot_fails_by_the_rule_that_it_breaks() {
-    let robots: Vec<(&str, Vec<Rule>)> =
+    let robots: Vec<(&str, Vec<ProtocolRule>)> =
         RULES.iter().map(|rule| (rule.name, vec![*rule])).collect();
     judge(&robots);
 }
@@ -227,7 +227,8 @@ fn a_wrong_robot_fails_by_the_rule_that_it_breaks() {
 #[test]
 #[ignore = "thorough: with `-- --include-ignored`"]
 fn a_wrong_robot_fails_by_the_rule_that_it_breaks_and_by_no_other() {
-    let robots: Vec<(&str, Vec<Rule>)> = RULES.iter().map(|rule| (rule.name, Vec::new())).collect();
+    let robots: Vec<(&str, Vec<ProtocolRule>)> =
+        RULES.iter().map(|rule| (rule.name, Vec::new())).collect();
     judge(&robots);
 }
 
@@ -236,10 +237,10 @@ fn a_wrong_robot_fails_by_the_rule_that_it_breaks_and_by_no_other() {
 fn rules_can_be_broken_in_more_than_one_way() {
     let mut robots = Vec::new();
     for how in OTHERWISE.iter().chain(&OTHERWISE_ON_THE_WIRE) {
-        let mut rules = vec![Rule::named(rule_of(how)).unwrap()];
+        let mut rules = vec![ProtocolRule::named(rule_of(how)).unwrap()];
         // A state is put where there is a subscriber, which another check has.
         if *how == "wire.qos:state" {
-            rules.push(Rule::named("query.tick").unwrap());
+            rules.push(ProtocolRule::named("query.tick").unwrap());
         }
         robots.push((*how, rules));
     }

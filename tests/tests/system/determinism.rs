@@ -169,7 +169,7 @@ fn reproducible(lab: &Lab, run: &str) -> Vec<recording::RecordedTick> {
     let mut ticks = lab.recorded(run);
     for tick in &mut ticks {
         tick.panels.clear();
-        tick.wall = recording::Wall::default();
+        tick.wall = recording::WallTimes::default();
     }
     ticks
 }

@@ -11,9 +11,18 @@ use system_tests::root;
 const SHARED: [(&str, &str); 5] = [
     ("Blocker", "what the environment finds, and the event of it"),
     ("Cars", "what a robot sees in a tick, in Rust and in Python"),
-    ("Point", "a place on the field, in messages and in the environment"),
-    ("Range", "a triangular distribution, in messages and in scenarios"),
-    ("Stream", "a stream of random numbers, in Rust and in Python"),
+    (
+        "Point",
+        "a place on the field, in messages and in the environment",
+    ),
+    (
+        "Range",
+        "a triangular distribution, in messages and in scenarios",
+    ),
+    (
+        "Stream",
+        "a stream of random numbers, in Rust and in Python",
+    ),
 ];
 
 /// The Rust files of a folder, without tests and without the skeletons of `cars new`.
@@ -77,8 +86,14 @@ fn declarations() -> BTreeMap<String, BTreeMap<String, Vec<PathBuf>>> {
 #[test]
 fn declarations_are_found() {
     assert_eq!(declared("pub struct Point {"), Some("Point"));
-    assert_eq!(declared("    pub(in crate::a) enum Kind<T> {"), Some("Kind"));
-    assert_eq!(declared("pub(crate) type Pixel = (f64, f64);"), Some("Pixel"));
+    assert_eq!(
+        declared("    pub(in crate::a) enum Kind<T> {"),
+        Some("Kind")
+    );
+    assert_eq!(
+        declared("pub(crate) type Pixel = (f64, f64);"),
+        Some("Pixel")
+    );
     assert_eq!(declared("    type Output = Self;"), None);
     assert_eq!(declared("// struct"), None);
     assert_eq!(declared("let structure = 1;"), None);
@@ -97,7 +112,9 @@ fn a_name_is_one_type_in_a_crate() {
 #[test]
 fn a_name_is_one_idea_in_all_crates() {
     let declarations = declarations();
-    let several = declarations.iter().filter(|(_, packages)| packages.len() > 1);
+    let several = declarations
+        .iter()
+        .filter(|(_, packages)| packages.len() > 1);
     let several: BTreeSet<&str> = several.map(|(name, _)| name.as_str()).collect();
     let shared: BTreeSet<&str> = SHARED.iter().map(|(name, _)| *name).collect();
     assert_eq!(several, shared, "name one of them otherwise");

@@ -8,8 +8,8 @@ use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{
     Answer, Clock, Command, Control, ControlAnswer, FaultOrder, JoinAnswer, JoinRequest, LogRecord,
-    MAX_ENTRIES, MAX_LINE_BYTES, MAX_TEXT_BYTES, MAX_WIDGETS, News, Panel, PublicState, Report,
-    Waiting, WorldFrame,
+    MAX_ENTRIES, MAX_LINE_BYTES, MAX_TEXT_BYTES, MAX_WIDGETS, Panel, PublicState, Report,
+    TickUpdate, Waiting, WorldFrame,
 };
 use protocol::name::MAX_NAME_LEN;
 use protocol::random::{MAX_SEED, stream, unit};
@@ -340,7 +340,7 @@ fn check_as(schema: &str, text: &str) -> Result<(), Malformed> {
         "join_answer" => check::<JoinAnswer>(text),
         "join_request" => check::<JoinRequest>(text),
         "log_record" => check::<LogRecord>(text),
-        "news" => check::<News>(text),
+        "news" => check::<TickUpdate>(text),
         "panel" => check::<Panel>(text),
         "public_state" => check::<PublicState>(text),
         "report" => check::<Report>(text),
@@ -422,7 +422,7 @@ fn check_line(key: &str, line: &Value) -> Result<(), Malformed> {
     match Keys::last_chunk(key) {
         "clock" => check::<Clock>(&message),
         "report" => check::<Report>(&message),
-        "news" => check::<News>(&message),
+        "news" => check::<TickUpdate>(&message),
         _ if line["refused"].is_string() => Ok(()),
         STATE if line["way"] == "from" => check::<PublicState>(&message),
         STATE => check::<PublicState>(&answer),

@@ -3,7 +3,9 @@
 
 use protocol::random::{self, Stream};
 use serde_json::{Value, json};
-use statistics::{Estimate, PairedTimes, SignFlip, Survival, TimeTo, dominance, ecdf, quantile};
+use statistics::{
+    CensoredTime, Estimate, PairedTimes, SignFlip, Survival, dominance, ecdf, quantile,
+};
 use system_tests::root;
 use system_tests::tools::{has_modules, python};
 
@@ -77,10 +79,10 @@ fn counted(stream: &mut Stream) -> f64 {
 }
 
 /// Times, a quarter of which is censored.
-fn times(stream: &mut Stream, size: usize, draw: Draw) -> Vec<TimeTo> {
+fn times(stream: &mut Stream, size: usize, draw: Draw) -> Vec<CensoredTime> {
     let mut times = Vec::new();
     for _ in 0..size {
-        times.push(TimeTo {
+        times.push(CensoredTime {
             time_s: draw(stream).abs(),
             is_event: random::unit(stream) > 0.25,
         });
@@ -102,7 +104,7 @@ fn sample(values: &[f64]) -> Value {
 }
 
 /// The times of two arms, and what is found of them.
-fn pair(arm: &[TimeTo], baseline: &[TimeTo]) -> Value {
+fn pair(arm: &[CensoredTime], baseline: &[CensoredTime]) -> Value {
     let paired = PairedTimes::of(arm, baseline);
     json!({
         "arm": written(arm),
@@ -113,7 +115,7 @@ fn pair(arm: &[TimeTo], baseline: &[TimeTo]) -> Value {
     })
 }
 
-fn written(times: &[TimeTo]) -> Value {
+fn written(times: &[CensoredTime]) -> Value {
     times
         .iter()
         .map(|time| json!([time.time_s, time.is_event]))

@@ -4,7 +4,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use experiments::hunt::{Case, Subject, Trial};
+use experiments::hunt::{FaultCase, Subject, Trial};
 use nix::sys::signal::Signal;
 use roxmltree::{Document, ParsingOptions};
 use serde_json::Value;
@@ -401,7 +401,9 @@ fn assert_all_readers_agree(lab: &Lab, run: &str) -> Times {
 /// A hunt plays the scenario of a run again: robots send the same commands.
 fn assert_hunt_agrees(lab: &Lab, run: &str) {
     let subject = Subject::load(&lab.file(run, "scenario.toml"), &Default::default()).unwrap();
-    let played = subject.play(&Case::default(), &BTreeSet::new()).unwrap();
+    let played = subject
+        .play(&FaultCase::default(), &BTreeSet::new())
+        .unwrap();
 
     let mut lost = BTreeSet::new();
     let mut sent = Vec::new();

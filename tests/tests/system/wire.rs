@@ -7,8 +7,8 @@ use std::time::Duration;
 use bus::{Bus, Declared, Role};
 use protocol::keys::Keys;
 use protocol::messages::{
-    Clock, Command, Control, ControlAnswer, Delivery, JoinAnswer, LogKind, LogRecord, News, OnLate,
-    Performative, Point, PublicState, Refusal, Report, StateVariables, Status, Welcome,
+    Clock, Command, Control, ControlAnswer, Delivery, JoinAnswer, LogKind, LogRecord, OnLate,
+    Performative, Point, PublicState, Refusal, Report, StateVariables, Status, TickUpdate, Welcome,
 };
 use protocol::{PROTOCOL_VERSION, RobotName, RunName, decode, encode};
 use serde_json::{Value, json};
@@ -151,7 +151,7 @@ struct Hand {
     name: RobotName,
     welcome: Welcome,
     clocks: Receiver<Clock>,
-    news: Receiver<News>,
+    news: Receiver<TickUpdate>,
     _declared: Vec<Declared>,
 }
 
@@ -204,12 +204,12 @@ impl Hand {
     }
 
     /// The news that belong to a clock, if the clock says that there are some.
-    fn news_of(&self, clock: &Clock) -> Option<News> {
+    fn news_of(&self, clock: &Clock) -> Option<TickUpdate> {
         if clock.news & self.welcome.news_flag == 0 {
             return None;
         }
         // They were put before the clock, and on the same session.
-        let is_of_clock = |news: &News| (news.epoch, news.tick) == (clock.epoch, clock.tick);
+        let is_of_clock = |news: &TickUpdate| (news.epoch, news.tick) == (clock.epoch, clock.tick);
         let found = self.news.try_iter().find(is_of_clock);
 
         Some(found.expect("news come before their clock"))

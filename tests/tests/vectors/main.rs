@@ -27,7 +27,7 @@ use record::RunFolder;
 use robot::{Host, HostOptions, Robot};
 use scenario::Changes;
 use scenario::Scenario;
-use simulator::server::{Options, REPEAT_AFTER, Server, Stay};
+use simulator::server::{KeepAlive, REPEAT_AFTER, Server, ServerOptions};
 use stage::Stage;
 use system_tests::{Lab, PATIENCE, eventually, root};
 use witness::Witness;
@@ -210,11 +210,11 @@ fn echo_over_zenoh() {
         trusts_network: false,
     };
     let run = RunName::new("vectors").unwrap();
-    let options = Options {
+    let options = ServerOptions {
         run: run.clone(),
         speed: None,
         is_paused: true,
-        stay: Stay::Never,
+        stay: KeepAlive::Never,
         repeat_after: REPEAT_AFTER,
     };
     let scenario = Scenario::load(&root().join(ECHO), &Changes::default()).unwrap();

@@ -3,13 +3,14 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use lockstep::{Action, Begin, Participant, StateQuery, Timeouts, Turn};
-use protocol::messages::{CommandText, JoinRequest, News, PublicState, Welcome};
+use lockstep::{Begin, Participant, ParticipantOutput, StateQuery, Timeouts, Turn};
+use protocol::messages::{CommandText, JoinRequest, PublicState, TickUpdate, Welcome};
 use protocol::{PROTOCOL_VERSION, RobotName, RunName};
-use robot::{Done, Network, Robot, Runner, Undelivered};
+use robot::{PeerNetwork, Robot, Runner, TickResult, Undelivered};
 
-pub(super) type Machine = Participant<News, Arc<PublicState>, CommandText, Vec<u8>>;
-pub(super) type MachineAction = Action<News, Arc<PublicState>, CommandText, Vec<u8>>;
+pub(super) type Machine = Participant<TickUpdate, Arc<PublicState>, CommandText, Vec<u8>>;
+pub(super) type MachineAction =
+    ParticipantOutput<TickUpdate, Arc<PublicState>, CommandText, Vec<u8>>;
 
 /// No timer ever fires.
 const PATIENCE: Timeouts = Timeouts {
@@ -33,7 +34,7 @@ pub(super) struct Others<'a> {
     pub(super) query: StateQuery,
 }
 
-impl Network for Others<'_> {
+impl PeerNetwork for Others<'_> {
     fn state_of(&mut self, target: &RobotName) -> Result<Arc<PublicState>, Undelivered> {
         let other = self.processes.get(target).ok_or(Undelivered::Lost)?;
 
@@ -72,7 +73,7 @@ impl Process {
     }
 
     /// Runs the robot for a tick.
-    pub(super) fn run(&mut self, turn: &Turn<News>, others: &mut Others<'_>) -> Done {
+    pub(super) fn run(&mut self, turn: &Turn<TickUpdate>, others: &mut Others<'_>) -> TickResult {
         if turn.begin != Begin::GoOn {
             self.take_runner();
         }

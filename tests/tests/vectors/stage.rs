@@ -7,13 +7,13 @@ use std::path::Path;
 use std::sync::Arc;
 
 use lockstep::{
-    Action, Admission, Answer, Barrier, Ignored, IncarnationNotice, Leave, Output, Sent, Stamp,
-    StateQuery, Timing, Turn,
+    Admission, Barrier, BarrierOutput, Ignored, IncarnationNotice, Leave, ParticipantOutput, Sent,
+    Stamp, StateQuery, TickAnswer, Timing, Turn,
 };
 use protocol::keys::{Keys, STATE};
 use protocol::messages::{
-    Clock, Command, CommandText, End, JoinAnswer, JoinRequest, MAX_ENTRIES, News, PublicState,
-    Report,
+    Clock, Command, CommandText, End, JoinAnswer, JoinRequest, MAX_ENTRIES, PublicState, Report,
+    TickUpdate,
 };
 use protocol::{Epoch, Message, RobotName, RunName, Tick, decode, encode};
 use robot::Robot;
@@ -37,7 +37,7 @@ pub(super) struct Stage {
     run: RunName,
     keys: Keys,
     barrier: Barrier<Arc<Report>, CommandText>,
-    outputs: Vec<Output<Arc<Report>, CommandText>>,
+    outputs: Vec<BarrierOutput<Arc<Report>, CommandText>>,
     simulation: Simulation,
     clock: Clock,
     processes: BTreeMap<RobotName, Process>,
@@ -193,25 +193,25 @@ impl Stage {
         }
     }
 
-    fn carry_out_output(&mut self, output: Output<Arc<Report>, CommandText>) {
+    fn carry_out_output(&mut self, output: BarrierOutput<Arc<Report>, CommandText>) {
         match output {
-            Output::Gathered => {
+            BarrierOutput::Gathered => {
                 self.simulation.begin_init();
                 self.open(0);
             }
-            Output::Grant { news, clock } => {
+            BarrierOutput::Grant { news, clock } => {
                 for (name, notice) in news {
                     self.put_news(&name, notice);
                 }
                 self.put_clock(clock);
             }
-            Output::Complete(outcome) => {
+            BarrierOutput::Complete(outcome) => {
                 self.simulation.end_tick(outcome);
             }
             // The robot repeats its report after a repeated clock.
-            Output::Ignored(Ignored::Stale, _) => {}
+            BarrierOutput::Ignored(Ignored::Stale, _) => {}
             // Every robot reports at once, so no timer fires.
-            Output::SetTimer(..) => {}
+            BarrierOutput::SetTimer(..) => {}
             other => unreachable!("{other:?}"),
         }
     }
@@ -222,7 +222,7 @@ impl Stage {
             self.transcript.received(&self.keys.news(name), &bytes);
         }
 
-        let news: News = read(&bytes);
+        let news: TickUpdate = read(&bytes);
         self.feed(name, |participant, actions| {
             participant.news(
                 news.epoch,
@@ -282,18 +282,20 @@ impl Stage {
 
     fn carry_out(&mut self, name: &RobotName, action: MachineAction) {
         match action {
-            Action::Join => self.join(name),
-            Action::DeclareToken => {
+            ParticipantOutput::Join => self.join(name),
+            ParticipantOutput::DeclareToken => {
                 if *name == self.robot {
                     self.transcript.token(&self.keys.alive_robot(name));
                 }
                 self.barrier.token(name, true, &mut self.outputs);
             }
-            Action::Run(turn) => self.run_tick(name, &turn),
-            Action::Put(answer) => self.put(name, &answer),
-            Action::SetTimer(..) => {}
-            Action::Leave(leave) => assert_eq!(leave, Leave::End(End::Stopped)),
-            Action::Query { .. } | Action::Unfollow(_) | Action::PutWaiting { .. } => {
+            ParticipantOutput::Run(turn) => self.run_tick(name, &turn),
+            ParticipantOutput::Put(answer) => self.put(name, &answer),
+            ParticipantOutput::SetTimer(..) => {}
+            ParticipantOutput::Leave(leave) => assert_eq!(leave, Leave::End(End::Stopped)),
+            ParticipantOutput::Query { .. }
+            | ParticipantOutput::Unfollow(_)
+            | ParticipantOutput::PutWaiting { .. } => {
                 unreachable!("a robot is called with the other robots' states")
             }
         }
@@ -323,7 +325,7 @@ impl Stage {
         });
     }
 
-    fn run_tick(&mut self, name: &RobotName, turn: &Turn<News>) {
+    fn run_tick(&mut self, name: &RobotName, turn: &Turn<TickUpdate>) {
         if *name == self.robot && turn.tick > 0 {
             self.write_queries(turn);
         }
@@ -342,7 +344,7 @@ impl Stage {
     }
 
     /// Writes all queries that the robot can make in a tick, and the replies.
-    fn write_queries(&mut self, turn: &Turn<News>) {
+    fn write_queries(&mut self, turn: &Turn<TickUpdate>) {
         let unreachable = turn.news.iter().flat_map(|news| &news.unreachable);
         let unreachable: Vec<&RobotName> = unreachable.collect();
         for (name, other) in &self.processes {
@@ -361,7 +363,11 @@ impl Stage {
     }
 
     /// Puts what came of a tick: the commands, the state, the report.
-    fn put(&mut self, name: &RobotName, answer: &Answer<Arc<PublicState>, CommandText, Vec<u8>>) {
+    fn put(
+        &mut self,
+        name: &RobotName,
+        answer: &TickAnswer<Arc<PublicState>, CommandText, Vec<u8>>,
+    ) {
         for (to, command) in answer.commands_from(1) {
             let bytes = encode(&command);
             self.write_put(name, &self.keys.command(to, name), &bytes);
@@ -391,7 +397,7 @@ impl Stage {
     }
 }
 
-fn query_in(turn: &Turn<News>) -> StateQuery {
+fn query_in(turn: &Turn<TickUpdate>) -> StateQuery {
     StateQuery {
         tick: Some(turn.tick),
         epoch: Some(turn.epoch),

@@ -46,7 +46,7 @@ impl Default for ConceptualParameters {
 /// A possible outcome of an action.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Outcome {
+pub struct ActionOutcome {
     /// Its probability, in `[0, 1]`.
     pub probability: f64,
     /// Time until the outcome, in seconds.
@@ -78,7 +78,7 @@ pub enum CandidateError {
 pub struct Candidate<A> {
     action: A,
     tendency: Option<ActionTendency>,
-    outcomes: Vec<Outcome>,
+    outcomes: Vec<ActionOutcome>,
 }
 
 impl<A> Candidate<A> {
@@ -93,7 +93,7 @@ impl<A> Candidate<A> {
     pub fn new(
         action: A,
         tendency: Option<ActionTendency>,
-        outcomes: Vec<Outcome>,
+        outcomes: Vec<ActionOutcome>,
     ) -> Result<Self, CandidateError> {
         for outcome in &outcomes {
             if !(0.0..=1.0).contains(&outcome.probability) {

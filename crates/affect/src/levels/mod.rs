@@ -13,7 +13,7 @@ mod conceptual;
 mod sensory_motor;
 
 pub use conceptual::{
-    Candidate, CandidateError, Choice, Conceptual, ConceptualParameters, Experience, Memory,
-    Outcome,
+    ActionOutcome, Candidate, CandidateError, Choice, Conceptual, ConceptualParameters, Experience,
+    Memory,
 };
 pub use sensory_motor::{SensoryMotor, SensoryMotorParameters};

@@ -20,7 +20,7 @@ use crate::table;
 
 /// `cars experiment replay`.
 #[derive(Debug, Args)]
-pub(super) struct ReplayArgs {
+pub(super) struct ReplayUnitArgs {
     /// Folder of the experiment.
     folder: PathBuf,
     /// Number of the unit, from 0.
@@ -40,7 +40,7 @@ pub(super) struct ReplayArgs {
 }
 
 /// Plays a unit with everything recorded, and compares its digest with that of the unit as it was played before.
-pub(super) fn replay(args: ReplayArgs) -> Result<ExitCode> {
+pub(super) fn replay(args: ReplayUnitArgs) -> Result<ExitCode> {
     let plan = Plan::load(&args.folder)?;
     if args.unit >= plan.units() {
         return Err(refusal!(

@@ -1,7 +1,8 @@
 //! Results as tables and as JSON.
 
 use experiments::{
-    Cell, Contrast, Difference, Estimated, Experiment, Measure, Results, SHOWN_P, least_p_holm,
+    ArmDifference, ArmMeasure, Contrast, Estimated, Experiment, Measure, Results, SHOWN_P,
+    least_p_holm,
 };
 use tabled::builder::Builder;
 use tabled::settings::formatting::AlignmentStrategy;
@@ -58,7 +59,7 @@ pub(super) fn print(results: &Results) -> Result<()> {
 }
 
 /// The estimates as a table with one line for each arm under each condition.
-fn render(experiment: &Experiment, cells: &[Cell]) -> tabled::Table {
+fn render(experiment: &Experiment, cells: &[ArmMeasure]) -> tabled::Table {
     let mut head = vec![experiment.conditions.head(), "arm".to_owned()];
     for measure in &experiment.measures {
         if measure.column.is_some() {
@@ -125,8 +126,8 @@ fn render_contrasts(experiment: &Experiment, measure: &Measure, contrasts: &[&Co
             pairs(contrast),
         ];
         match &contrast.difference {
-            Difference::Number { mean, .. } => row.push(mean.signed()),
-            Difference::Time {
+            ArmDifference::Number { mean, .. } => row.push(mean.signed()),
+            ArmDifference::Time {
                 share,
                 restricted_mean_s,
                 until_s,
@@ -135,7 +136,7 @@ fn render_contrasts(experiment: &Experiment, measure: &Measure, contrasts: &[&Co
                 row.push(share.scaled(100.0).signed());
                 row.push(format!("{}\nup to {until_s} s", restricted_mean_s.signed()));
             }
-            Difference::NoPair | Difference::NotFinite => {
+            ArmDifference::NoPair | ArmDifference::NotFinite => {
                 row.push(contrast.no_difference().unwrap_or_default());
                 row.resize(head.len() - 1, String::new());
             }

@@ -15,7 +15,7 @@ use crate::kit::Kit;
 use crate::patience::PATIENCE;
 use crate::report::RuleFailure;
 use crate::script::{Disturbance, PlayScript, play, with_robot};
-use crate::transcript::Entry;
+use crate::transcript::PlayedTick;
 
 /// How often the robot is queried during a tick.
 const EVERY: Duration = Duration::from_millis(20);
@@ -62,7 +62,7 @@ impl Disturbance for QueriesDuringTicks {
         }
     }
 
-    fn after(&mut self, harness: &mut Harness<'_>, entry: &Entry) -> Result<(), RuleFailure> {
+    fn after(&mut self, harness: &mut Harness<'_>, entry: &PlayedTick) -> Result<(), RuleFailure> {
         for pair in &self.pairs {
             let expected = format!("queried during tick {}, a reply", entry.tick);
             for number in [pair.robot, pair.control] {

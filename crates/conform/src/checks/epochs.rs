@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use protocol::messages::{Clock, Delivery, JoinRequest, News, Performative, Point};
+use protocol::messages::{Clock, Delivery, JoinRequest, Performative, Point, TickUpdate};
 use protocol::{Epoch, Tick};
 
 use crate::comparison::{PlayDifference, demand_same, difference};
@@ -12,7 +12,7 @@ use crate::kit::Kit;
 use crate::patience::PATIENCE;
 use crate::report::RuleFailure;
 use crate::script::{Disturbance, PlayScript, Straight, play, usual, with_robot};
-use crate::transcript::Entry;
+use crate::transcript::PlayedTick;
 use crate::wire::Joining;
 
 /// No report comes within this time where it is not the robot's turn.
@@ -154,7 +154,7 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     play(&mut harness, &busy, &mut Straight)?;
     let [text, _] = kit.texts();
     // News of a tick that is never granted must not be taken for those of the next epoch.
-    harness.put_news(&News {
+    harness.put_news(&TickUpdate {
         epoch: 1,
         tick: harness.next_tick(),
         commands: vec![Delivery {
@@ -162,7 +162,7 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
             performative: Performative::Achieve,
             command: text,
         }],
-        ..News::default()
+        ..TickUpdate::default()
     })?;
     let tokens_lost = harness.seen.tokens_lost;
 
@@ -200,7 +200,7 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
 
     // A clock that does not name the robot: what the barrier puts for a robot that has not reported names it.
     harness.is_cut_off = true;
-    harness.open(&News::default())?;
+    harness.open(&TickUpdate::default())?;
     harness.put_clock(&Clock {
         epoch: 2,
         tick: 1,
@@ -274,7 +274,7 @@ fn demand_same_process(harness: &Harness<'_>) -> Result<(), RuleFailure> {
     Ok(())
 }
 
-fn demand_epoch(transcript: &[Entry], epoch: Epoch) -> Result<(), RuleFailure> {
+fn demand_epoch(transcript: &[PlayedTick], epoch: Epoch) -> Result<(), RuleFailure> {
     match transcript.iter().find(|entry| entry.report.epoch != epoch) {
         None => Ok(()),
         Some(entry) => {

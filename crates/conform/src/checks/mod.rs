@@ -20,10 +20,10 @@ use std::sync::PoisonError;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread::Builder;
 
-use crate::findings::{Findings, Verdicts};
+use crate::findings::{Findings, VerdictsByRule};
 use crate::kit::{CannotRun, Kit};
-use crate::report::{AnswerTimes, Report, RuleFailure, RuleOutcome, RuleVerdict};
-use crate::rules::{RULES, Rule};
+use crate::report::{AnswerTimes, CheckReport, RuleFailure, RuleOutcome, RuleVerdict};
+use crate::rules::{ProtocolRule, RULES};
 use crate::setting::CheckSetting;
 
 /// A check, with its rules; the first one gets the failure that breaks it off.
@@ -87,8 +87,8 @@ const WORKERS: usize = 4;
 pub fn check(
     command: &Command,
     setting: &CheckSetting,
-    rules: &[Rule],
-) -> Result<Report, CannotRun> {
+    rules: &[ProtocolRule],
+) -> Result<CheckReport, CannotRun> {
     let kit = Kit::open(command, setting)?;
     let (mut verdicts, answers) = all(&kit, rules)?;
 
@@ -106,7 +106,7 @@ pub fn check(
         });
     }
 
-    Ok(Report {
+    Ok(CheckReport {
         name: kit.subject(),
         sdk: kit.sdk(),
         outcomes,
@@ -115,7 +115,10 @@ pub fn check(
 }
 
 /// Takes the robot through all checks that the wanted rules need.
-fn all(kit: &Kit, wanted: &[Rule]) -> Result<(Verdicts, Option<AnswerTimes>), CannotRun> {
+fn all(
+    kit: &Kit,
+    wanted: &[ProtocolRule],
+) -> Result<(VerdictsByRule, Option<AnswerTimes>), CannotRun> {
     let mut findings = Findings::default();
     // First and alone: all other checks compare with these ticks, and a robot that does not get through
     // them shows nothing else.

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use protocol::Tick;
-use protocol::messages::{Clock, Correction, News, Point};
+use protocol::messages::{Clock, Correction, Point, TickUpdate};
 
 use crate::comparison::demand_same;
 use crate::findings::Findings;
@@ -73,11 +73,11 @@ fn put_stale(harness: &Harness<'_>, tick: Tick) -> Result<(), RuleFailure> {
     let of_other_epoch = (harness.epoch() - 1, tick);
     let of_other_tick = tick.checked_sub(1).map(|before| (harness.epoch(), before));
     for (epoch, tick) in of_other_tick.into_iter().chain([of_other_epoch]) {
-        harness.put_news(&News {
+        harness.put_news(&TickUpdate {
             epoch,
             tick,
             correction: elsewhere,
-            ..News::default()
+            ..TickUpdate::default()
         })?;
     }
     Ok(())
@@ -90,7 +90,7 @@ fn others_flags(kit: &Kit) -> Result<(), RuleFailure> {
 
     // The barrier's own clock, which has no flag, does not reach the robot.
     harness.is_cut_off = true;
-    harness.open(&News::default())?;
+    harness.open(&TickUpdate::default())?;
     harness.put_clock(&Clock {
         epoch: 1,
         tick: 3,

@@ -15,7 +15,7 @@ use crate::kit::Kit;
 use crate::patience::{PATIENCE, in_each_attempt};
 use crate::report::RuleFailure;
 use crate::script::{Disturbance, PlayScript, Straight, play, usual, with_robot};
-use crate::transcript::Entry;
+use crate::transcript::PlayedTick;
 
 /// The kit's own limit where it waits until all replies are in.
 const ALL_REPLIES: Duration = Duration::from_secs(3);
@@ -128,7 +128,7 @@ pub(super) fn state(answer: Option<Reply>, expected: &str) -> Result<PublicState
 }
 
 impl Disturbance for StateQueries {
-    fn after(&mut self, harness: &mut Harness<'_>, entry: &Entry) -> Result<(), RuleFailure> {
+    fn after(&mut self, harness: &mut Harness<'_>, entry: &PlayedTick) -> Result<(), RuleFailure> {
         let epoch = entry.epoch;
         let tick = entry.tick;
         let expected = format!("asked with tick={}, the state of tick {tick}", tick + 1);
@@ -165,7 +165,7 @@ impl Disturbance for StateQueries {
 
 impl StateQueries {
     /// It stands where it was put, and else where it proposed.
-    fn check_location(&mut self, entry: &Entry, now: &PublicState) {
+    fn check_location(&mut self, entry: &PlayedTick, now: &PublicState) {
         let tick = entry.tick;
         let came = format!("{:?} in tick {tick}", now.location);
         self.location = entry.location;
@@ -219,7 +219,7 @@ impl StateQueries {
 /// What is put for subscribers comes before the report, in every tick once the robot knows of a subscriber.
 fn check_followed(
     harness: &Harness<'_>,
-    entry: &Entry,
+    entry: &PlayedTick,
     now: &PublicState,
 ) -> Result<(), RuleFailure> {
     let tick = entry.tick;
@@ -251,7 +251,7 @@ fn check_followed(
 }
 
 /// What it shows is what it reports.
-fn check_state(entry: &Entry, now: &PublicState) -> Result<(), RuleFailure> {
+fn check_state(entry: &PlayedTick, now: &PublicState) -> Result<(), RuleFailure> {
     let report = &entry.report;
     let shown = PublicState {
         epoch: now.epoch,
@@ -551,7 +551,11 @@ fn demand_one_reply(
 pub(super) fn unknown(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     struct Odd;
     impl Disturbance for Odd {
-        fn after(&mut self, harness: &mut Harness<'_>, entry: &Entry) -> Result<(), RuleFailure> {
+        fn after(
+            &mut self,
+            harness: &mut Harness<'_>,
+            entry: &PlayedTick,
+        ) -> Result<(), RuleFailure> {
             if !entry.tick.is_multiple_of(8) {
                 return Ok(());
             }

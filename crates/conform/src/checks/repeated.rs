@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use protocol::messages::{Clock, Correction, News, Point};
+use protocol::messages::{Clock, Correction, Point, TickUpdate};
 use protocol::{Epoch, Tick};
 
 use crate::comparison::demand_same;
@@ -13,8 +13,8 @@ use crate::kit::Kit;
 use crate::patience::PATIENCE;
 use crate::report::RuleFailure;
 use crate::script::{Disturbance, PlayScript, play, usual, with_robot};
-use crate::seen::{Answer, SentCommand};
-use crate::transcript::Entry;
+use crate::seen::{ReceivedReport, ReportedCommand};
+use crate::transcript::PlayedTick;
 
 /// One clock in so many comes again, and each whose tick had commands.
 const EVERY: Tick = 3;
@@ -27,7 +27,11 @@ const COMMANDS_PATIENCE: Duration = Duration::from_secs(2);
 pub(super) fn duplicate(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     struct Again;
     impl Disturbance for Again {
-        fn after(&mut self, harness: &mut Harness<'_>, entry: &Entry) -> Result<(), RuleFailure> {
+        fn after(
+            &mut self,
+            harness: &mut Harness<'_>,
+            entry: &PlayedTick,
+        ) -> Result<(), RuleFailure> {
             if entry.tick.is_multiple_of(EVERY) || !entry.commands.is_empty() {
                 repeat(harness, entry)?;
             }
@@ -40,7 +44,7 @@ pub(super) fn duplicate(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> 
 }
 
 /// Repeats the clock of a tick, and waits for its report and its commands.
-fn repeat(harness: &mut Harness<'_>, entry: &Entry) -> Result<(), RuleFailure> {
+fn repeat(harness: &mut Harness<'_>, entry: &PlayedTick) -> Result<(), RuleFailure> {
     // A robot that reports twice by itself breaks another rule: what it still sends is not the repetition.
     harness.pass(BEFORE_REPEATING);
     // What comes from here on follows the repetition.
@@ -87,7 +91,10 @@ fn repeat(harness: &mut Harness<'_>, entry: &Entry) -> Result<(), RuleFailure> {
     Ok(())
 }
 
-fn answers_of<'s>(harness: &'s Harness<'_>, tick: Tick) -> impl Iterator<Item = &'s Answer> {
+fn answers_of<'s>(
+    harness: &'s Harness<'_>,
+    tick: Tick,
+) -> impl Iterator<Item = &'s ReceivedReport> {
     harness
         .seen
         .answers
@@ -99,7 +106,7 @@ fn answers_of<'s>(harness: &'s Harness<'_>, tick: Tick) -> impl Iterator<Item = 
 fn commands_since<'s>(
     harness: &'s Harness<'_>,
     since: usize,
-) -> impl Iterator<Item = &'s SentCommand> {
+) -> impl Iterator<Item = &'s ReportedCommand> {
     harness
         .seen
         .commands
@@ -108,16 +115,16 @@ fn commands_since<'s>(
 }
 
 /// The number of a command of the tick that did not come again between two places among all that came.
-fn missing(harness: &Harness<'_>, entry: &Entry, since: usize, report: usize) -> Option<u32> {
+fn missing(harness: &Harness<'_>, entry: &PlayedTick, since: usize, report: usize) -> Option<u32> {
     let came: BTreeSet<Option<u32>> = commands_since(harness, since)
         .filter(|sent| sent.order < report && sent.tick() == Some(entry.tick))
-        .map(SentCommand::number)
+        .map(ReportedCommand::number)
         .collect();
 
     entry
         .commands
         .iter()
-        .map(SentCommand::number)
+        .map(ReportedCommand::number)
         .find(|number| !came.contains(number))
         .flatten()
 }
@@ -155,14 +162,14 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
             let flag = harness.flag();
             for (epoch, tick) in late {
                 // If it took them for its own, it would stand elsewhere.
-                harness.put_news(&News {
+                harness.put_news(&TickUpdate {
                     epoch,
                     tick,
                     correction: Some(Correction {
                         location: Point::new(1.0, 1.0),
                         blocked: true,
                     }),
-                    ..News::default()
+                    ..TickUpdate::default()
                 })?;
                 harness.put_clock(&Clock {
                     epoch,
@@ -174,7 +181,7 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
             Ok(())
         }
 
-        fn after(&mut self, harness: &mut Harness<'_>, _: &Entry) -> Result<(), RuleFailure> {
+        fn after(&mut self, harness: &mut Harness<'_>, _: &PlayedTick) -> Result<(), RuleFailure> {
             // In order on one link: an answer to a late clock would have come before that to this one.
             let answered = self
                 .0

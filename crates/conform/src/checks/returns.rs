@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use protocol::messages::{Clock, News, PublicState};
+use protocol::messages::{Clock, PublicState, TickUpdate};
 use protocol::{Generation, Tick};
 
 use crate::comparison::demand_same;
@@ -12,7 +12,7 @@ use crate::kit::Kit;
 use crate::patience::PATIENCE;
 use crate::report::RuleFailure;
 use crate::script::{PlayScript, Straight, play, step, usual, with_robot};
-use crate::transcript::Entry;
+use crate::transcript::PlayedTick;
 
 /// The last tick of the predecessor.
 const LAST: Tick = 8;
@@ -21,7 +21,7 @@ const GENERATION: Generation = 2;
 const QUIET: Duration = Duration::from_millis(300);
 
 /// What the robot reported for a tick when nothing disturbed it.
-fn state_of(entry: &Entry) -> PublicState {
+fn state_of(entry: &PlayedTick) -> PublicState {
     let report = entry.report.clone();
     PublicState {
         epoch: report.epoch,
@@ -100,7 +100,7 @@ pub(super) fn generation(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure>
     demand_generation(&transcript)
 }
 
-fn demand_generation(transcript: &[Entry]) -> Result<(), RuleFailure> {
+fn demand_generation(transcript: &[PlayedTick]) -> Result<(), RuleFailure> {
     match transcript
         .iter()
         .find(|entry| entry.report.generation != GENERATION)
@@ -128,7 +128,7 @@ pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     harness.miss()?;
 
     harness.keeps_requests = true;
-    harness.open(&News::default())?;
+    harness.open(&TickUpdate::default())?;
     let expected = "another request to join when its news have its generation as `rejoin`";
     let joining = harness
         .next_join(PATIENCE)
@@ -166,7 +166,7 @@ pub(super) fn replaced(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     let tick = harness.next_tick();
     // The robot's own process runs on, as after a cut: it must end by itself.
     harness.play_successor();
-    harness.open(&News::default())?;
+    harness.open(&TickUpdate::default())?;
     let expected = "its process ends, with an exit status other than 0, when its news name a later incarnation";
     let status = harness.until_ended(expected, PATIENCE)?;
     if status.success() {

@@ -14,8 +14,8 @@ use crate::kit::{CannotRun, Kit};
 use crate::patience::START_PATIENCE;
 use crate::report::{AnswerTimes, RuleFailure};
 use crate::script::{PlayScript, Straight, play, with_robot};
-use crate::seen::SentCommand;
-use crate::transcript::{Entry, Transcript};
+use crate::seen::ReportedCommand;
+use crate::transcript::{PlayedTick, Transcript};
 use crate::wire::Joining;
 
 /// The rules that the usual ticks show.
@@ -229,14 +229,14 @@ fn check_stamps(harness: &Harness<'_>, transcript: &Transcript) -> Result<(), Ru
 }
 
 /// The commands of a tick are numbered from 1, are as many as the report states, and were put before it.
-fn check_tick(harness: &Harness<'_>, entry: &Entry) -> Result<(), RuleFailure> {
+fn check_tick(harness: &Harness<'_>, entry: &PlayedTick) -> Result<(), RuleFailure> {
     let tick = entry.tick;
     let report = harness
         .seen
         .answers
         .get(entry.index)
         .map_or(usize::MAX, |answer| answer.order);
-    let mut first: BTreeMap<u32, &SentCommand> = BTreeMap::new();
+    let mut first: BTreeMap<u32, &ReportedCommand> = BTreeMap::new();
     for sent in &harness.seen.commands {
         let Ok(command) = &sent.command else { continue };
         if (command.epoch, command.tick) != (entry.epoch, tick) {
@@ -268,7 +268,7 @@ fn check_tick(harness: &Harness<'_>, entry: &Entry) -> Result<(), RuleFailure> {
     }
 }
 
-fn describe(sent: &SentCommand) -> String {
+fn describe(sent: &ReportedCommand) -> String {
     match &sent.command {
         Ok(command) => format!(
             "from {} to {}: number {} of tick {}, epoch {}, generation {}, {}: {:?}",

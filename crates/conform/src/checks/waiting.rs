@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use protocol::Tick;
-use protocol::messages::{Correction, News};
+use protocol::messages::{Correction, TickUpdate};
 
 use crate::harness::{Harness, HarnessOptions};
 use crate::kit::Kit;
@@ -34,12 +34,12 @@ pub(super) fn for_news(kit: &Kit) -> Result<Harness<'_>, RuleFailure> {
 
     // The clock says that there are news: without them the robot must not begin.
     harness.withholds_news = true;
-    harness.open(&News {
+    harness.open(&TickUpdate {
         correction: Some(Correction {
             location: harness.body.stands,
             blocked: true,
         }),
-        ..News::default()
+        ..TickUpdate::default()
     })?;
     harness.settle(UNDER_WAY);
     Ok(harness)
@@ -52,7 +52,7 @@ pub(super) fn for_another(kit: &Kit) -> Result<(Harness<'_>, bool), RuleFailure>
     // From here on no query is answered, so the robot waits in the first tick in which it asks.
     harness.fake_peers.hold();
     for _ in 0..TICKS {
-        harness.open(&News::default())?;
+        harness.open(&TickUpdate::default())?;
         let came = harness.until("a report or a query", PATIENCE, |harness| {
             (harness.fake_peers.has_held() || !harness.is_open()).then_some(())
         });

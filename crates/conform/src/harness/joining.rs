@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use lockstep::{Admission, Refused, Stamp};
-use protocol::messages::{JoinAnswer, News, Refusal};
+use protocol::messages::{JoinAnswer, Refusal, TickUpdate};
 use protocol::{Epoch, RobotName, Tick};
 
 use super::{Harness, barrier, patient};
@@ -72,7 +72,7 @@ impl Harness<'_> {
         let subject = self.kit.subject();
         self.play(&subject);
         for tick in 0..=last {
-            self.open(&News::default())?;
+            self.open(&TickUpdate::default())?;
             let stamp = Stamp {
                 epoch: self.epoch,
                 tick,

@@ -10,19 +10,20 @@ use std::process::ExitStatus;
 use std::time::{Duration, Instant};
 
 use lockstep::{
-    Barrier, IncarnationNotice, Lateness, Outcome, Output, Sent as Put, Stamp, Timer, Timing,
+    Barrier, BarrierOutput, IncarnationNotice, LatePolicy, Sent as Put, Stamp, TickOutcome, Timer,
+    Timing,
 };
 use protocol::keys::Keys;
-use protocol::messages::{Clock, MAX_ENTRIES, News, OnLate, Report, Waiting, Welcome};
+use protocol::messages::{Clock, MAX_ENTRIES, OnLate, Report, TickUpdate, Waiting, Welcome};
 use protocol::{Epoch, RobotName, RunName, Tick, decode};
 
-use crate::body::Body;
+use crate::body::RobotBody;
 use crate::fake_peers::FakePeers;
 use crate::kit::Kit;
 use crate::patience::{Limit, PATIENCE};
 use crate::process::RobotProcess;
 use crate::report::RuleFailure;
-use crate::seen::{Seen, SentCommand};
+use crate::seen::{ReportedCommand, Seen};
 use crate::wire::{Joining, Wire, WireEvent};
 
 /// How often a wait looks whether the process still runs.
@@ -37,7 +38,7 @@ const TOKEN_PATIENCE: Duration = Duration::from_secs(120);
 /// A complete tick.
 pub(crate) struct CompleteTick {
     pub(crate) report: Report,
-    pub(crate) commands: Vec<SentCommand>,
+    pub(crate) commands: Vec<ReportedCommand>,
     /// The place of its report in [`Seen::answers`].
     pub(crate) index: usize,
     /// From the clock to the report, wall clock.
@@ -81,7 +82,7 @@ pub(crate) struct Harness<'k> {
     pub(crate) fake_peers: FakePeers,
     pub(crate) seen: Seen,
     pub(crate) process: RobotProcess,
-    pub(crate) body: Body,
+    pub(crate) body: RobotBody,
     /// Clocks that were put more than once.
     pub(crate) repeated: BTreeSet<(Epoch, Tick)>,
     /// What the robot is welcomed with; epoch, tick, generation and news flag are the barrier's.
@@ -93,22 +94,22 @@ pub(crate) struct Harness<'k> {
     /// News are not put.
     pub(crate) withholds_news: bool,
     wire: Wire,
-    barrier: Barrier<usize, SentCommand>,
+    barrier: Barrier<usize, ReportedCommand>,
     timers: BTreeMap<Timer, Instant>,
     epoch: Epoch,
     next: Tick,
     is_gathered: bool,
     /// News of the open tick.
-    news: News,
+    news: TickUpdate,
     granted: Option<(Epoch, Tick)>,
     begun: Instant,
-    outcome: Option<Outcome<usize, SentCommand>>,
+    outcome: Option<TickOutcome<usize, ReportedCommand>>,
     options: HarnessOptions,
     joins: VecDeque<Joining>,
 }
 
 /// The barrier for these robots: it waits, whatever happens.
-fn barrier(roster: impl IntoIterator<Item = RobotName>) -> Barrier<usize, SentCommand> {
+fn barrier(roster: impl IntoIterator<Item = RobotName>) -> Barrier<usize, ReportedCommand> {
     let timing = Timing {
         token: TOKEN_PATIENCE,
         ..Timing::default()
@@ -116,8 +117,8 @@ fn barrier(roster: impl IntoIterator<Item = RobotName>) -> Barrier<usize, SentCo
     Barrier::new(roster, patient(), timing, MAX_ENTRIES as u32)
 }
 
-fn patient() -> Lateness {
-    Lateness {
+fn patient() -> LatePolicy {
+    LatePolicy {
         on_late: OnLate::Wait,
         own: BTreeMap::new(),
         deadline: Duration::from_millis(100),
@@ -146,7 +147,7 @@ impl<'k> Harness<'k> {
             fake_peers: FakePeers::default(),
             seen: Seen::default(),
             process,
-            body: Body::default(),
+            body: RobotBody::default(),
             repeated: BTreeSet::new(),
             template: kit.template(&run),
             run,
@@ -159,7 +160,7 @@ impl<'k> Harness<'k> {
             epoch: 1,
             next: 0,
             is_gathered: false,
-            news: News::default(),
+            news: TickUpdate::default(),
             granted: None,
             begun: Instant::now(),
             outcome: None,
@@ -302,25 +303,28 @@ impl<'k> Harness<'k> {
     /// Lets the barrier act, and carries out its outputs.
     fn drive(
         &mut self,
-        act: impl FnOnce(&mut Barrier<usize, SentCommand>, &mut Vec<Output<usize, SentCommand>>),
+        act: impl FnOnce(
+            &mut Barrier<usize, ReportedCommand>,
+            &mut Vec<BarrierOutput<usize, ReportedCommand>>,
+        ),
     ) {
         let mut out = Vec::new();
         act(&mut self.barrier, &mut out);
 
         for output in out {
             match output {
-                Output::Gathered => self.is_gathered = true,
-                Output::Grant { news, clock } => self.grant(&news, &clock),
-                Output::Complete(outcome) => self.outcome = Some(outcome),
-                Output::SetTimer(timer, after) => {
+                BarrierOutput::Gathered => self.is_gathered = true,
+                BarrierOutput::Grant { news, clock } => self.grant(&news, &clock),
+                BarrierOutput::Complete(outcome) => self.outcome = Some(outcome),
+                BarrierOutput::SetTimer(timer, after) => {
                     self.timers.insert(timer, Instant::now() + after);
                 }
                 // Checks look at what came, not at what the barrier makes of it.
-                Output::StandIn(_)
-                | Output::Held
-                | Output::Released
-                | Output::Aborted
-                | Output::Ignored(..) => {}
+                BarrierOutput::StandIn(_)
+                | BarrierOutput::Held
+                | BarrierOutput::Released
+                | BarrierOutput::Aborted
+                | BarrierOutput::Ignored(..) => {}
             }
         }
     }
@@ -367,7 +371,7 @@ impl<'k> Harness<'k> {
         if let Some((_, notice)) = own
             && !self.withholds_news
         {
-            self.put_news(&News {
+            self.put_news(&TickUpdate {
                 epoch: clock.epoch,
                 tick: clock.tick,
                 joined: notice.joined,

@@ -3,15 +3,15 @@
 use std::collections::BTreeSet;
 use std::time::Instant;
 
-use lockstep::Lateness;
+use lockstep::LatePolicy;
 use protocol::Tick;
-use protocol::messages::{Clock, End, News, OnLate, Report};
+use protocol::messages::{Clock, End, OnLate, Report, TickUpdate};
 
 use super::{CompleteTick, Harness, patient};
 use crate::flushing;
 use crate::patience::PATIENCE;
 use crate::report::RuleFailure;
-use crate::seen::SentCommand;
+use crate::seen::ReportedCommand;
 
 /// A robot that has put its report so often without all commands that it states does not put them at all.
 const INCOMPLETE: usize = 3;
@@ -41,7 +41,7 @@ impl Harness<'_> {
     }
 
     /// Puts news for the robot.
-    pub(crate) fn put_news(&self, news: &News) -> Result<(), RuleFailure> {
+    pub(crate) fn put_news(&self, news: &TickUpdate) -> Result<(), RuleFailure> {
         self.put_as_news(&self.fake_peers.dress(news))
     }
 
@@ -56,8 +56,8 @@ impl Harness<'_> {
     }
 
     /// The news of the open tick, as they are put.
-    pub(crate) fn open_news(&self) -> News {
-        News {
+    pub(crate) fn open_news(&self) -> TickUpdate {
+        TickUpdate {
             epoch: self.epoch,
             tick: self.next.saturating_sub(1),
             ..self.news.clone()
@@ -65,7 +65,7 @@ impl Harness<'_> {
     }
 
     /// Grants the next tick with these news.
-    pub(crate) fn open(&mut self, news: &News) -> Result<(), RuleFailure> {
+    pub(crate) fn open(&mut self, news: &TickUpdate) -> Result<(), RuleFailure> {
         self.until("all robots are connected", PATIENCE, |harness| {
             harness.is_gathered.then_some(())
         })?;
@@ -182,7 +182,7 @@ impl Harness<'_> {
             .commands
             .iter()
             .filter(|sent| sent.tick() == Some(tick))
-            .filter_map(SentCommand::number)
+            .filter_map(ReportedCommand::number)
             .collect();
 
         format!("commands with the numbers {numbers:?}")
@@ -190,13 +190,13 @@ impl Harness<'_> {
 
     /// Grants the next tick while the robot is cut off, and goes on without it: it is lost.
     pub(crate) fn miss(&mut self) -> Result<(), RuleFailure> {
-        let impatient = Lateness {
+        let impatient = LatePolicy {
             on_late: OnLate::Continue,
             ..patient()
         };
         self.is_cut_off = true;
         self.drive(|barrier, out| barrier.set_lateness(impatient, out));
-        self.open(&News::default())?;
+        self.open(&TickUpdate::default())?;
         self.until("the clock goes on", PATIENCE, |harness| {
             harness.outcome.take()
         })?;

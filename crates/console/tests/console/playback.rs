@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use protocol::messages::{Awaited, Cut, Panel, Performative, Point, Reason, Report, Widget};
 use protocol::{Event, RobotName, RunName};
 use recording::content::Missed;
-use recording::{Frame, Header, PlacedRobot, RecordedTick, Wall, Writer};
+use recording::{Frame, Header, PlacedRobot, RecordedTick, WallTimes, Writer};
 use serde_json::{Value, json};
 
 use crate::client::{Console, fails};
@@ -86,7 +86,7 @@ fn recorded_tick(tick: u64) -> RecordedTick {
         events: events(tick),
         reports: [(robot("Butler"), report(tick))].into(),
         panels: BTreeMap::new(),
-        wall: Wall::default(),
+        wall: WallTimes::default(),
     }
 }
 

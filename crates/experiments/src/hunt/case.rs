@@ -11,7 +11,7 @@ use super::fault::{Effect, Link, Messages, PlannedFault, chance, seconds};
 
 /// A plan of faults on a scenario, which may be smaller than the one that is hunted in.
 #[derive(Debug, Clone, PartialEq, Serialize, Default)]
-pub struct Case {
+pub struct FaultCase {
     /// The faults.
     pub faults: Vec<PlannedFault>,
     /// Duration, ticks; `None` for that of the scenario.
@@ -22,7 +22,7 @@ pub struct Case {
     pub without: BTreeSet<RobotName>,
 }
 
-impl Case {
+impl FaultCase {
     /// These faults on the whole scenario.
     #[must_use]
     pub fn of(faults: Vec<PlannedFault>) -> Self {

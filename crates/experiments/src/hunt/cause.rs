@@ -5,13 +5,13 @@ use std::collections::BTreeSet;
 use protocol::RobotName;
 use serde::Serialize;
 
-use super::case::Case;
-use super::fault::{Kind, Link, PlannedFault};
-use super::trial::{Played, SentMessage};
+use super::case::FaultCase;
+use super::fault::{FaultClass, Link, PlannedFault};
+use super::trial::{SentMessage, TrialResult};
 
 /// What the faults of a case do.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Cause(BTreeSet<Sign>);
+pub struct FailureSignature(BTreeSet<Sign>);
 
 /// One thing that faults do.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -27,12 +27,12 @@ pub enum Sign {
     /// This robot takes no part for a time.
     Absent(RobotName),
     /// There is a fault of this kind.
-    Fault(Kind),
+    Fault(FaultClass),
 }
 
-impl Cause {
+impl FailureSignature {
     /// What the faults of a shrunk case do, each of which is needed.
-    pub(super) fn of_faults(case: &Case, played: &Played) -> Self {
+    pub(super) fn of_faults(case: &FaultCase, played: &TrialResult) -> Self {
         let mut signs = BTreeSet::new();
         for fault in &case.faults {
             match fault {
@@ -55,7 +55,7 @@ impl Cause {
     }
 
     /// All that the faults of a plan did in its run.
-    pub(super) fn of_plan(case: &Case, played: &Played) -> Self {
+    pub(super) fn of_plan(case: &FaultCase, played: &TrialResult) -> Self {
         let mut cause = Self::of_faults(case, played);
         for message in &played.sent {
             if message.is_lost {

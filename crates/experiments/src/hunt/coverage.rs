@@ -6,7 +6,7 @@ use protocol::RobotName;
 use protocol::event::Cause;
 use serde::Serialize;
 
-use super::fault::{Kind, Link};
+use super::fault::{FaultClass, Link};
 
 /// Most features that are told apart, because robots choose the texts of commands and states.
 const MAX_FEATURES: usize = 10_000;
@@ -18,7 +18,7 @@ pub enum Feature {
     /// The plan has a fault of this kind.
     Fault {
         /// The kind.
-        kind: Kind,
+        kind: FaultClass,
     },
     /// A command had this fate.
     Message {
@@ -27,7 +27,7 @@ pub enum Feature {
         /// Its text.
         text: String,
         /// What became of it.
-        fate: Fate,
+        fate: CommandFate,
     },
     /// A query could not be made by chance.
     QueryLost {
@@ -57,7 +57,7 @@ pub enum Feature {
 /// What became of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Fate {
+pub enum CommandFate {
     /// It arrived.
     Delivered,
     /// It was delayed.
@@ -110,7 +110,7 @@ impl Serialize for Coverage {
     }
 }
 
-impl std::fmt::Display for Fate {
+impl std::fmt::Display for CommandFate {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Delivered => f.write_str("delivered"),

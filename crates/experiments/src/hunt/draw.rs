@@ -8,8 +8,8 @@ use protocol::{RobotName, Tick};
 use scenario::MAX_GUESTS;
 use scenario::Scenario;
 
-use super::fault::{Absence, Effect, Kind, Link, Messages, PlannedFault, Span};
-use super::trial::Played;
+use super::fault::{AbsenceReason, Effect, FaultClass, Link, Messages, PlannedFault, TickSpan};
+use super::trial::TrialResult;
 
 /// Most faults of a plan.
 const MAX_FAULTS: usize = 4;
@@ -29,7 +29,7 @@ pub struct Ground {
     roster: Vec<RobotName>,
     /// Number of commands on each link in the run without faults.
     sent: BTreeMap<Link, u64>,
-    kinds: Vec<Kind>,
+    kinds: Vec<FaultClass>,
     /// Longest time of a fault.
     longest_ticks: Tick,
 }
@@ -38,7 +38,12 @@ impl Ground {
     /// The faults of these kinds that a scenario can have, which was played without any; none lasts longer than
     /// `longest_s`, simulated seconds.
     #[must_use]
-    pub fn new(scenario: &Scenario, played: &Played, kinds: &[Kind], longest_s: f64) -> Self {
+    pub fn new(
+        scenario: &Scenario,
+        played: &TrialResult,
+        kinds: &[FaultClass],
+        longest_s: f64,
+    ) -> Self {
         let mut sent = BTreeMap::new();
         for message in &played.sent {
             if scenario.robots.contains_key(&message.link.to) {
@@ -63,22 +68,22 @@ impl Ground {
 
     /// The kinds that are drawn.
     #[must_use]
-    pub fn kinds(&self) -> &[Kind] {
+    pub fn kinds(&self) -> &[FaultClass] {
         &self.kinds
     }
 
-    fn has(&self, kind: Kind) -> bool {
+    fn has(&self, kind: FaultClass) -> bool {
         match kind {
-            Kind::Lose => !self.sent.is_empty(),
-            Kind::Loss
-            | Kind::Burst
-            | Kind::Delay
-            | Kind::Duplication
-            | Kind::Partition
-            | Kind::OneWay => self.roster.len() > 1,
-            Kind::Crash | Kind::Hang => !self.roster.is_empty(),
-            Kind::Wall => true,
-            Kind::Crowd => self.scenario.guests.count > 0,
+            FaultClass::Lose => !self.sent.is_empty(),
+            FaultClass::Loss
+            | FaultClass::Burst
+            | FaultClass::Delay
+            | FaultClass::Duplication
+            | FaultClass::Partition
+            | FaultClass::OneWay => self.roster.len() > 1,
+            FaultClass::Crash | FaultClass::Hang => !self.roster.is_empty(),
+            FaultClass::Wall => true,
+            FaultClass::Crowd => self.scenario.guests.count > 0,
         }
     }
 
@@ -108,31 +113,31 @@ impl Ground {
     fn fault(&self, chance: &mut Stream) -> PlannedFault {
         let kind = self.kinds[below(self.kinds.len(), chance)];
         match kind {
-            Kind::Lose => self.lose(chance),
-            Kind::Loss => {
+            FaultClass::Lose => self.lose(chance),
+            FaultClass::Loss => {
                 let effect = Effect::Loss(5 * (1 + below(20, chance) as u64));
                 self.channel(self.messages(chance), effect, chance)
             }
-            Kind::Burst => {
+            FaultClass::Burst => {
                 let enter = 1 + below(20, chance) as u64;
                 let leave = 5 * (1 + below(10, chance) as u64);
                 let effect = Effect::Burst(enter, leave);
                 self.channel(self.messages(chance), effect, chance)
             }
-            Kind::Delay => {
+            FaultClass::Delay => {
                 let effect = Effect::Delay(1 << below(6, chance));
                 self.channel(Messages::Commands, effect, chance)
             }
-            Kind::Duplication => {
+            FaultClass::Duplication => {
                 let effect = Effect::Duplication(5 * (1 + below(20, chance) as u64));
                 self.channel(Messages::Commands, effect, chance)
             }
-            Kind::Partition => self.partition(false, chance),
-            Kind::OneWay => self.partition(true, chance),
-            Kind::Crash => self.absence(Absence::Crash, chance),
-            Kind::Hang => self.absence(Absence::Hang, chance),
-            Kind::Wall => self.wall(chance),
-            Kind::Crowd => {
+            FaultClass::Partition => self.partition(false, chance),
+            FaultClass::OneWay => self.partition(true, chance),
+            FaultClass::Crash => self.absence(AbsenceReason::Crash, chance),
+            FaultClass::Hang => self.absence(AbsenceReason::Hang, chance),
+            FaultClass::Wall => self.wall(chance),
+            FaultClass::Crowd => {
                 let count = self.scenario.guests.count;
                 let more = 1 + below(count, chance);
                 let guests = (count + more).min(MAX_GUESTS);
@@ -179,7 +184,7 @@ impl Ground {
         }
     }
 
-    fn absence(&self, why: Absence, chance: &mut Stream) -> PlannedFault {
+    fn absence(&self, why: AbsenceReason, chance: &mut Stream) -> PlannedFault {
         let robot = self.roster[below(self.roster.len(), chance)].clone();
         let span = self.span(chance);
         PlannedFault::Absence { robot, why, span }
@@ -269,12 +274,12 @@ impl Ground {
     }
 
     /// A time that begins in the run.
-    fn span(&self, chance: &mut Stream) -> Span {
+    fn span(&self, chance: &mut Stream) -> TickSpan {
         let ticks = usize::try_from(self.scenario.ticks).unwrap_or(usize::MAX);
         let from = 1 + below(ticks, chance) as Tick;
         let scale = SHORTEST_TICKS << below(DOUBLINGS, chance);
         let lasting = scale + below(scale as usize, chance) as Tick;
-        Span {
+        TickSpan {
             from,
             until: from + lasting.min(self.longest_ticks),
         }

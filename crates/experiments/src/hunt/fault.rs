@@ -10,7 +10,7 @@ const CHANCE_STEPS: f64 = 100.0;
 /// A kind of faults that a hunt draws.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Kind {
+pub enum FaultClass {
     /// One command is lost.
     Lose,
     /// Messages are lost by chance.
@@ -35,7 +35,7 @@ pub enum Kind {
     Crowd,
 }
 
-impl Kind {
+impl FaultClass {
     /// All kinds.
     pub const ALL: [Self; 11] = [
         Self::Lose,
@@ -70,7 +70,7 @@ impl Kind {
     }
 }
 
-impl std::str::FromStr for Kind {
+impl std::str::FromStr for FaultClass {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -84,7 +84,7 @@ impl std::str::FromStr for Kind {
 
 /// A time of a run, ticks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct Span {
+pub struct TickSpan {
     /// First tick of the fault.
     pub from: Tick,
     /// First tick after the fault; it may be after the end of the run.
@@ -137,14 +137,14 @@ pub enum Effect {
 /// Why a robot takes no part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Absence {
+pub enum AbsenceReason {
     /// Its process is killed, and starts again.
     Crash,
     /// Its process stands still, and goes on.
     Hang,
 }
 
-impl Absence {
+impl AbsenceReason {
     /// Its name in scenario files.
     pub(super) fn name(self) -> &'static str {
         match self {
@@ -174,7 +174,7 @@ pub enum PlannedFault {
         /// What happens to them.
         effect: Effect,
         /// When.
-        span: Span,
+        span: TickSpan,
     },
     /// A partition of two groups.
     Partition {
@@ -187,16 +187,16 @@ pub enum PlannedFault {
         /// What is cut, at least one.
         cuts: Vec<Messages>,
         /// When.
-        span: Span,
+        span: TickSpan,
     },
     /// A robot takes no part, and is back at the end of the time.
     Absence {
         /// The robot.
         robot: RobotName,
         /// Whether it crashes or hangs.
-        why: Absence,
+        why: AbsenceReason,
         /// When.
-        span: Span,
+        span: TickSpan,
     },
     /// Further fixed obstacles.
     Wall {
@@ -213,23 +213,23 @@ pub enum PlannedFault {
 impl PlannedFault {
     /// Its kind.
     #[must_use]
-    pub fn kind(&self) -> Kind {
+    pub fn kind(&self) -> FaultClass {
         match self {
-            Self::Lose { .. } => Kind::Lose,
+            Self::Lose { .. } => FaultClass::Lose,
             Self::Channel { effect, .. } => match effect {
-                Effect::Loss(_) => Kind::Loss,
-                Effect::Burst(..) => Kind::Burst,
-                Effect::Delay(_) => Kind::Delay,
-                Effect::Duplication(_) => Kind::Duplication,
+                Effect::Loss(_) => FaultClass::Loss,
+                Effect::Burst(..) => FaultClass::Burst,
+                Effect::Delay(_) => FaultClass::Delay,
+                Effect::Duplication(_) => FaultClass::Duplication,
             },
-            Self::Partition { one_way: true, .. } => Kind::OneWay,
-            Self::Partition { .. } => Kind::Partition,
+            Self::Partition { one_way: true, .. } => FaultClass::OneWay,
+            Self::Partition { .. } => FaultClass::Partition,
             Self::Absence { why, .. } => match why {
-                Absence::Crash => Kind::Crash,
-                Absence::Hang => Kind::Hang,
+                AbsenceReason::Crash => FaultClass::Crash,
+                AbsenceReason::Hang => FaultClass::Hang,
             },
-            Self::Wall { .. } => Kind::Wall,
-            Self::Crowd { .. } => Kind::Crowd,
+            Self::Wall { .. } => FaultClass::Wall,
+            Self::Crowd { .. } => FaultClass::Crowd,
         }
     }
 
@@ -258,7 +258,7 @@ impl PlannedFault {
     }
 
     /// The fault at another time. Walls and guests have none.
-    pub(super) fn at(&self, time: Span) -> Self {
+    pub(super) fn at(&self, time: TickSpan) -> Self {
         let mut fault = self.clone();
         match &mut fault {
             Self::Channel { span, .. }
@@ -306,8 +306,8 @@ impl PlannedFault {
             }
             Self::Absence { robot, why, span } => {
                 let state = match why {
-                    Absence::Crash => "is crashed",
-                    Absence::Hang => "hangs",
+                    AbsenceReason::Crash => "is crashed",
+                    AbsenceReason::Hang => "hangs",
                 };
                 format!("{robot} {state}, {}", span.in_words(tick_s))
             }
@@ -342,7 +342,7 @@ impl Effect {
     }
 }
 
-impl Span {
+impl TickSpan {
     fn in_words(self, tick_s: f64) -> String {
         format!(
             "from {} until {}",

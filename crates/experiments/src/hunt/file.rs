@@ -11,9 +11,9 @@ use protocol::plain::escape_line;
 use protocol::time::time_s;
 use toml::Value;
 
-use super::case::Case;
+use super::case::FaultCase;
 use super::fault::PlannedFault;
-use super::trial::{Played, Subject};
+use super::trial::{Subject, TrialResult};
 use crate::shell;
 use export::draft::{Draft, unwritable};
 
@@ -34,8 +34,8 @@ pub(super) struct Heading<'a> {
 pub(super) fn write(
     path: &Path,
     subject: &Subject,
-    case: &Case,
-    played: &Played,
+    case: &FaultCase,
+    played: &TrialResult,
     heading: Heading<'_>,
 ) -> Result<(), LabError> {
     let folder = path.parent().unwrap_or(Path::new("."));
@@ -107,8 +107,8 @@ fn candidates(path: &Path) -> impl Iterator<Item = PathBuf> {
 fn comment(
     path: &Path,
     subject: &Subject,
-    case: &Case,
-    played: &Played,
+    case: &FaultCase,
+    played: &TrialResult,
     heading: Heading<'_>,
 ) -> String {
     let tick_s = subject.scenario.tick_s;
@@ -155,7 +155,7 @@ fn comment(
 }
 
 /// A fault in words, with the text of the message that it loses.
-fn described(fault: &PlannedFault, played: &Played, tick_s: f64) -> String {
+fn described(fault: &PlannedFault, played: &TrialResult, tick_s: f64) -> String {
     let words = fault.in_words(tick_s);
     let PlannedFault::Lose { link, number } = fault else {
         return words;

@@ -10,10 +10,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use protocol::{RobotName, Tick};
 
-use super::case::Case;
-use super::fault::{Effect, Messages, PlannedFault, Span};
+use super::case::FaultCase;
+use super::fault::{Effect, Messages, PlannedFault, TickSpan};
 use super::parallel::first;
-use super::trial::{Played, Trial};
+use super::trial::{Trial, TrialResult};
 
 /// Least time of a fault, ticks.
 const MIN_TICKS: Tick = 2;
@@ -33,9 +33,9 @@ pub struct Bounds<'a> {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shrunk {
     /// The smallest case that was found.
-    pub case: Case,
+    pub case: FaultCase,
     /// Its run, in which the expectation fails.
-    pub played: Played,
+    pub played: TrialResult,
     /// Number of runs that it took.
     pub runs: u64,
     /// Whether no step makes it smaller. If not, the runs did not suffice.
@@ -46,9 +46,9 @@ pub struct Shrunk {
 pub fn shrink(
     trial: &dyn Trial,
     name: &str,
-    case: Case,
-    played: Played,
-    world: &World,
+    case: FaultCase,
+    played: TrialResult,
+    world: &ScenarioParts,
     bounds: Bounds<'_>,
 ) -> Shrunk {
     let mut shrinker = Shrinker {
@@ -73,7 +73,7 @@ pub fn shrink(
 
 /// What can be left out of a scenario.
 #[derive(Debug, Clone, Default)]
-pub struct World {
+pub struct ScenarioParts {
     /// The robots.
     pub roster: Vec<RobotName>,
     /// The number of guests.
@@ -84,12 +84,12 @@ struct Shrinker<'a> {
     trial: &'a dyn Trial,
     name: &'a str,
     wanted: BTreeSet<String>,
-    world: &'a World,
+    world: &'a ScenarioParts,
     bounds: Bounds<'a>,
     /// The smallest case so far in which the expectation fails.
-    best: Case,
+    best: FaultCase,
     /// Its run.
-    played: Played,
+    played: TrialResult,
     runs: u64,
 }
 
@@ -122,7 +122,7 @@ impl Shrinker<'_> {
 
     /// Takes the first of these cases in which the expectation fails; returns its place. The order decides, not which run
     /// ends first.
-    fn take_first(&mut self, cases: Vec<Case>) -> Option<usize> {
+    fn take_first(&mut self, cases: Vec<FaultCase>) -> Option<usize> {
         let mut cases = cases;
         cases.retain(|case| *case != self.best);
         let left = self.bounds.runs.saturating_sub(self.runs);
@@ -142,7 +142,7 @@ impl Shrinker<'_> {
     }
 
     /// The run of a case, if the expectation fails in it because of its faults.
-    fn failing(&self, case: &Case) -> Option<Played> {
+    fn failing(&self, case: &FaultCase) -> Option<TrialResult> {
         let played = self.trial.play(case, &self.wanted).ok()?;
         if !played.failed.contains_key(self.name) {
             return None;
@@ -370,7 +370,7 @@ fn earlier(fault: &PlannedFault) -> Vec<PlannedFault> {
         | PlannedFault::Partition { span, .. }
         | PlannedFault::Absence { span, .. } => {
             for from in before(span.from, 0) {
-                let span = Span {
+                let span = TickSpan {
                     from,
                     until: from + (span.until - span.from),
                 };
@@ -432,7 +432,7 @@ fn partition(
     other: &[RobotName],
     one_way: bool,
     cuts: &[Messages],
-    span: Span,
+    span: TickSpan,
 ) -> PlannedFault {
     PlannedFault::Partition {
         one: one.to_vec(),
@@ -454,7 +454,7 @@ fn weaker_effect(effect: Effect) -> Option<Effect> {
 }
 
 /// Shorter times: the second half and the first half of a time, and what is left without its first and its last part.
-fn shorter(span: Span) -> Vec<Span> {
+fn shorter(span: TickSpan) -> Vec<TickSpan> {
     let lasting = span.until - span.from;
     let mut all = Vec::new();
     for part in [lasting / 2, lasting / 8, 1] {
@@ -462,11 +462,11 @@ fn shorter(span: Span) -> Vec<Span> {
             continue;
         }
 
-        all.push(Span {
+        all.push(TickSpan {
             from: span.from + part,
             until: span.until,
         });
-        all.push(Span {
+        all.push(TickSpan {
             from: span.from,
             until: span.until - part,
         });
@@ -481,8 +481,8 @@ mod tests {
 
     use proptest::prelude::*;
 
-    use super::super::fault::{Absence, Link};
-    use super::super::trial::{Failure, SentMessage};
+    use super::super::fault::{AbsenceReason, Link};
+    use super::super::trial::{FailedExpectation, SentMessage};
     use super::*;
     use lab::LabError;
 
@@ -508,7 +508,7 @@ mod tests {
         }
     }
 
-    fn numbers(case: &Case) -> BTreeSet<u64> {
+    fn numbers(case: &FaultCase) -> BTreeSet<u64> {
         let mut numbers = BTreeSet::new();
         for fault in &case.faults {
             match fault {
@@ -540,10 +540,10 @@ mod tests {
     }
 
     impl Trial for Synthetic {
-        fn play(&self, case: &Case, _: &BTreeSet<String>) -> Result<Played, LabError> {
+        fn play(&self, case: &FaultCase, _: &BTreeSet<String>) -> Result<TrialResult, LabError> {
             self.played.fetch_add(1, Ordering::Relaxed);
             let lost = numbers(case);
-            let mut played = Played::default();
+            let mut played = TrialResult::default();
             for number in 0..10 {
                 played.sent.push(SentMessage {
                     tick: number,
@@ -554,7 +554,7 @@ mod tests {
                 });
             }
             if self.fails(&lost) {
-                let failure = Failure {
+                let failure = FailedExpectation {
                     tick: 10,
                     because: String::new(),
                 };
@@ -564,7 +564,7 @@ mod tests {
         }
     }
 
-    fn shrunk(trial: &Synthetic, case: Case, runs: u64, jobs: usize) -> Shrunk {
+    fn shrunk(trial: &Synthetic, case: FaultCase, runs: u64, jobs: usize) -> Shrunk {
         let played = trial.play(&case, &BTreeSet::new()).unwrap();
         assert!(played.failed.contains_key(NAME), "it fails before");
         let bounds = Bounds {
@@ -572,7 +572,7 @@ mod tests {
             jobs,
             stop: &AtomicBool::new(false),
         };
-        shrink(trial, NAME, case, played, &World::default(), bounds)
+        shrink(trial, NAME, case, played, &ScenarioParts::default(), bounds)
     }
 
     proptest! {
@@ -588,7 +588,7 @@ mod tests {
             let mut all = more;
             all.extend(causes[0].iter());
             let trial = Synthetic { causes, played: AtomicU64::new(0) };
-            let case = Case::of(all.into_iter().map(lose).collect());
+            let case = FaultCase::of(all.into_iter().map(lose).collect());
             let one = shrunk(&trial, case.clone(), 10_000, 1);
 
             prop_assert!(one.is_minimal);
@@ -596,7 +596,7 @@ mod tests {
             for index in 0..one.case.faults.len() {
                 let mut faults = one.case.faults.clone();
                 faults.remove(index);
-                let fewer = Case::of(faults);
+                let fewer = FaultCase::of(faults);
                 prop_assert!(!trial.fails(&numbers(&fewer)), "{fewer:?} fails, too");
             }
 
@@ -608,7 +608,7 @@ mod tests {
         #[test]
         fn a_result_within_bounds_fails(runs in 0_u64..40, cause in prop::collection::btree_set(0_u64..30, 1..4)) {
             let trial = Synthetic { causes: vec![cause], played: AtomicU64::new(0) };
-            let case = Case::of((0..30).map(lose).collect());
+            let case = FaultCase::of((0..30).map(lose).collect());
             let one = shrunk(&trial, case, runs, 1);
             prop_assert!(trial.fails(&numbers(&one.case)));
             prop_assert!(one.runs <= runs);
@@ -620,10 +620,10 @@ mod tests {
         let trial = Synthetic::of(&[&[7]]);
         let crash = PlannedFault::Absence {
             robot: RobotName::new("A").unwrap(),
-            why: Absence::Crash,
-            span: Span { from: 2, until: 9 },
+            why: AbsenceReason::Crash,
+            span: TickSpan { from: 2, until: 9 },
         };
-        let result = shrunk(&trial, Case::of(vec![lose(1), crash]), 10_000, 2);
+        let result = shrunk(&trial, FaultCase::of(vec![lose(1), crash]), 10_000, 2);
         assert_eq!(result.case.faults, [lose(7)]);
     }
 
@@ -631,14 +631,18 @@ mod tests {
     fn a_fault_that_no_message_replaces_becomes_short() {
         struct Absent;
         impl Trial for Absent {
-            fn play(&self, case: &Case, _: &BTreeSet<String>) -> Result<Played, LabError> {
-                let mut played = Played::default();
+            fn play(
+                &self,
+                case: &FaultCase,
+                _: &BTreeSet<String>,
+            ) -> Result<TrialResult, LabError> {
+                let mut played = TrialResult::default();
                 for fault in &case.faults {
                     if let PlannedFault::Absence { span, .. } = fault
                         && span.from <= 55
                         && span.until >= 60
                     {
-                        let failure = Failure {
+                        let failure = FailedExpectation {
                             tick: 60,
                             because: String::new(),
                         };
@@ -651,17 +655,24 @@ mod tests {
 
         let crash = |from, until| PlannedFault::Absence {
             robot: RobotName::new("A").unwrap(),
-            why: Absence::Crash,
-            span: Span { from, until },
+            why: AbsenceReason::Crash,
+            span: TickSpan { from, until },
         };
-        let case = Case::of(vec![lose(1), crash(10, 300)]);
+        let case = FaultCase::of(vec![lose(1), crash(10, 300)]);
         let played = Absent.play(&case, &BTreeSet::new()).unwrap();
         let bounds = Bounds {
             runs: 10_000,
             jobs: 2,
             stop: &AtomicBool::new(false),
         };
-        let result = shrink(&Absent, NAME, case, played, &World::default(), bounds);
+        let result = shrink(
+            &Absent,
+            NAME,
+            case,
+            played,
+            &ScenarioParts::default(),
+            bounds,
+        );
         assert_eq!(result.case.faults, [crash(55, 60)]);
         assert_eq!(result.case.ticks, Some(60));
     }
@@ -671,8 +682,12 @@ mod tests {
     fn a_fault_moves_to_an_earlier_time() {
         struct Later;
         impl Trial for Later {
-            fn play(&self, case: &Case, _: &BTreeSet<String>) -> Result<Played, LabError> {
-                let mut played = Played::default();
+            fn play(
+                &self,
+                case: &FaultCase,
+                _: &BTreeSet<String>,
+            ) -> Result<TrialResult, LabError> {
+                let mut played = TrialResult::default();
                 let does_fail = |fault: &PlannedFault| match fault {
                     PlannedFault::Absence { span, .. } => {
                         span.from >= 12 && span.until - span.from >= 5
@@ -681,7 +696,7 @@ mod tests {
                     _ => false,
                 };
                 if case.faults.iter().any(does_fail) {
-                    let failure = Failure {
+                    let failure = FailedExpectation {
                         tick: 60,
                         because: String::new(),
                     };
@@ -693,22 +708,29 @@ mod tests {
 
         let crash = |from, until| PlannedFault::Absence {
             robot: RobotName::new("A").unwrap(),
-            why: Absence::Crash,
-            span: Span { from, until },
+            why: AbsenceReason::Crash,
+            span: TickSpan { from, until },
         };
         for (fault, expected) in [
             (crash(180, 300), crash(12, 17)),
             (lose(29), lose(3)),
             (lose(3), lose(3)),
         ] {
-            let case = Case::of(vec![fault]);
+            let case = FaultCase::of(vec![fault]);
             let played = Later.play(&case, &BTreeSet::new()).unwrap();
             let bounds = Bounds {
                 runs: 10_000,
                 jobs: 2,
                 stop: &AtomicBool::new(false),
             };
-            let result = shrink(&Later, NAME, case, played, &World::default(), bounds);
+            let result = shrink(
+                &Later,
+                NAME,
+                case,
+                played,
+                &ScenarioParts::default(),
+                bounds,
+            );
             assert_eq!(result.case.faults, [expected]);
             assert!(result.is_minimal);
         }
@@ -719,11 +741,15 @@ mod tests {
     fn what_is_left_of_the_scenario_does_not_fail_by_itself() {
         struct Lonely;
         impl Trial for Lonely {
-            fn play(&self, case: &Case, _: &BTreeSet<String>) -> Result<Played, LabError> {
-                let mut played = Played::default();
+            fn play(
+                &self,
+                case: &FaultCase,
+                _: &BTreeSet<String>,
+            ) -> Result<TrialResult, LabError> {
+                let mut played = TrialResult::default();
                 let is_lonely = !case.without.is_empty();
                 if is_lonely || case.faults.contains(&lose(3)) {
-                    let failure = Failure {
+                    let failure = FailedExpectation {
                         tick: 5,
                         because: String::new(),
                     };
@@ -733,14 +759,14 @@ mod tests {
             }
         }
 
-        let case = Case::of(vec![lose(3), lose(4)]);
+        let case = FaultCase::of(vec![lose(3), lose(4)]);
         let played = Lonely.play(&case, &BTreeSet::new()).unwrap();
         let bounds = Bounds {
             runs: 10_000,
             jobs: 1,
             stop: &AtomicBool::new(false),
         };
-        let world = World {
+        let world = ScenarioParts {
             roster: vec![RobotName::new("C").unwrap()],
             guests: 100,
         };

@@ -10,10 +10,10 @@ use protocol::{Event, RobotName, RunName, Tick};
 use robot::Robot;
 use scenario::Scenario;
 use simulator::TickRecord;
-use timeline::{Command, Counts, Kind, Span, Timeline};
+use timeline::{CommandSpan, Counts, Span, StateKind, Timeline};
 
-use super::case::Case;
-use super::coverage::{Fate, Feature};
+use super::case::FaultCase;
+use super::coverage::{CommandFate, Feature};
 use super::fault::Link;
 use lab::LabError;
 use lab::run::{Local, check_faults, make_robots_with};
@@ -23,9 +23,9 @@ pub const RUNS: &str = "the run goes to its end";
 
 /// What came of a run.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Played {
+pub struct TrialResult {
     /// The expectations that failed.
-    pub failed: BTreeMap<String, Failure>,
+    pub failed: BTreeMap<String, FailedExpectation>,
     /// The expectations that the run has.
     pub expectations: BTreeSet<String>,
     /// Those that were not asked: what they are expected after did not happen.
@@ -40,7 +40,7 @@ pub struct Played {
 
 /// An expectation that failed.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Failure {
+pub struct FailedExpectation {
     /// The tick in which that was certain.
     pub tick: Tick,
     /// Why.
@@ -68,7 +68,7 @@ pub trait Trial: Sync {
     ///
     /// # Errors
     /// If the case cannot be played.
-    fn play(&self, case: &Case, wanted: &BTreeSet<String>) -> Result<Played, LabError>;
+    fn play(&self, case: &FaultCase, wanted: &BTreeSet<String>) -> Result<TrialResult, LabError>;
 }
 
 /// Makes a robot of a class; `None` if it makes no robots of that class.
@@ -133,7 +133,7 @@ impl Subject {
     ///
     /// # Errors
     /// If the file has no place for a change.
-    pub fn content_of(&self, case: &Case) -> Result<toml::Table, LabError> {
+    pub fn content_of(&self, case: &FaultCase) -> Result<toml::Table, LabError> {
         let changes = case.changes(&self.content, self.scenario.tick_s);
         let mut content = self.content.clone();
         for change in changes.map_err(LabError::refused)? {
@@ -146,7 +146,7 @@ impl Subject {
     ///
     /// # Errors
     /// If it is not a scenario: bodies overlap, or a robot is missing that something else names.
-    fn scenario_of(&self, case: &Case) -> Result<Scenario, LabError> {
+    fn scenario_of(&self, case: &FaultCase) -> Result<Scenario, LabError> {
         let source = Source {
             name: format!("{} (with the faults of a plan)", self.file.display()),
             text: toml::to_string(&self.content_of(case)?).map_err(LabError::failed)?,
@@ -178,7 +178,7 @@ impl Subject {
 }
 
 impl Trial for Subject {
-    fn play(&self, case: &Case, wanted: &BTreeSet<String>) -> Result<Played, LabError> {
+    fn play(&self, case: &FaultCase, wanted: &BTreeSet<String>) -> Result<TrialResult, LabError> {
         let scenario = self.scenario_of(case)?;
         let run = RunName::unknown();
         let robots = make_robots_with(&scenario, &self.file, &|_, class| (self.maker)(class))?;
@@ -203,7 +203,7 @@ impl Trial for Subject {
             Ok(Err(error)) => error.to_string(),
             Err(_) => "a robot panicked".to_owned(),
         };
-        let failure = Failure {
+        let failure = FailedExpectation {
             tick: notes.played.ticks + 1,
             because,
         };
@@ -215,11 +215,11 @@ impl Trial for Subject {
 /// Notes on a run in progress.
 #[derive(Default)]
 struct TrialNotes {
-    played: Played,
+    played: TrialResult,
     timeline: Timeline,
     counts: Counts,
     /// Commands between robots.
-    commands: Vec<Command>,
+    commands: Vec<CommandSpan>,
 }
 
 impl TrialNotes {
@@ -253,7 +253,7 @@ impl TrialNotes {
             Verdict::Fail => {
                 let because = because.to_owned();
                 let failed = self.played.failed.entry(expectation);
-                failed.or_insert(Failure { tick, because });
+                failed.or_insert(FailedExpectation { tick, because });
             }
             Verdict::Pass | Verdict::Undecided => {}
         }
@@ -271,12 +271,12 @@ impl TrialNotes {
     }
 
     /// What came of the run, with what is in progress at its end.
-    fn finish(mut self) -> Played {
+    fn finish(mut self) -> TrialResult {
         for span in self.timeline.in_progress() {
             self.note_span(span);
         }
         for (robot, counts) in &self.counts.robots {
-            for kind in [Kind::Emotion, Kind::Behavior] {
+            for kind in [StateKind::Emotion, StateKind::Behavior] {
                 let transitions = counts.states(kind).transitions.keys();
                 let features = transitions.map(|change| transition(robot, kind, change));
                 self.played.features.extend(features);
@@ -312,23 +312,26 @@ impl TrialNotes {
     }
 }
 
-fn transition(robot: &RobotName, kind: Kind, (from, to): &(String, String)) -> Feature {
+fn transition(robot: &RobotName, kind: StateKind, (from, to): &(String, String)) -> Feature {
     let robot = robot.clone();
     let from = from.clone();
     let to = to.clone();
     match kind {
-        Kind::Emotion => Feature::Emotion { robot, from, to },
-        Kind::Behavior => Feature::Behavior { robot, from, to },
+        StateKind::Emotion => Feature::Emotion { robot, from, to },
+        StateKind::Behavior => Feature::Behavior { robot, from, to },
     }
 }
 
 /// What became of a command and its copies so far.
-fn fates(command: &Command) -> Vec<Fate> {
+fn fates(command: &CommandSpan) -> Vec<CommandFate> {
     let mut fates = Vec::new();
-    fates.extend(command.until.map(|_| Fate::Delayed));
-    fates.extend(command.is_doubled.then_some(Fate::Duplicated));
+    fates.extend(command.until.map(|_| CommandFate::Delayed));
+    fates.extend(command.is_doubled.then_some(CommandFate::Duplicated));
     for end in &command.ends {
-        fates.push(end.lost.map_or(Fate::Delivered, Fate::Dropped));
+        fates.push(
+            end.lost
+                .map_or(CommandFate::Delivered, CommandFate::Dropped),
+        );
     }
     fates
 }

@@ -192,18 +192,18 @@ impl std::fmt::Display for UnknownFields {
 /// A line from the program.
 #[derive(Debug)]
 pub(super) enum FromProgram {
-    Query(Query),
+    Query(QueryLine),
     Percept,
     Random,
     Command(CommandRequest),
     Log(Log),
     Panel(Panel),
-    Done(Done),
+    Done(DoneLine),
 }
 
 /// A query to another robot.
 #[derive(Debug, Deserialize)]
-pub(super) struct Query {
+pub(super) struct QueryLine {
     pub(super) of: String,
     pub(super) what: String,
 }
@@ -223,7 +223,7 @@ pub(super) struct Log {
 
 /// The line `done`, which ends a tick: the proposed location and the published state.
 #[derive(Debug, Default, Clone)]
-pub(super) struct Done {
+pub(super) struct DoneLine {
     /// Proposed location; `None` to stay.
     pub(super) proposal: Option<Point>,
     pub(super) speed_mps: f64,
@@ -351,7 +351,7 @@ fn check_order(order: CommandRequest) -> Result<CommandRequest, String> {
     }
 }
 
-fn check_done(raw: RawDone) -> Result<Done, String> {
+fn check_done(raw: RawDone) -> Result<DoneLine, String> {
     let mut state_variables = StateVariables::new();
     for (name, value) in raw.state_variables {
         let variable = variable(&name, value)?;
@@ -370,7 +370,7 @@ fn check_done(raw: RawDone) -> Result<Done, String> {
         behavior_state: raw.behavior_state,
     })?;
 
-    Ok(Done {
+    Ok(DoneLine {
         proposal: raw.proposal,
         speed_mps: state.speed_mps,
         direction_rad: state.direction_rad,

@@ -15,7 +15,7 @@ use robot::Stopper;
 
 use super::line::{EndReason, ToProgram};
 use crate::child::{self, AtExit};
-use crate::ending::Ended;
+use crate::ending::ProcessEnd;
 use crate::error::LaunchError;
 use crate::lines::Lines;
 use crate::tail::Tail;
@@ -178,7 +178,10 @@ impl Program {
             return otherwise.to_owned();
         };
 
-        let ended = format!("its program {} before the run did", Ended::Exited(status));
+        let ended = format!(
+            "its program {} before the run did",
+            ProcessEnd::Exited(status)
+        );
 
         let lines = self.tail.lines();
         if lines.is_empty() {
@@ -222,7 +225,7 @@ impl Program {
         let status = self.wait(END_PATIENCE).filter(|status| !status.success())?;
         Some(format!(
             "its program {} after the line `end`, where exit status 0 is expected",
-            Ended::Exited(status)
+            ProcessEnd::Exited(status)
         ))
     }
 

@@ -11,7 +11,7 @@ use robot::{Action, BadParameters, CallError, Cars, ReceivedCommand, Robot};
 use serde_json::Value;
 
 use super::line::{
-    Answered, Arrived, Done, FromProgram, Query, ReadLine, ToProgram, UnknownFields, quote,
+    Answered, Arrived, DoneLine, FromProgram, QueryLine, ReadLine, ToProgram, UnknownFields, quote,
 };
 use super::program::{MAX_LINE, Program, ProgramEvent};
 use super::remarks::Remarks;
@@ -26,7 +26,7 @@ const MAX_COMMANDS: usize = protocol::messages::MAX_ENTRIES;
 const MAX_REPORTED: usize = MAX_MESSAGE_BYTES - (1 << 17);
 
 /// A robot whose program is another process.
-pub(super) struct Proxy {
+pub(super) struct ProgramRobot {
     program: Arc<Program>,
     events: Receiver<ProgramEvent>,
     /// What to report when the program does not answer for [`SILENCE`]; `None` once it has been reported.
@@ -35,11 +35,11 @@ pub(super) struct Proxy {
     is_initializing: bool,
     remarks: Remarks,
     /// The last line `done`.
-    done: Done,
+    done: DoneLine,
     panel: Panel,
 }
 
-impl Proxy {
+impl ProgramRobot {
     pub(super) fn new(
         program: Arc<Program>,
         events: Receiver<ProgramEvent>,
@@ -52,7 +52,7 @@ impl Proxy {
             silence: Some(silence),
             is_initializing: false,
             remarks,
-            done: Done::default(),
+            done: DoneLine::default(),
             panel: Panel::default(),
         }
     }
@@ -81,7 +81,7 @@ impl Proxy {
     }
 
     /// Carries out the lines of the program until its line `done`.
-    fn converse(&mut self, cars: &mut Cars<'_>) -> Result<Done, String> {
+    fn converse(&mut self, cars: &mut Cars<'_>) -> Result<DoneLine, String> {
         let mut commands = 0;
         let mut reported = 0;
         // Bounded, because a program that writes for ever would hold the clock of the run.
@@ -144,7 +144,7 @@ impl Proxy {
         &mut self,
         cars: &mut Cars<'_>,
         message: FromProgram,
-    ) -> Result<Option<Done>, String> {
+    ) -> Result<Option<DoneLine>, String> {
         match message {
             FromProgram::Query(query) => self.answer(ask(cars, &query))?,
             FromProgram::Percept => {
@@ -188,7 +188,7 @@ impl Proxy {
     }
 
     /// One tick of the program. Tick 0 has begun with the line `init`.
-    fn exchange(&mut self, cars: &mut Cars<'_>) -> Result<Done, String> {
+    fn exchange(&mut self, cars: &mut Cars<'_>) -> Result<DoneLine, String> {
         if cars.tick() > 0 {
             let commands: Vec<Arrived> = cars.commands().iter().map(arrived).collect();
             let told = ToProgram::Tick {
@@ -221,7 +221,7 @@ fn arrived(command: &ReceivedCommand) -> Arrived {
 }
 
 /// The answer to a query of the program.
-fn ask(cars: &mut Cars<'_>, query: &Query) -> Result<Value, &'static str> {
+fn ask(cars: &mut Cars<'_>, query: &QueryLine) -> Result<Value, &'static str> {
     let state = cars
         .get_robot_state(&query.of)
         .map_err(|error| word_for(&error))?;
@@ -243,11 +243,11 @@ fn word_for(error: &CallError) -> &'static str {
     }
 }
 
-impl Robot for Proxy {
+impl Robot for ProgramRobot {
     fn init(&mut self, cars: &mut Cars<'_>) -> Result<(), BadParameters> {
         // As if nothing had been before: an incarnation does not inherit what another one has
         // published.
-        self.done = Done::default();
+        self.done = DoneLine::default();
         self.panel = Panel::default();
         self.remarks.start_over();
 

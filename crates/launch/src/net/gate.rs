@@ -69,11 +69,11 @@ impl Gate {
 
 /// Computes when successive pieces leave a link. Pieces keep their order.
 #[derive(Debug)]
-pub(super) struct Pace {
+pub(super) struct LinkSchedule {
     last: Instant,
 }
 
-impl Pace {
+impl LinkSchedule {
     pub(super) fn new() -> Self {
         Self {
             last: Instant::now(),
@@ -113,7 +113,7 @@ mod tests {
     #[test]
     fn pieces_are_late_and_in_order() {
         let ms = Duration::from_millis;
-        let mut pace = Pace::new();
+        let mut pace = LinkSchedule::new();
         let now = pace.last;
         let shape = Shape {
             delay: ms(50),
@@ -131,7 +131,7 @@ mod tests {
 
     #[test]
     fn bandwidth_limits_every_byte() {
-        let mut pace = Pace::new();
+        let mut pace = LinkSchedule::new();
         let now = pace.last;
         let shape = Shape {
             bandwidth_bps: Some(8000),

@@ -17,7 +17,7 @@ use super::shape::{Flow, Shape, duration};
 
 /// A plan of faults that has been checked.
 #[derive(Debug, Clone)]
-pub struct Plan {
+pub struct FaultPlan {
     faults: Vec<LinkFault>,
 }
 
@@ -72,7 +72,7 @@ struct Slow {
     bandwidth_bps: Option<u64>,
 }
 
-impl Plan {
+impl FaultPlan {
     /// Reads a plan for the links of these robots.
     ///
     /// # Errors
@@ -305,13 +305,13 @@ fn shape(raw: RawShape) -> Result<Shape, String> {
 mod tests {
     use super::*;
 
-    fn parse(text: &str) -> Result<Plan, FileError> {
+    fn parse(text: &str) -> Result<FaultPlan, FileError> {
         let robots = ["Butler", "Leguin"].map(|name| RobotName::new(name).unwrap());
         let source = Source {
             name: "plan.toml".to_owned(),
             text: text.to_owned(),
         };
-        Plan::parse(&source, &robots.into_iter().collect())
+        FaultPlan::parse(&source, &robots.into_iter().collect())
     }
 
     fn fault(robot: &str, at: &str, length: &str, what: &str) -> String {
@@ -361,7 +361,8 @@ mod tests {
     fn the_shipped_plan_can_be_played() {
         let file =
             Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/links/cut_leguin.toml");
-        let plan = Plan::load(&file, &BTreeSet::from([RobotName::new("Leguin").unwrap()])).unwrap();
+        let plan =
+            FaultPlan::load(&file, &BTreeSet::from([RobotName::new("Leguin").unwrap()])).unwrap();
         assert_eq!(plan.changes().len(), 4);
     }
 
@@ -385,7 +386,7 @@ mod tests {
                 "[[network.partition]]\ngroups = [[\"A\"], [\"C\", \"B\"]]\nfrom = \"60 s\"\n";
             scenario(&format!("{head}{more}\n"))
         };
-        let plan = Plan::of_partitions(&partition("until = \"100 s\""), 20.0).unwrap();
+        let plan = FaultPlan::of_partitions(&partition("until = \"100 s\""), 20.0).unwrap();
         let a = RobotName::new("A").unwrap();
         for (s, shape) in [(2, "whole"), (3, "cut"), (4, "cut"), (5, "whole")] {
             let found = plan.shape(&a, Duration::from_secs(s));
@@ -393,17 +394,17 @@ mod tests {
         }
         assert_eq!(plan.robots().len(), 1, "the larger group keeps its links");
 
-        let endless = Plan::of_partitions(&partition(""), 20.0).unwrap();
+        let endless = FaultPlan::of_partitions(&partition(""), 20.0).unwrap();
         assert!(endless.changes().contains(&NEVER));
 
         for refused in ["one_way = true", "cuts = [\"queries\"]"] {
             assert!(
-                Plan::of_partitions(&partition(refused), 20.0).is_err(),
+                FaultPlan::of_partitions(&partition(refused), 20.0).is_err(),
                 "{refused}"
             );
         }
 
-        assert!(Plan::of_partitions(&scenario(""), 20.0).is_err());
+        assert!(FaultPlan::of_partitions(&scenario(""), 20.0).is_err());
     }
 
     #[test]

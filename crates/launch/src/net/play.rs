@@ -20,7 +20,7 @@ use std::time::{Duration, Instant};
 use super::compose::Compose;
 use super::links::{Links, Start};
 use super::namespaces::{self, Namespaces};
-use super::plan::Plan;
+use super::plan::FaultPlan;
 use super::proxy::{self, Proxy};
 use super::shape::Shape;
 use crate::child::{self, AtExit};
@@ -123,7 +123,7 @@ pub fn play(play: &Play, mut report: impl FnMut(String)) -> Result<u8, LaunchErr
 
     let mut options = play.options.clone();
     let plan = match &play.plan {
-        Some(plan) => Plan::load(plan, &process_of.keys().cloned().collect())?,
+        Some(plan) => FaultPlan::load(plan, &process_of.keys().cloned().collect())?,
         None => partitions(&file, &options)?,
     };
     // Containers read the scenario file itself.
@@ -187,7 +187,7 @@ fn process_of(file: &LaunchFile) -> BTreeMap<RobotName, String> {
 fn make_links(
     via: Via,
     file: &LaunchFile,
-    plan: &Plan,
+    plan: &FaultPlan,
     start: &Start,
     report: &mut dyn FnMut(String),
 ) -> Result<Box<dyn Links>, LaunchError> {
@@ -224,7 +224,7 @@ fn check_not_secured(file: &LaunchFile) -> Result<(), LaunchError> {
 const WITHOUT_PARTITIONS: &str = "network.partition=[]";
 
 /// The partitions of the scenario, as faults of real links.
-fn partitions(file: &LaunchFile, options: &RunOptions) -> Result<Plan, LaunchError> {
+fn partitions(file: &LaunchFile, options: &RunOptions) -> Result<FaultPlan, LaunchError> {
     let scenario = file.load_scenario(&options.changes())?;
     let Some(speed) = options.speed.or(file.speed).and_then(|speed| speed.0) else {
         return Err(LaunchError::refused_with_help(
@@ -232,7 +232,7 @@ fn partitions(file: &LaunchFile, options: &RunOptions) -> Result<Plan, LaunchErr
             "for example --speed 20",
         ));
     };
-    Ok(Plan::of_partitions(&scenario, speed)?)
+    Ok(FaultPlan::of_partitions(&scenario, speed)?)
 }
 
 /// Waits until the first tick is in the record. Returns `false` if the launch ends before.
@@ -279,7 +279,7 @@ struct LinkRecord<'a> {
 
 /// Plays a plan on the links of a launch.
 struct LinkPlayer<'a> {
-    plan: &'a Plan,
+    plan: &'a FaultPlan,
     process_of: &'a BTreeMap<RobotName, String>,
     folder: &'a RunFolder,
 }

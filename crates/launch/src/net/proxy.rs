@@ -13,8 +13,8 @@ use bus::endpoint::TLS;
 use protocol::RobotName;
 use protocol::random::{stream, unit};
 
-use super::gate::{Gate, Pace};
-use super::plan::Plan;
+use super::gate::{Gate, LinkSchedule};
+use super::plan::FaultPlan;
 use super::shape::{Flow, Shape};
 use crate::endpoint::NO_PORT;
 use crate::error::LaunchError;
@@ -120,7 +120,7 @@ impl Proxy {
 
     /// Plays the faults of a plan, the times of which begin with the first connection. `apply` receives each shape and the
     /// time since then.
-    pub fn play(&self, plan: &Plan, mut apply: impl FnMut(Shape, Duration)) {
+    pub fn play(&self, plan: &FaultPlan, mut apply: impl FnMut(Shape, Duration)) {
         let apply = |_: &RobotName, shape: Shape, at: Duration| {
             apply(shape, at);
             Ok::<(), std::convert::Infallible>(())
@@ -232,7 +232,7 @@ fn pipe(
 
 fn read(mut from: TcpStream, send: &SyncSender<Piece>, gate: &Gate, number: u64) {
     let mut luck = stream(number, "proxy");
-    let mut pace = Pace::new();
+    let mut pace = LinkSchedule::new();
     let mut buffer = vec![0; PIECE_BYTES];
 
     loop {
@@ -251,7 +251,7 @@ fn read(mut from: TcpStream, send: &SyncSender<Piece>, gate: &Gate, number: u64)
 }
 
 fn write(mut to: TcpStream, pieces: &Receiver<Piece>, gate: &Gate) {
-    let mut pace = Pace::new();
+    let mut pace = LinkSchedule::new();
     let mut written = Ok(());
     for (due, piece) in pieces {
         sleep_until(due);
@@ -275,7 +275,7 @@ fn write(mut to: TcpStream, pieces: &Receiver<Piece>, gate: &Gate) {
 fn write_piece(
     to: &mut TcpStream,
     piece: &[u8],
-    pace: &mut Pace,
+    pace: &mut LinkSchedule,
     gate: &Gate,
 ) -> std::io::Result<()> {
     let bps = gate.shape().bandwidth_bps.unwrap_or(u64::MAX);

@@ -17,13 +17,13 @@ use super::*;
 const FOREVER: &str = "sleep 600";
 
 /// What a test sees of a launch: its folder, and the launch itself once it is over.
-struct Hall {
+struct TestLaunch {
     folder: tempfile::TempDir,
     planned: Vec<Planned>,
     grace: Duration,
 }
 
-impl Hall {
+impl TestLaunch {
     /// `$DIR` is the test's folder for the shells.
     fn new(simulator: &str) -> Self {
         let hall = Self {
@@ -62,12 +62,12 @@ impl Hall {
     }
 
     /// Runs to the end; the signals are sent once the files `ready` are there.
-    fn run(&self, ready: &[&str], signals: &[Signal]) -> Outcome {
+    fn run(&self, ready: &[&str], signals: &[Signal]) -> LaunchOutcome {
         self.run_and_report(ready, signals).0
     }
 
     /// The same, with the robots for which the simulator was told that no process follows.
-    fn run_and_report(&self, ready: &[&str], signals: &[Signal]) -> (Outcome, Vec<String>) {
+    fn run_and_report(&self, ready: &[&str], signals: &[Signal]) -> (LaunchOutcome, Vec<String>) {
         let screen = Screen::open(quiet()).unwrap();
         let (sender, gone) = std::sync::mpsc::channel();
         let leftovers = Leftovers::unguarded();
@@ -154,7 +154,7 @@ fn assert_gone(pid: &str) {
 
 #[test]
 fn a_run_that_ends_well_is_no_failure() {
-    let hall = Hall::new("sleep 0.2")
+    let hall = TestLaunch::new("sleep 0.2")
         .with(shell("Butler", "sleep 0.1"))
         .with(shell("Leguin", "sleep 0.3"));
     let outcome = hall.run(&[], &[]);
@@ -174,7 +174,7 @@ fn who_watches_is_told_when_the_run_is_over_and_does_not_end_it() {
         is_required: false,
         ..shell("broken", "exit 1")
     };
-    let hall = Hall::new("until [ -e $DIR/watching ]; do sleep 0.01; done")
+    let hall = TestLaunch::new("until [ -e $DIR/watching ]; do sleep 0.01; done")
         .with(observer)
         .with(broken);
     let told = hall.path("told");
@@ -196,7 +196,8 @@ fn only_the_owner_can_read_the_log_of_an_observer() {
         part: Part::Observer,
         ..shell("console", "echo secret; touch $DIR/shown; sleep 600")
     };
-    let hall = Hall::new("until [ -e $DIR/shown ]; do sleep 0.01; done; echo plain").with(observer);
+    let hall =
+        TestLaunch::new("until [ -e $DIR/shown ]; do sleep 0.01; done; echo plain").with(observer);
     let log = hall.path("console.log");
     std::fs::write(&log, "earlier\n").unwrap();
     std::fs::set_permissions(&log, Permissions::from_mode(0o644)).unwrap();
@@ -219,7 +220,7 @@ fn the_first_required_failure_ends_the_run_in_good_order() {
     let robot =
         "until [ -e $DIR/up ]; do sleep 0.01; done; echo one >&2; echo two >&2; echo plain; exit 3";
     let other_robot = "until [ -e $DIR/record ]; do sleep 0.01; done";
-    let hall = Hall::new(simulator)
+    let hall = TestLaunch::new(simulator)
         .with(shell("Butler", robot))
         .with(shell("Leguin", other_robot));
     let failure = hall.run(&[], &[]).failure.unwrap();
@@ -240,7 +241,7 @@ fn the_first_required_failure_ends_the_run_in_good_order() {
 
 #[test]
 fn a_signal_is_a_failure_with_its_number() {
-    let hall = Hall::new(FOREVER).with(shell("Butler", "kill -KILL $$"));
+    let hall = TestLaunch::new(FOREVER).with(shell("Butler", "kill -KILL $$"));
     let failure = hall.run(&[], &[]).failure.unwrap();
     assert_eq!(
         (failure.code, failure.text.as_str()),
@@ -251,7 +252,7 @@ fn a_signal_is_a_failure_with_its_number() {
 #[test]
 fn a_simulator_that_fails_takes_the_robots_with_it_at_once() {
     let begun = Instant::now();
-    let failure = Hall::new("exit 4")
+    let failure = TestLaunch::new("exit 4")
         .with(shell("Butler", FOREVER))
         .run(&[], &[])
         .failure
@@ -264,7 +265,7 @@ fn a_simulator_that_fails_takes_the_robots_with_it_at_once() {
 fn a_program_that_cannot_be_started_is_a_failure() {
     let mut missing = shell("Butler", "");
     missing.command.program = "/nowhere/cars-butler".into();
-    let failure = Hall::new(FOREVER)
+    let failure = TestLaunch::new(FOREVER)
         .with(missing)
         .run(&[], &[])
         .failure
@@ -302,7 +303,7 @@ const FAILING: &str =
 #[test]
 fn the_console_outlives_a_failure_and_is_told_why() {
     for (status, is_to_resume) in [(0, false), (RESUME, true), (1, false)] {
-        let hall = Hall::new(RECORDING)
+        let hall = TestLaunch::new(RECORDING)
             .with(shell("Butler", FAILING))
             .with(staying(status));
         let outcome = hall.run(&[], &[]);
@@ -320,7 +321,7 @@ fn the_console_outlives_a_failure_and_is_told_why() {
 
 #[test]
 fn ctrl_c_ends_a_console_that_shows_a_failure() {
-    let hall = Hall::new("trap 'exit 0' TERM; touch $DIR/sim; sleep 600 & wait")
+    let hall = TestLaunch::new("trap 'exit 0' TERM; touch $DIR/sim; sleep 600 & wait")
         .with(shell("Butler", FAILING))
         .with(staying(RESUME));
     let outcome = hall.run(&["read"], &[Signal::SIGINT]);
@@ -335,7 +336,7 @@ fn a_robot_that_is_not_required_may_fail() {
         is_required: false,
         ..shell("Butler", "exit 1")
     };
-    let outcome = Hall::new("sleep 0.3").with(robot).run(&[], &[]);
+    let outcome = TestLaunch::new("sleep 0.3").with(robot).run(&[], &[]);
     assert_eq!(outcome.failure, None);
 }
 
@@ -346,8 +347,8 @@ fn a_failed_robot_is_restarted_and_the_run_goes_on() {
         restart: Restart::OnFailure,
         ..shell("Butler", script)
     };
-    let hall = Hall::new("until [ -e $DIR/well ]; do sleep 0.01; done").with(robot);
-    let hall = Hall {
+    let hall = TestLaunch::new("until [ -e $DIR/well ]; do sleep 0.01; done").with(robot);
+    let hall = TestLaunch {
         grace: Duration::from_millis(100),
         ..hall
     };
@@ -362,7 +363,7 @@ fn a_robot_that_always_fails_is_given_up() {
         restart: Restart::Always,
         ..shell("Butler", "echo up >> $DIR/starts; exit 7")
     };
-    let hall = Hall::new(FOREVER).with(robot);
+    let hall = TestLaunch::new(FOREVER).with(robot);
     assert_eq!(hall.run(&[], &[]).failure.unwrap().code, 7);
     assert_eq!(hall.read("starts").lines().count(), 1 + BUDGET);
 }
@@ -370,7 +371,7 @@ fn a_robot_that_always_fails_is_given_up() {
 #[test]
 fn what_a_process_started_ends_with_it() {
     let robot = "sleep 600 & echo $! > $DIR/grandchild; exit 0";
-    let hall = Hall::new("until [ -s $DIR/grandchild ]; do sleep 0.01; done; sleep 0.1")
+    let hall = TestLaunch::new("until [ -s $DIR/grandchild ]; do sleep 0.01; done; sleep 0.1")
         .with(shell("Butler", robot));
     assert_eq!(hall.run(&[], &[]).failure, None);
     assert_gone(&hall.read("grandchild"));
@@ -380,8 +381,9 @@ fn what_a_process_started_ends_with_it() {
 fn a_child_in_a_session_of_its_own_ends_with_the_run() {
     let robot = "setsid sleep 600 & setsid sh -c 'echo $$ > $DIR/daemon; sleep 600' & \
                  until [ -s $DIR/daemon ]; do sleep 0.01; done; touch $DIR/up; sleep 600";
-    let hall = Hall::new("until [ -e $DIR/up ]; do sleep 0.01; done").with(shell("Butler", robot));
-    let hall = Hall {
+    let hall =
+        TestLaunch::new("until [ -e $DIR/up ]; do sleep 0.01; done").with(shell("Butler", robot));
+    let hall = TestLaunch {
         grace: Duration::from_millis(100),
         ..hall
     };
@@ -396,7 +398,7 @@ fn a_child_in_a_session_of_its_own_ends_with_its_robot() {
     // The simulator ends when the daemon has.
     let simulator = "until [ -e $DIR/left ]; do sleep 0.01; done; \
                      while kill -0 $(cat $DIR/daemon) 2> /dev/null; do sleep 0.01; done";
-    let hall = Hall::new(simulator).with(shell("Butler", robot));
+    let hall = TestLaunch::new(simulator).with(shell("Butler", robot));
     assert_eq!(hall.run(&[], &[]).failure, None);
     assert_gone(&hall.read("daemon"));
 }
@@ -409,7 +411,7 @@ fn the_simulator_is_told_of_robots_that_no_process_follows() {
     let over = "touch $DIR/left; exit 0";
     let broken = "touch $DIR/left; exit 3";
     let told = |butler: Planned| {
-        let hall = Hall::new(WHILE_BUTLER).with(butler);
+        let hall = TestLaunch::new(WHILE_BUTLER).with(butler);
         let (outcome, gone) = hall.run_and_report(&[], &[]);
         assert_eq!(outcome.failure, None);
         gone
@@ -452,7 +454,7 @@ fn the_simulator_is_told_of_robots_that_no_process_follows() {
         },
         ..missing
     };
-    let hall = Hall::new("sleep 0.5").with(missing);
+    let hall = TestLaunch::new("sleep 0.5").with(missing);
     let (_, gone) = hall.run_and_report(&[], &[]);
     assert!(
         gone[0].starts_with("Butler did not start (/nowhere/robot cannot be started"),
@@ -479,7 +481,7 @@ fn the_simulator_is_not_told_of_robots_that_a_process_follows() {
     );
     let simulator = "until [ -e $DIR/left ] && [ -e $DIR/closed ]; do sleep 0.01; done; \
                      sleep 0.3; echo $$ > $DIR/simulator";
-    let hall = Hall::new(simulator)
+    let hall = TestLaunch::new(simulator)
         .with(restarted)
         .with(observer)
         .with(at_the_end);
@@ -491,7 +493,7 @@ fn the_simulator_is_not_told_of_robots_that_a_process_follows() {
 #[test]
 fn the_log_of_a_process_is_bounded() {
     let robot = "echo first; yes 'a line of a robot that prints without an end' | head -n 4000000; echo last";
-    let hall = Hall::new("until [ -e $DIR/left ]; do sleep 0.05; done")
+    let hall = TestLaunch::new("until [ -e $DIR/left ]; do sleep 0.05; done")
         .with(shell("Butler", &format!("{robot}; touch $DIR/left")));
     assert_eq!(hall.run(&[], &[]).failure, None);
 
@@ -508,8 +510,9 @@ const DEAF: &str = "trap '' TERM; (sleep 600; true) & echo $! > $DIR/grandchild;
 
 #[test]
 fn who_does_not_leave_in_time_is_killed_with_all_it_started() {
-    let hall = Hall::new("until [ -e $DIR/deaf ]; do sleep 0.01; done").with(shell("Butler", DEAF));
-    let hall = Hall {
+    let hall =
+        TestLaunch::new("until [ -e $DIR/deaf ]; do sleep 0.01; done").with(shell("Butler", DEAF));
+    let hall = TestLaunch {
         grace: Duration::from_millis(100),
         ..hall
     };
@@ -522,7 +525,7 @@ fn who_does_not_leave_in_time_is_killed_with_all_it_started() {
 fn asked_once_all_are_ended_also_one_that_is_stopped() {
     let simulator =
         "trap 'echo stopped > $DIR/record; exit 0' TERM; touch $DIR/up; sleep 600 & wait";
-    let hall = Hall::new(simulator).with(shell(
+    let hall = TestLaunch::new(simulator).with(shell(
         "Butler",
         "touch $DIR/stopped; kill -STOP $$; sleep 600",
     ));
@@ -544,7 +547,7 @@ fn asked_once_all_are_ended_also_one_that_is_stopped() {
 fn the_death_of_a_parent_is_one_request_however_many_signals_it_sends() {
     let simulator = "trap 'sleep 0.3; echo whole > $DIR/record; exit 0' TERM; touch $DIR/up; \
                      while :; do sleep 0.01; done";
-    let hall = Hall::new(simulator);
+    let hall = TestLaunch::new(simulator);
     let outcome = hall.run(&["up"], &[Signal::SIGTERM, Signal::SIGTERM, Signal::SIGHUP]);
     assert_eq!(
         (outcome.failure, outcome.asked),
@@ -555,8 +558,8 @@ fn the_death_of_a_parent_is_one_request_however_many_signals_it_sends() {
 
 #[test]
 fn asked_twice_all_are_killed_at_once() {
-    let hall = Hall::new(FOREVER).with(shell("Butler", DEAF));
-    let hall = Hall {
+    let hall = TestLaunch::new(FOREVER).with(shell("Butler", DEAF));
+    let hall = TestLaunch {
         grace: Duration::from_secs(600),
         ..hall
     };
@@ -568,7 +571,7 @@ fn asked_twice_all_are_killed_at_once() {
 
 #[test]
 fn no_process_is_left_behind_when_the_launcher_panics() {
-    let hall = Hall::new(FOREVER).with(shell("Butler", DEAF));
+    let hall = TestLaunch::new(FOREVER).with(shell("Butler", DEAF));
     let screen = Screen::open(quiet()).unwrap();
     let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
         runtime().block_on(async {
@@ -582,7 +585,7 @@ fn no_process_is_left_behind_when_the_launcher_panics() {
                 std::sync::mpsc::channel().0,
             );
             tokio::spawn(supervisor.run());
-            Hall::ready(hall.folder.path(), &["deaf"]).await;
+            TestLaunch::ready(hall.folder.path(), &["deaf"]).await;
             panic!("as a defect of the launcher would");
         });
     }));

@@ -7,10 +7,10 @@ use std::ops::Deref;
 use protocol::messages::{Clock, End, FaultKind, OnLate, Refusal};
 use protocol::{Epoch, Generation, RobotName, Tick};
 
-use super::simulation::{News, Order, Report};
+use super::simulation::{ModelReport, ModelUpdate, Order};
 use crate::{
-    Action, Admission, Barrier, Begin, IncarnationNotice, Lateness, Leave, Output, Participant,
-    Refused, RobotTimer, Sent, Stamp, Timeouts, Timer, Timing, Turn,
+    Admission, Barrier, BarrierOutput, Begin, IncarnationNotice, LatePolicy, Leave, Participant,
+    ParticipantOutput, Refused, RobotTimer, Sent, Stamp, Timeouts, Timer, Timing, Turn,
 };
 
 /// What a simulator or a robot does wrong.
@@ -91,29 +91,29 @@ pub(super) enum Mutant {
     DeclaresTokenEarly,
 }
 
-type Outputs = Vec<Output<Report, Order>>;
+type Outputs = Vec<BarrierOutput<ModelReport, Order>>;
 
 /// A message of a robot for the open tick.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-enum Message {
+enum RobotMessage {
     Command(u32, Sent<Order>),
-    Report(u32, Report),
+    Report(u32, ModelReport),
 }
 
 /// A barrier that may be wrong.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) struct Simulator {
-    barrier: Barrier<Report, Order>,
+    barrier: Barrier<ModelReport, Order>,
     mutant: Option<Mutant>,
     epoch: Epoch,
     tick: Tick,
     /// What has come for the open tick, and which incarnations have reported in this epoch, for mutants that need it.
-    messages: Vec<(RobotName, Stamp, Message)>,
+    messages: Vec<(RobotName, Stamp, RobotMessage)>,
     reported: BTreeSet<(RobotName, Generation)>,
 }
 
 impl Deref for Simulator {
-    type Target = Barrier<Report, Order>;
+    type Target = Barrier<ModelReport, Order>;
 
     fn deref(&self) -> &Self::Target {
         &self.barrier
@@ -121,7 +121,11 @@ impl Deref for Simulator {
 }
 
 impl Simulator {
-    pub(super) fn new(roster: [RobotName; 2], lateness: Lateness, mutant: Option<Mutant>) -> Self {
+    pub(super) fn new(
+        roster: [RobotName; 2],
+        lateness: LatePolicy,
+        mutant: Option<Mutant>,
+    ) -> Self {
         Self {
             barrier: Barrier::new(roster, lateness, Timing::default(), 4),
             mutant,
@@ -136,7 +140,7 @@ impl Simulator {
         self.mutant == Some(mutant)
     }
 
-    pub(super) fn gather(&mut self, epoch: Epoch, mut lateness: Lateness, out: &mut Outputs) {
+    pub(super) fn gather(&mut self, epoch: Epoch, mut lateness: LatePolicy, out: &mut Outputs) {
         self.epoch = epoch;
         self.messages.clear();
         self.reported.clear();
@@ -217,7 +221,7 @@ impl Simulator {
         command: Sent<Order>,
         out: &mut Outputs,
     ) {
-        self.receive(from, stamp, Message::Command(number, command), out);
+        self.receive(from, stamp, RobotMessage::Command(number, command), out);
     }
 
     pub(super) fn report(
@@ -225,7 +229,7 @@ impl Simulator {
         from: &RobotName,
         stamp: Stamp,
         mut commands: u32,
-        report: Report,
+        report: ModelReport,
         out: &mut Outputs,
     ) {
         if self.is(Mutant::CountsIncompleteReports) {
@@ -234,7 +238,7 @@ impl Simulator {
             commands = sent.filter(|(of, at, _)| (of, *at) == own).count() as u32;
         }
         let forged = self.is(Mutant::CompletesEarly).then(|| report.clone());
-        self.receive(from, stamp, Message::Report(commands, report), out);
+        self.receive(from, stamp, RobotMessage::Report(commands, report), out);
 
         if let Some(report) = forged {
             let roster: Vec<RobotName> = self.roster().cloned().collect();
@@ -249,7 +253,7 @@ impl Simulator {
         }
     }
 
-    fn receive(&mut self, from: &RobotName, at: Stamp, message: Message, out: &mut Outputs) {
+    fn receive(&mut self, from: &RobotName, at: Stamp, message: RobotMessage, out: &mut Outputs) {
         let mut stamp = at;
         match self.mutant {
             Some(Mutant::CountsOtherEpochs) => stamp.epoch = self.epoch,
@@ -267,10 +271,10 @@ impl Simulator {
 
         let first = out.len();
         match message {
-            Message::Command(number, command) => {
+            RobotMessage::Command(number, command) => {
                 self.barrier.command(from, stamp, number, command, out);
             }
-            Message::Report(commands, report) => {
+            RobotMessage::Report(commands, report) => {
                 self.barrier.report(from, stamp, commands, report, out);
             }
         }
@@ -312,18 +316,20 @@ impl Simulator {
         self.barrier.is_back(robot)
     }
 
-    fn alter(&mut self, out: &mut [Output<Report, Order>], is_repetition: bool) {
+    fn alter(&mut self, out: &mut [BarrierOutput<ModelReport, Order>], is_repetition: bool) {
         for output in out {
             match output {
-                Output::Grant { news, clock } => self.alter_grant(news, clock, is_repetition),
-                Output::Complete(outcome) if self.is(Mutant::NamesReplacementOnce) => {
+                BarrierOutput::Grant { news, clock } => {
+                    self.alter_grant(news, clock, is_repetition)
+                }
+                BarrierOutput::Complete(outcome) if self.is(Mutant::NamesReplacementOnce) => {
                     for (name, (report, _)) in &outcome.reports {
                         self.reported.insert((name.clone(), report.generation));
                     }
                 }
-                Output::Complete(outcome) if self.is(Mutant::CountsLateReports) => {
+                BarrierOutput::Complete(outcome) if self.is(Mutant::CountsLateReports) => {
                     for (name, _, message) in &self.messages {
-                        if let Message::Report(_, report) = message {
+                        if let RobotMessage::Report(_, report) = message {
                             let late = (report.clone(), Vec::new());
                             outcome.reports.entry(name.clone()).or_insert(late);
                         }
@@ -361,22 +367,22 @@ impl Simulator {
     }
 }
 
-type Actions = Vec<Action<News, (), Order, Report>>;
+type Actions = Vec<ParticipantOutput<ModelUpdate, (), Order, ModelReport>>;
 
 /// A participant that may be wrong.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) struct MaybeWrongRobot {
-    participant: Participant<News, (), Order, Report>,
+    participant: Participant<ModelUpdate, (), Order, ModelReport>,
     mutant: Option<Mutant>,
     /// The tick that was run last, and news of ticks that were not run, for mutants that need it.
-    last: Option<Turn<News>>,
-    news: BTreeMap<(Epoch, Tick), News>,
+    last: Option<Turn<ModelUpdate>>,
+    news: BTreeMap<(Epoch, Tick), ModelUpdate>,
 }
 
 impl MaybeWrongRobot {
     pub(super) fn new(timeouts: Timeouts, mutant: Option<Mutant>, out: &mut Actions) -> Self {
         if mutant == Some(Mutant::DeclaresTokenEarly) {
-            out.push(Action::DeclareToken);
+            out.push(ParticipantOutput::DeclareToken);
         }
         Self {
             participant: Participant::new(timeouts, out),
@@ -407,7 +413,7 @@ impl MaybeWrongRobot {
 
         self.participant.admitted(admission, [], out);
         if is_known || self.is(Mutant::DeclaresTokenEarly) {
-            out.retain(|action| *action != Action::DeclareToken);
+            out.retain(|action| *action != ParticipantOutput::DeclareToken);
         }
         self.alter(out, first);
     }
@@ -438,7 +444,7 @@ impl MaybeWrongRobot {
             && let Some(last) = &self.last
             && (clock.epoch, clock.tick) < (last.epoch, last.tick)
         {
-            out.push(Action::Run(Turn {
+            out.push(ParticipantOutput::Run(Turn {
                 epoch: clock.epoch,
                 tick: clock.tick,
                 begin: Begin::GoOn,
@@ -453,7 +459,7 @@ impl MaybeWrongRobot {
                 joined: Some(own.generation),
                 rejoin: None,
             };
-            let none = News {
+            let none = ModelUpdate {
                 epoch: clock.epoch,
                 tick: clock.tick,
                 orders: Vec::new(),
@@ -466,17 +472,17 @@ impl MaybeWrongRobot {
         // What is put here is a repetition.
         for action in &mut out[first..] {
             match (self.mutant, &mut *action, &self.last) {
-                (Some(Mutant::RunsAgain), Action::Put(_), Some(turn)) => {
-                    *action = Action::Run(turn.clone());
+                (Some(Mutant::RunsAgain), ParticipantOutput::Put(_), Some(turn)) => {
+                    *action = ParticipantOutput::Run(turn.clone());
                 }
-                (Some(Mutant::RepeatsNoCommands), Action::Put(answer), _) => {
+                (Some(Mutant::RepeatsNoCommands), ParticipantOutput::Put(answer), _) => {
                     answer.commands.clear();
                 }
                 _ => {}
             }
         }
         if self.is(Mutant::RepeatsNoAnswer) {
-            out.retain(|action| !matches!(action, Action::Put(_)));
+            out.retain(|action| !matches!(action, ParticipantOutput::Put(_)));
         }
         self.alter(out, first);
     }
@@ -486,7 +492,7 @@ impl MaybeWrongRobot {
         epoch: Epoch,
         tick: Tick,
         mut notice: IncarnationNotice,
-        news: News,
+        news: ModelUpdate,
         out: &mut Actions,
     ) {
         let first = out.len();
@@ -510,12 +516,17 @@ impl MaybeWrongRobot {
 
         self.participant.news(epoch, tick, notice, news, out);
         if self.is(Mutant::ExpectsNoWelcome) && is_named && !self.participant.has_left() {
-            out.push(Action::Leave(Leave::Replaced));
+            out.push(ParticipantOutput::Leave(Leave::Replaced));
         }
         self.alter(out, first);
     }
 
-    pub(super) fn done(&mut self, commands: Vec<Sent<Order>>, report: Report, out: &mut Actions) {
+    pub(super) fn done(
+        &mut self,
+        commands: Vec<Sent<Order>>,
+        report: ModelReport,
+        out: &mut Actions,
+    ) {
         let first = out.len();
         self.participant.done(commands, (), report, out);
         self.alter(out, first);
@@ -527,7 +538,9 @@ impl MaybeWrongRobot {
 
     fn alter(&mut self, out: &mut Actions, first: usize) {
         for action in &mut out[first..] {
-            let Action::Run(turn) = action else { continue };
+            let ParticipantOutput::Run(turn) = action else {
+                continue;
+            };
             match self.mutant {
                 Some(Mutant::GoesOnAsSuccessor) if turn.begin == Begin::TakeOver => {
                     turn.begin = Begin::GoOn;

@@ -1,4 +1,4 @@
-//! A robot's process, and its link to the router: what [`Action`]s become on the bus, and nothing else.
+//! A robot's process, and its link to the router: what [`ParticipantOutput`]s become on the bus, and nothing else.
 
 use std::collections::VecDeque;
 
@@ -6,10 +6,10 @@ use protocol::messages::Clock;
 use protocol::{Epoch, Generation, RobotName, Tick};
 
 use super::mutants::{MaybeWrongRobot, Mutant};
-use super::simulation::{self, News, Order, Report, Simulation, Violation};
+use super::simulation::{self, ModelReport, ModelSimulation, ModelUpdate, Order, Violation};
 use crate::{
-    Action, Admission, Begin, IncarnationNotice, Leave, Refused, RobotTimer, Sent, Stamp, Timeouts,
-    Turn,
+    Admission, Begin, IncarnationNotice, Leave, ParticipantOutput, Refused, RobotTimer, Sent,
+    Stamp, Timeouts, Turn,
 };
 
 /// From a process to the simulator, in order.
@@ -19,18 +19,18 @@ pub(super) enum Up {
     /// Its token is declared or undeclared.
     Token(bool),
     Command(Stamp, u32, Sent<Order>),
-    Report(Stamp, u32, Report),
+    Report(Stamp, u32, ModelReport),
 }
 
 /// From the simulator to a process, in order.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) enum Down {
     Answer(Result<Admission, Refused>),
-    News(Epoch, Tick, IncarnationNotice, News),
+    News(Epoch, Tick, IncarnationNotice, ModelUpdate),
     Clock(Clock),
 }
 
-type Actions = Vec<Action<News, (), Order, Report>>;
+type Actions = Vec<ParticipantOutput<ModelUpdate, (), Order, ModelReport>>;
 
 /// A process of a robot.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -52,7 +52,7 @@ pub(super) struct ModelProcess {
     /// Whether the timer for a further request is set.
     pub(super) asks_again: bool,
     /// The tick that it runs.
-    pub(super) running: Option<Turn<News>>,
+    pub(super) running: Option<Turn<ModelUpdate>>,
     /// As what it runs, and its first tick as that: all that it knows is from this tick on.
     generation: Generation,
     since: Tick,
@@ -68,7 +68,7 @@ pub(super) struct ModelProcess {
 /// What a process needs to know of its surroundings to be checked.
 #[derive(Clone, Copy)]
 pub(super) struct Around<'a> {
-    pub(super) simulation: &'a Simulation,
+    pub(super) simulation: &'a ModelSimulation,
     /// Whether a tick takes time, so that things happen meanwhile.
     pub(super) is_slow: bool,
     pub(super) mutant: Option<Mutant>,
@@ -139,7 +139,7 @@ impl ModelProcess {
         let turn = self.running.take()?;
         let generation = self.generation;
         let commands = simulation::commands(&self.name, turn.epoch, turn.tick, generation);
-        let report = Report {
+        let report = ModelReport {
             epoch: turn.epoch,
             tick: turn.tick,
             generation,
@@ -199,12 +199,12 @@ impl ModelProcess {
         let mut violation = None;
         for action in out {
             let wrong = match action {
-                Action::Join => {
+                ParticipantOutput::Join => {
                     self.is_asking = true;
                     self.send(Up::Join);
                     None
                 }
-                Action::DeclareToken => {
+                ParticipantOutput::DeclareToken => {
                     self.has_token = true;
                     self.send(Up::Token(true));
 
@@ -213,8 +213,8 @@ impl ModelProcess {
                         && around.mutant != Some(Mutant::DeclaresTokenEarly);
                     is_early.then_some(Violation::TokenBeforeWelcome)
                 }
-                Action::Run(turn) => self.run(turn, around),
-                Action::Put(answer) => {
+                ParticipantOutput::Run(turn) => self.run(turn, around),
+                ParticipantOutput::Put(answer) => {
                     let stamp = Stamp::from(answer.as_ref());
                     // How many were sent; a mutant may repeat fewer.
                     let count = simulation::commands(&self.name, 0, answer.tick, 0).len();
@@ -225,11 +225,11 @@ impl ModelProcess {
                     self.send(Up::Report(stamp, count as u32, answer.report));
                     None
                 }
-                Action::SetTimer(RobotTimer::Join, _) => {
+                ParticipantOutput::SetTimer(RobotTimer::Join, _) => {
                     self.asks_again = true;
                     None
                 }
-                Action::Leave(leave) => {
+                ParticipantOutput::Leave(leave) => {
                     self.end();
                     let is_wrong = leave == Leave::Replaced && !self.was_cut;
                     is_wrong.then_some(Violation::ReplacedConnected)
@@ -243,7 +243,7 @@ impl ModelProcess {
         violation
     }
 
-    fn run(&mut self, turn: Turn<News>, around: Around) -> Option<Violation> {
+    fn run(&mut self, turn: Turn<ModelUpdate>, around: Around) -> Option<Violation> {
         let at = (turn.epoch, turn.tick);
         let is_backwards = self.last_run.is_some_and(|last| at <= last);
         let generation = self.robot.admission().map_or(0, |own| own.generation);
@@ -271,7 +271,7 @@ impl ModelProcess {
         violation.or(self.finish(around))
     }
 
-    fn has_its_news(&self, turn: &Turn<News>, simulation: &Simulation) -> bool {
+    fn has_its_news(&self, turn: &Turn<ModelUpdate>, simulation: &ModelSimulation) -> bool {
         let at = (turn.epoch, turn.tick);
         if let Some(news) = &turn.news
             && (news.epoch, news.tick) != at
@@ -289,7 +289,12 @@ impl ModelProcess {
         }
     }
 
-    fn begins_rightly(&self, turn: &Turn<News>, is_first: bool, simulation: &Simulation) -> bool {
+    fn begins_rightly(
+        &self,
+        turn: &Turn<ModelUpdate>,
+        is_first: bool,
+        simulation: &ModelSimulation,
+    ) -> bool {
         let generation = self.robot.admission().map_or(0, |own| own.generation);
         let named = simulation.parts[&self.name].named;
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use protocol::messages::FaultKind;
 use protocol::{Epoch, Generation, RobotName, Tick};
 
-use crate::exchange::{Membership, Outcome, Sent};
+use crate::exchange::{Membership, Sent, TickOutcome};
 
 /// A command; its content identifies it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -18,7 +18,7 @@ pub(super) struct Order {
 
 /// What is new for a robot: the commands that arrive in this tick.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(super) struct News {
+pub(super) struct ModelUpdate {
     pub(super) epoch: Epoch,
     pub(super) tick: Tick,
     pub(super) orders: Vec<Order>,
@@ -26,7 +26,7 @@ pub(super) struct News {
 
 /// What a robot reports: in which tick it ran, and with what news.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(super) struct Report {
+pub(super) struct ModelReport {
     pub(super) epoch: Epoch,
     pub(super) tick: Tick,
     pub(super) generation: Generation,
@@ -123,7 +123,7 @@ pub(super) struct ModelRobot {
 
 /// The simulation.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(super) struct Simulation {
+pub(super) struct ModelSimulation {
     pub(super) epoch: Epoch,
     pub(super) tick: Tick,
     /// The tick that is to be granted next, when the faults before it are carried out.
@@ -138,7 +138,7 @@ pub(super) struct Simulation {
     pub(super) parts: BTreeMap<RobotName, ModelRobot>,
 }
 
-impl Simulation {
+impl ModelSimulation {
     pub(super) fn new(roster: &[RobotName]) -> Self {
         Self {
             epoch: 1,
@@ -178,7 +178,7 @@ impl Simulation {
     /// What must not be about a complete tick. Then it becomes the past: commands turn into news.
     pub(super) fn record(
         &mut self,
-        outcome: Outcome<Report, Order>,
+        outcome: TickOutcome<ModelReport, Order>,
         is_excused: impl Fn(&RobotName) -> bool,
     ) -> Option<Violation> {
         let mut violation = None;
@@ -230,10 +230,10 @@ impl Simulation {
         &self,
         name: &RobotName,
         part: &ModelRobot,
-        report: &Report,
+        report: &ModelReport,
         sent: &[Sent<Order>],
     ) -> Option<Violation> {
-        let expected = Report {
+        let expected = ModelReport {
             epoch: self.epoch,
             tick: self.tick,
             generation: part.generation,

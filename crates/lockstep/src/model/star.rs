@@ -9,8 +9,10 @@ use stateright::{Model, Property};
 
 use super::mutants::{MaybeWrongRobot, Mutant, Simulator};
 use super::process::{Around, Down, ModelProcess, Up};
-use super::simulation::{News, Order, Ordered, Report, Simulation, Violation};
-use crate::{IncarnationNotice, Lateness, Membership, Outcome, Output, RobotTimer, Timer};
+use super::simulation::{ModelReport, ModelSimulation, ModelUpdate, Order, Ordered, Violation};
+use crate::{
+    BarrierOutput, IncarnationNotice, LatePolicy, Membership, RobotTimer, TickOutcome, Timer,
+};
 
 /// How often each thing may still happen.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Hash)]
@@ -62,7 +64,7 @@ pub(super) struct Star {
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) struct ModelState {
     pub(super) barrier: Simulator,
-    pub(super) simulation: Simulation,
+    pub(super) simulation: ModelSimulation,
     /// By the order in which they were started; `None` if nothing of them remains.
     pub(super) processes: Vec<Option<ModelProcess>>,
     /// Robots for which [`Timer::Token`] is set.
@@ -201,8 +203,8 @@ impl Star {
         Self { budget, ..self }
     }
 
-    fn lateness(&self) -> Lateness {
-        Lateness {
+    fn lateness(&self) -> LatePolicy {
+        LatePolicy {
             on_late: self.on_late,
             own: self
                 .waits_for
@@ -241,7 +243,7 @@ impl Star {
     fn feed_barrier(
         &self,
         state: &mut ModelState,
-        input: impl FnOnce(&mut Simulator, &mut Vec<Output<Report, Order>>),
+        input: impl FnOnce(&mut Simulator, &mut Vec<BarrierOutput<ModelReport, Order>>),
     ) {
         let mut out = Vec::new();
         input(&mut state.barrier, &mut out);
@@ -265,12 +267,12 @@ impl Star {
         Self::observe(state);
     }
 
-    fn carry_out(&self, state: &mut ModelState, out: Vec<Output<Report, Order>>) {
+    fn carry_out(&self, state: &mut ModelState, out: Vec<BarrierOutput<ModelReport, Order>>) {
         for output in out {
             match output {
-                Output::Gathered => state.simulation.next = Some(0),
-                Output::Grant { news, clock } => Self::put(state, news, clock),
-                Output::Complete(outcome) => {
+                BarrierOutput::Gathered => state.simulation.next = Some(0),
+                BarrierOutput::Grant { news, clock } => Self::put(state, news, clock),
+                BarrierOutput::Complete(outcome) => {
                     let accident = self
                         .lost_by_accident(state, &outcome.membership)
                         .or_else(|| self.remembers_hang(&outcome));
@@ -288,8 +290,8 @@ impl Star {
                     state.note(violation);
                     self.go_on(state);
                 }
-                Output::Aborted => Self::end(state, End::Aborted),
-                Output::SetTimer(Timer::Token(name), _) => {
+                BarrierOutput::Aborted => Self::end(state, End::Aborted),
+                BarrierOutput::SetTimer(Timer::Token(name), _) => {
                     state.reserved.insert(name);
                 }
                 _ => {}
@@ -311,7 +313,7 @@ impl Star {
     }
 
     /// What a robot does after a hang does not depend on what its process made of the clocks before its end.
-    fn remembers_hang(&self, outcome: &Outcome<Report, Order>) -> Option<Violation> {
+    fn remembers_hang(&self, outcome: &TickOutcome<ModelReport, Order>) -> Option<Violation> {
         let fault = self
             .scenario
             .filter(|fault| fault.kind == FaultKind::Hang)?;
@@ -325,7 +327,7 @@ impl Star {
     fn put(state: &mut ModelState, news: Vec<(RobotName, IncarnationNotice)>, clock: Clock) {
         let simulation = &mut state.simulation;
         for (name, notice) in news {
-            let content = News {
+            let content = ModelUpdate {
                 epoch: clock.epoch,
                 tick: clock.tick,
                 orders: simulation.news.get(&name).cloned().unwrap_or_default(),
@@ -751,7 +753,7 @@ impl Model for Star {
         let roster = [super::name("A"), super::name("B")];
         let mut state = ModelState {
             barrier: Simulator::new(roster.clone(), self.lateness(), self.mutant),
-            simulation: Simulation::new(&roster),
+            simulation: ModelSimulation::new(&roster),
             processes: Vec::new(),
             reserved: BTreeSet::new(),
             left: self.budget,

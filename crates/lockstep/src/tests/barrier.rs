@@ -8,14 +8,14 @@ use protocol::messages::{End, FaultKind, NEWS_FLAGS, OnLate, Presence, Reason};
 
 use super::{clock, joined, name};
 use crate::{
-    Attendance, Barrier, Ignored, IncarnationNotice, Lateness, Membership, Outcome, Output,
-    Refused, Sent, Stamp, Timer, Timing,
+    Attendance, Barrier, BarrierOutput, Ignored, IncarnationNotice, LatePolicy, Membership,
+    Refused, Sent, Stamp, TickOutcome, Timer, Timing,
 };
 
 pub(super) type Simulator = Barrier<&'static str, &'static str>;
-pub(super) type Outputs = Vec<Output<&'static str, &'static str>>;
-pub(super) fn lateness(on_late: OnLate, lose_after: u32) -> Lateness {
-    Lateness {
+pub(super) type Outputs = Vec<BarrierOutput<&'static str, &'static str>>;
+pub(super) fn lateness(on_late: OnLate, lose_after: u32) -> LatePolicy {
+    LatePolicy {
         on_late,
         own: Default::default(),
         deadline: Duration::from_secs(1),
@@ -24,7 +24,7 @@ pub(super) fn lateness(on_late: OnLate, lose_after: u32) -> Lateness {
 }
 
 /// A barrier with A and B, both connected, before tick 0.
-pub(super) fn gathered(lateness: Lateness) -> Simulator {
+pub(super) fn gathered(lateness: LatePolicy) -> Simulator {
     let mut out = Vec::new();
     let roster = [name("A"), name("B")];
     let mut barrier = Barrier::new(roster, lateness.clone(), Timing::default(), 4);
@@ -34,7 +34,7 @@ pub(super) fn gathered(lateness: Lateness) -> Simulator {
         barrier.token(&name(robot), true, &mut out);
     }
 
-    assert!(out.contains(&Output::Gathered), "{out:?}");
+    assert!(out.contains(&BarrierOutput::Gathered), "{out:?}");
     barrier
 }
 
@@ -55,9 +55,9 @@ pub(super) fn open(barrier: &mut Simulator, tick: u64) -> Outputs {
     out
 }
 
-pub(super) fn outcome(out: Outputs) -> Option<Outcome<&'static str, &'static str>> {
+pub(super) fn outcome(out: Outputs) -> Option<TickOutcome<&'static str, &'static str>> {
     out.into_iter().find_map(|output| match output {
-        Output::Complete(outcome) => Some(outcome),
+        BarrierOutput::Complete(outcome) => Some(outcome),
         _ => None,
     })
 }
@@ -91,7 +91,7 @@ fn a_place_is_reserved_until_the_timer_fires() {
     barrier.timer(&timer, &mut out);
     let late = barrier.join(&name("A"), "third", &mut out);
 
-    assert!(out.contains(&Output::SetTimer(timer, Timing::default().token)));
+    assert!(out.contains(&BarrierOutput::SetTimer(timer, Timing::default().token)));
     assert_eq!(early, Err(Refused::NameTaken));
     assert_eq!(late.map(|admission| admission.generation), Ok(3));
 }
@@ -108,9 +108,9 @@ fn a_held_clock_is_announced_once_and_released() {
     barrier.timer(&Timer::Announce, &mut second);
     let complete = report(&mut barrier, "B", 0);
 
-    assert_eq!(first, [Output::Held]);
+    assert_eq!(first, [BarrierOutput::Held]);
     assert_eq!(second, []);
-    assert_eq!(complete.first(), Some(&Output::Released));
+    assert_eq!(complete.first(), Some(&BarrierOutput::Released));
 }
 
 #[test]
@@ -135,7 +135,7 @@ fn a_clock_is_repeated_while_its_tick_is_open() {
 fn a_deadline_does_what_the_scenario_wants() {
     for (on_late, expected) in [
         (OnLate::Wait, vec![]),
-        (OnLate::Abort, vec![Output::Aborted]),
+        (OnLate::Abort, vec![BarrierOutput::Aborted]),
     ] {
         let mut barrier = gathered(lateness(on_late, 1));
         open(&mut barrier, 0);
@@ -157,12 +157,12 @@ fn a_deadline_does_what_the_scenario_wants() {
 #[test]
 fn the_state_of_a_robot_that_is_given_up_is_put_on_its_behalf() {
     let own = [(name("B"), OnLate::Continue)].into();
-    let mut barrier = gathered(Lateness {
+    let mut barrier = gathered(LatePolicy {
         own,
         ..lateness(OnLate::Wait, 3)
     });
     open(&mut barrier, 0);
-    let stands_in = |out: &Outputs| out.contains(&Output::StandIn(name("B")));
+    let stands_in = |out: &Outputs| out.contains(&BarrierOutput::StandIn(name("B")));
 
     let mut early = Vec::new();
     barrier.waiting(&name("A"), 1, 0, &name("B"), &mut early);
@@ -239,7 +239,7 @@ fn a_robot_is_back_after_a_hang_when_it_has_joined_again() {
     assert!(!barrier.is_back(&name("B")));
     let again = barrier.join(&name("B"), "B", &mut Vec::new());
 
-    assert_eq!(late, [Output::Ignored(Ignored::Stale, name("B"))]);
+    assert_eq!(late, [BarrierOutput::Ignored(Ignored::Stale, name("B"))]);
     assert_eq!(again.map(|admission| admission.generation), Ok(2));
     assert!(barrier.is_back(&name("B")));
     let outcome = {
@@ -280,7 +280,7 @@ fn a_report_that_states_fewer_commands_than_arrived_counts() {
 /// The news and the clock's flags of the tick that was granted.
 pub(super) fn granted(out: &Outputs) -> (Vec<(RobotName, IncarnationNotice)>, u32) {
     let granted = out.iter().find_map(|output| match output {
-        Output::Grant { news, clock } => Some((news.clone(), clock.news)),
+        BarrierOutput::Grant { news, clock } => Some((news.clone(), clock.news)),
         _ => None,
     });
     granted.expect("a tick is granted")
@@ -399,7 +399,7 @@ fn a_message_that_does_not_count_says_why() {
     let mut barrier = gathered(lateness(OnLate::Continue, 1));
     open(&mut barrier, 0);
     let why = |out: &mut Outputs| match out.pop() {
-        Some(Output::Ignored(why, _)) => why.as_str(),
+        Some(BarrierOutput::Ignored(why, _)) => why.as_str(),
         other => panic!("{other:?}"),
     };
     let out = &mut Vec::new();
@@ -494,7 +494,7 @@ fn for_whom_the_clock_waits_is_said_again_when_it_changes() {
     barrier.gather(1, lateness(OnLate::Wait, 1), &mut out);
     assert_eq!(
         out,
-        [Output::SetTimer(
+        [BarrierOutput::SetTimer(
             Timer::Announce,
             Timing::default().announce
         )]
@@ -510,7 +510,7 @@ fn for_whom_the_clock_waits_is_said_again_when_it_changes() {
         barrier.token(&name(robot), true, &mut out);
     }
     assert!(barrier.awaited().is_empty() && !barrier.is_announced());
-    assert_eq!(out[1..], [Output::Released, Output::Gathered]);
+    assert_eq!(out[1..], [BarrierOutput::Released, BarrierOutput::Gathered]);
 
     open(&mut barrier, 0);
     let silent = |robot: &str| (name(robot), Reason::Silent);
@@ -527,7 +527,14 @@ fn for_whom_the_clock_waits_is_said_again_when_it_changes() {
     assert!(barrier.is_announced());
     barrier.waiting(&name("A"), 1, 0, &name("B"), &mut out);
     barrier.token(&name("B"), false, &mut out);
-    assert_eq!(out, [Output::Held, Output::Held, Output::Held]);
+    assert_eq!(
+        out,
+        [
+            BarrierOutput::Held,
+            BarrierOutput::Held,
+            BarrierOutput::Held
+        ]
+    );
     assert_eq!(barrier.awaited(), [waits, (name("B"), Reason::Gone)]);
 
     // The next epoch is not announced yet, and nobody is told that a clock goes on that was given up.
@@ -536,17 +543,17 @@ fn for_whom_the_clock_waits_is_said_again_when_it_changes() {
     assert_eq!(out.len(), 1);
     assert!(!barrier.is_announced());
     barrier.token(&name("B"), true, &mut out);
-    assert_eq!(out[1..], [Output::Gathered]);
+    assert_eq!(out[1..], [BarrierOutput::Gathered]);
 }
 
 #[test]
 fn a_deadline_is_set_where_a_robot_does_not_wait() {
     let has_deadline = |out: &Outputs| {
-        let deadline = Output::SetTimer(Timer::Deadline, Duration::from_secs(1));
+        let deadline = BarrierOutput::SetTimer(Timer::Deadline, Duration::from_secs(1));
         out.contains(&deadline)
     };
     let mut barrier = gathered(lateness(OnLate::Wait, 1));
-    let own = Lateness {
+    let own = LatePolicy {
         own: [(name("B"), OnLate::Continue)].into(),
         ..lateness(OnLate::Wait, 1)
     };
@@ -563,7 +570,7 @@ fn a_deadline_is_set_where_a_robot_does_not_wait() {
     // A robot that waits is waited for.
     changed.clear();
     barrier.timer(&Timer::Deadline, &mut changed);
-    assert_eq!(changed, [Output::StandIn(name("B"))]);
+    assert_eq!(changed, [BarrierOutput::StandIn(name("B"))]);
 }
 
 #[test]

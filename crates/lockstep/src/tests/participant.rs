@@ -7,8 +7,8 @@ use protocol::messages::{Clock, End, OnLate, Refusal};
 use super::barrier::{Simulator, gathered, lateness, open, outcome, report};
 use super::{ADMISSION, clock, joined, name};
 use crate::{
-    Action, Admission, Begin, IncarnationNotice, Leave, Membership, NoState, Output, Participant,
-    RobotTimer, Stamp, StateQuery, Timeouts, Turn,
+    Admission, BarrierOutput, Begin, IncarnationNotice, Leave, Membership, NoState, Participant,
+    ParticipantOutput, RobotTimer, Stamp, StateQuery, Timeouts, Turn,
 };
 
 type Robot = Participant<(), &'static str, (), ()>;
@@ -25,13 +25,19 @@ fn a_newcomer_asks_again_while_its_name_is_taken() {
     let mut out = Vec::new();
 
     robot.refused(Refusal::NameTaken, &mut out);
-    assert!(matches!(out[..], [Action::SetTimer(RobotTimer::Join, _)]));
+    assert!(matches!(
+        out[..],
+        [ParticipantOutput::SetTimer(RobotTimer::Join, _)]
+    ));
     out.clear();
     robot.timer(RobotTimer::Join, &mut out);
-    assert_eq!(out, [Action::Join]);
+    assert_eq!(out, [ParticipantOutput::Join]);
     out.clear();
     robot.timer(RobotTimer::JoinPatience, &mut out);
-    assert_eq!(out, [Action::Leave(Leave::Refused(Refusal::NameTaken))]);
+    assert_eq!(
+        out,
+        [ParticipantOutput::Leave(Leave::Refused(Refusal::NameTaken))]
+    );
 }
 
 #[test]
@@ -43,7 +49,13 @@ fn a_robot_whose_name_is_taken_in_a_further_epoch_has_been_replaced() {
     robot.clock(clock(2, 0), &mut out);
     robot.refused(Refusal::NameTaken, &mut out);
 
-    assert_eq!(out, [Action::Join, Action::Leave(Leave::Replaced)]);
+    assert_eq!(
+        out,
+        [
+            ParticipantOutput::Join,
+            ParticipantOutput::Leave(Leave::Replaced)
+        ]
+    );
 }
 
 #[test]
@@ -78,7 +90,10 @@ fn a_simulator_that_is_back_in_time_is_not_gone() {
     robot.simulator(false, &mut out);
     robot.timer(RobotTimer::Gone, &mut out);
 
-    assert_eq!(out.last(), Some(&Action::Leave(Leave::SimulatorGone)));
+    assert_eq!(
+        out.last(),
+        Some(&ParticipantOutput::Leave(Leave::SimulatorGone))
+    );
 }
 
 /// A robot that runs tick 1 of epoch 1, after it has answered tick 0.
@@ -106,10 +121,10 @@ fn a_state_of_a_later_tick_does_not_take_the_place_of_the_one_that_is_asked_for(
     assert_eq!(robot.ask(&name("B"), &mut Vec::new()), Some("of tick 1"));
 }
 
-fn run(epoch: u32, tick: u64, begin: Begin) -> Action<(), &'static str, (), ()> {
+fn run(epoch: u32, tick: u64, begin: Begin) -> ParticipantOutput<(), &'static str, (), ()> {
     let has_news = begin == Begin::TakeOver;
 
-    Action::Run(Turn {
+    ParticipantOutput::Run(Turn {
         epoch,
         tick,
         begin,
@@ -125,7 +140,7 @@ fn a_clock_of_an_epoch_that_has_not_begun_costs_a_welcome_and_nothing_else() {
         robot.clock(clock(9, tick), &mut out);
         robot.news(9, tick, IncarnationNotice::default(), (), &mut out);
     }
-    assert_eq!(out, [Action::Join]);
+    assert_eq!(out, [ParticipantOutput::Join]);
     assert!(!robot.is_interrupted(), "its tick may count");
     out.clear();
     robot.done(Vec::new(), "of tick 1", (), &mut out);
@@ -139,14 +154,14 @@ fn a_clock_of_an_epoch_that_has_not_begun_costs_a_welcome_and_nothing_else() {
 
     robot.admitted(ADMISSION, [(0, "of the welcome")], &mut out);
 
-    assert!(matches!(&out[0], Action::Put(answer) if answer.tick == 1));
+    assert!(matches!(&out[0], ParticipantOutput::Put(answer) if answer.tick == 1));
     let turn = Turn {
         epoch: 1,
         tick: 2,
         begin: Begin::GoOn,
         news: Some(()),
     };
-    assert_eq!(out[1..], [Action::Run(turn)]);
+    assert_eq!(out[1..], [ParticipantOutput::Run(turn)]);
     assert_eq!(robot.query(StateQuery::default()), Ok("of tick 1"));
 }
 
@@ -165,7 +180,7 @@ fn a_robot_that_joins_again_forgets_the_tick_that_it_runs() {
 
     robot.news(1, 5, asked, (), &mut out);
     robot.news(1, 5, asked, (), &mut out);
-    assert_eq!(out, [Action::Join]);
+    assert_eq!(out, [ParticipantOutput::Join]);
     out.clear();
     // Its next incarnation may be named before the answer arrives.
     robot.news(1, 6, joined(2), (), &mut out);
@@ -218,7 +233,9 @@ fn a_robot_that_is_cut_off_where_an_epoch_begins_returns_as_a_further_incarnatio
         rejoin: Some(1),
     };
     let granted = complete(&mut barrier, 2);
-    assert!(matches!(&granted[0], Output::Grant { news, .. } if news[..] == [(name("B"), asked)]));
+    assert!(
+        matches!(&granted[0], BarrierOutput::Grant { news, .. } if news[..] == [(name("B"), asked)])
+    );
 
     let mut robot = running();
     let mut actions = Vec::new();
@@ -226,14 +243,14 @@ fn a_robot_that_is_cut_off_where_an_epoch_begins_returns_as_a_further_incarnatio
     actions.clear();
     robot.news(2, 2, asked, (), &mut actions);
     robot.clock(clock(2, 2), &mut actions);
-    assert_eq!(actions, [Action::Join]);
+    assert_eq!(actions, [ParticipantOutput::Join]);
     let admission = barrier.join(&name("B"), "B", &mut out).expect("joins");
     assert_eq!((admission.epoch, admission.generation), (2, 2));
     robot.admitted(admission, [], &mut actions);
     let taken_in = complete(&mut barrier, 3);
     let joins = Membership::Joined(name("B"), 2);
     assert!(
-        matches!(&taken_in[0], Output::Grant { news, .. } if news[..] == [(name("B"), joined(2))])
+        matches!(&taken_in[0], BarrierOutput::Grant { news, .. } if news[..] == [(name("B"), joined(2))])
     );
     actions.clear();
     robot.news(2, 3, joined(2), (), &mut actions);
@@ -257,12 +274,12 @@ fn a_robot_that_is_cut_off_where_an_epoch_begins_returns_as_a_further_incarnatio
 fn a_robot_that_waits_for_another_one_says_so_once_and_asks_again() {
     let mut robot = running();
     let mut out = Vec::new();
-    let query = |of: &str| Action::Query {
+    let query = |of: &str| ParticipantOutput::Query {
         of: name(of),
         tick: 1,
         epoch: 1,
     };
-    let is_set = |action: &Action<(), &'static str, (), ()>, timer| matches!(action, Action::SetTimer(set, _) if *set == timer);
+    let is_set = |action: &ParticipantOutput<(), &'static str, (), ()>, timer| matches!(action, ParticipantOutput::SetTimer(set, _) if *set == timer);
 
     assert_eq!(robot.ask(&name("B"), &mut out), None);
     assert_eq!(robot.ask(&name("B"), &mut out), None);
@@ -275,7 +292,7 @@ fn a_robot_that_waits_for_another_one_says_so_once_and_asks_again() {
     out.clear();
     robot.timer(RobotTimer::Waiting, &mut out);
     robot.timer(RobotTimer::Waiting, &mut out);
-    let waiting = Action::PutWaiting {
+    let waiting = ParticipantOutput::PutWaiting {
         tick: 1,
         epoch: 1,
         on: name("B"),
@@ -330,7 +347,7 @@ fn a_robot_that_is_not_asked_any_more_is_followed_no_more() {
     };
 
     assert_eq!(run_at(64), [run(1, 64, Begin::GoOn)]);
-    let unfollow = Action::Unfollow(name("B"));
+    let unfollow = ParticipantOutput::Unfollow(name("B"));
     assert_eq!(run_at(65), [unfollow, run(1, 65, Begin::GoOn)]);
     assert_eq!(run_at(200), [run(1, 200, Begin::GoOn)]);
 }
@@ -376,7 +393,7 @@ fn a_robot_runs_the_newest_clock() {
     robot.clock(clock(1, 2), &mut out);
     assert_eq!(out, []);
     robot.clock(clock(1, 3), &mut out);
-    assert!(matches!(&out[..], [Action::Put(answer)] if answer.tick == 3));
+    assert!(matches!(&out[..], [ParticipantOutput::Put(answer)] if answer.tick == 3));
     out.clear();
     robot.clock(clock(0, 9), &mut out);
     assert_eq!(out, [], "of an epoch that is over");
@@ -391,7 +408,7 @@ fn the_newest_clock_of_a_later_epoch_waits_for_its_welcome() {
         robot.clock(clock(2, tick), &mut out);
         robot.news(2, tick, joined(1), (), &mut out);
     }
-    assert_eq!(out, [Action::Join]);
+    assert_eq!(out, [ParticipantOutput::Join]);
     out.clear();
 
     let admission = Admission {
@@ -434,14 +451,17 @@ fn a_request_to_join_is_repeated_until_it_is_answered() {
     let mut robot = robot();
     assert!(robot.is_unanswered());
     robot.unanswered(&mut out);
-    assert!(matches!(out[..], [Action::SetTimer(RobotTimer::Join, _)]));
+    assert!(matches!(
+        out[..],
+        [ParticipantOutput::SetTimer(RobotTimer::Join, _)]
+    ));
     out.clear();
     robot.timer(RobotTimer::Join, &mut out);
-    assert_eq!(out, [Action::Join]);
+    assert_eq!(out, [ParticipantOutput::Join]);
     let mut patient = robot.clone();
     out.clear();
     patient.timer(RobotTimer::JoinPatience, &mut out);
-    assert_eq!(out, [Action::Leave(Leave::NoSimulator)]);
+    assert_eq!(out, [ParticipantOutput::Leave(Leave::NoSimulator)]);
     assert!(patient.has_left() && patient.is_interrupted());
     let mut taken = robot.clone();
     taken.refused(Refusal::NameTaken, &mut out);
@@ -449,7 +469,7 @@ fn a_request_to_join_is_repeated_until_it_is_answered() {
 
     out.clear();
     robot.admitted(ADMISSION, [], &mut out);
-    assert_eq!(out, [Action::DeclareToken]);
+    assert_eq!(out, [ParticipantOutput::DeclareToken]);
     assert!(!robot.is_unanswered());
     out.clear();
     robot.timer(RobotTimer::Join, &mut out);
@@ -479,14 +499,14 @@ fn a_robot_that_has_left_does_nothing_more() {
     let mut out = Vec::new();
     let mut early = robot();
     early.clock(end, &mut out);
-    assert_eq!(out, [Action::Leave(Leave::End(End::Finished))]);
+    assert_eq!(out, [ParticipantOutput::Leave(Leave::End(End::Finished))]);
     assert_eq!(early.admission(), None);
 
     let mut robot = running();
     out.clear();
     robot.stop(&mut out);
     robot.stop(&mut out);
-    assert_eq!(out, [Action::Leave(Leave::Stopped)]);
+    assert_eq!(out, [ParticipantOutput::Leave(Leave::Stopped)]);
     assert_eq!(robot.admission(), Some(ADMISSION));
     out.clear();
     robot.clock(clock(1, 2), &mut out);
@@ -501,7 +521,12 @@ fn a_robot_that_has_left_does_nothing_more() {
 
     let mut refused = self::robot();
     refused.refused(Refusal::UnknownName, &mut out);
-    assert_eq!(out, [Action::Leave(Leave::Refused(Refusal::UnknownName))]);
+    assert_eq!(
+        out,
+        [ParticipantOutput::Leave(Leave::Refused(
+            Refusal::UnknownName
+        ))]
+    );
 }
 
 #[test]
@@ -514,7 +539,7 @@ fn a_process_ends_when_a_later_incarnation_is_named() {
     robot.news(0, 2, joined(2), (), &mut out);
     assert_eq!(out, []);
     robot.news(1, 2, joined(2), (), &mut out);
-    assert_eq!(out, [Action::Leave(Leave::Replaced)]);
+    assert_eq!(out, [ParticipantOutput::Leave(Leave::Replaced)]);
 }
 
 #[test]
@@ -540,7 +565,7 @@ fn only_the_first_incarnation_begins_without_being_named() {
         robot.clock(clock(1, tick), &mut out);
 
         let begun = out.iter().find_map(|action| match action {
-            Action::Run(turn) => Some(turn.begin),
+            ParticipantOutput::Run(turn) => Some(turn.begin),
             _ => None,
         });
         assert_eq!(

@@ -2,15 +2,15 @@
 
 use std::collections::BTreeMap;
 
-use protocol::messages::{CommandText, News, Performative};
+use protocol::messages::{CommandText, Performative, TickUpdate};
 
 use super::{joined, name};
-use crate::{Answer, Bulletin, IncarnationNotice, NoState, Sent, StateQuery, States};
+use crate::{Bulletin, IncarnationNotice, NoState, RecentStates, Sent, StateQuery, TickAnswer};
 
 #[test]
 fn the_last_two_states_are_kept() {
     let at = |epoch: Option<u32>, tick: Option<u64>| StateQuery { tick, epoch };
-    let mut states = States::default();
+    let mut states = RecentStates::default();
     assert_eq!(states.answer(at(None, None)), Err(NoState::NotYet));
 
     for (epoch, tick) in [(1, 9), (2, 4), (2, 3), (2, 5), (1, 10)] {
@@ -74,7 +74,7 @@ fn commands_are_numbered_in_their_order() {
         },
     };
     let commands = vec![sent("B", "first"), sent("C", "second")];
-    let answer = Answer {
+    let answer = TickAnswer {
         epoch: 1,
         tick: 7,
         generation: 2,
@@ -95,10 +95,10 @@ fn commands_are_numbered_in_their_order() {
 
 #[test]
 fn news_name_incarnations() {
-    let news = News {
+    let news = TickUpdate {
         joined: Some(2),
         rejoin: Some(1),
-        ..News::default()
+        ..TickUpdate::default()
     };
     let notice = IncarnationNotice {
         rejoin: Some(1),

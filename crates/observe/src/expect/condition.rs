@@ -21,11 +21,11 @@ const MAX_EVENT_CHARS: usize = 200;
 /// What holds in a tick, or happens in it: one of these alternatives.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Value", into = "Value")]
-pub struct Condition(Vec<Alternative>);
+pub struct TickCondition(Vec<Alternative>);
 
 /// A condition that cannot be checked.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum ConditionError {
+pub enum TickConditionError {
     /// The pattern of its events cannot match.
     #[error(transparent)]
     Pattern(#[from] PatternError),
@@ -177,16 +177,16 @@ pub(super) fn one_or_list(mut values: Vec<Value>) -> Value {
     Value::Array(values)
 }
 
-impl TryFrom<Value> for Condition {
-    type Error = ConditionError;
+impl TryFrom<Value> for TickCondition {
+    type Error = TickConditionError;
 
-    fn try_from(value: Value) -> Result<Self, ConditionError> {
+    fn try_from(value: Value) -> Result<Self, TickConditionError> {
         let entries = match value {
             Value::Array(entries) => entries,
             one => vec![one],
         };
         if !(1..=MAX_ALTERNATIVES).contains(&entries.len()) {
-            return Err(ConditionError::Count);
+            return Err(TickConditionError::Count);
         }
 
         let mut alternatives = Vec::new();
@@ -197,37 +197,37 @@ impl TryFrom<Value> for Condition {
     }
 }
 
-impl From<Condition> for Value {
-    fn from(condition: Condition) -> Self {
+impl From<TickCondition> for Value {
+    fn from(condition: TickCondition) -> Self {
         one_or_list(condition.0.iter().map(Alternative::to_value).collect())
     }
 }
 
 impl TryFrom<Value> for Alternative {
-    type Error = ConditionError;
+    type Error = TickConditionError;
 
-    fn try_from(value: Value) -> Result<Self, ConditionError> {
+    fn try_from(value: Value) -> Result<Self, TickConditionError> {
         let Value::Object(fields) = &value else {
-            return Err(ConditionError::Unknown);
+            return Err(TickConditionError::Unknown);
         };
         if fields.contains_key("event") {
             return Ok(Self::Event(Pattern::try_from(value)?));
         }
         // JSON has no infinity: an infinite bound would not be there.
         if fields.values().any(Value::is_null) {
-            return Err(ConditionError::Bound);
+            return Err(TickConditionError::Bound);
         }
 
         let table: ConditionTable = serde_json::from_value(value)
-            .map_err(|error| ConditionError::Fields(error.to_string()))?;
+            .map_err(|error| TickConditionError::Fields(error.to_string()))?;
         table.check()
     }
 }
 
 impl ConditionTable {
-    fn check(self) -> Result<Alternative, ConditionError> {
+    fn check(self) -> Result<Alternative, TickConditionError> {
         if self.lasting.is_some_and(|lasting| lasting.0 <= 0.0) {
-            return Err(ConditionError::Lasting);
+            return Err(TickConditionError::Lasting);
         }
 
         let bounds = ValueBounds {
@@ -251,13 +251,13 @@ impl ConditionTable {
                         Is::Emotion(at_least_one("emotion", names)?)
                     }
                     (None, None, Some(_)) if bounds == ValueBounds::default() => {
-                        return Err(ConditionError::Bound);
+                        return Err(TickConditionError::Bound);
                     }
                     (None, None, Some(_)) if bounds.are_contradictory() => {
-                        return Err(ConditionError::NoNumber);
+                        return Err(TickConditionError::NoNumber);
                     }
                     (None, None, Some(variable)) => Is::Variable(variable, bounds),
-                    _ => return Err(ConditionError::Unknown),
+                    _ => return Err(TickConditionError::Unknown),
                 };
                 Ok(Alternative::State(LastingState {
                     robot,
@@ -265,15 +265,15 @@ impl ConditionTable {
                     lasting: self.lasting,
                 }))
             }
-            _ => Err(ConditionError::Unknown),
+            _ => Err(TickConditionError::Unknown),
         }
     }
 }
 
-fn at_least_one(key: &'static str, names: Names) -> Result<Vec<String>, ConditionError> {
+fn at_least_one(key: &'static str, names: Names) -> Result<Vec<String>, TickConditionError> {
     let names: Vec<String> = names.into();
     if names.is_empty() {
-        return Err(ConditionError::NoName(key));
+        return Err(TickConditionError::NoName(key));
     }
     Ok(names)
 }
@@ -293,38 +293,38 @@ impl ValueBounds {
     }
 }
 
-fn check_overlap(names: Names) -> Result<Alternative, ConditionError> {
+fn check_overlap(names: Names) -> Result<Alternative, TickConditionError> {
     let names = match names {
         Names::One(any) if any == "any" => return Ok(Alternative::Overlap(None)),
-        Names::One(_) => return Err(ConditionError::Overlap),
+        Names::One(_) => return Err(TickConditionError::Overlap),
         Names::Several(names) => names,
     };
 
     let mut robots = Vec::new();
     for name in names {
         let robot = RobotName::new(&name);
-        robots.push(robot.map_err(|error| ConditionError::Fields(error.to_string()))?);
+        robots.push(robot.map_err(|error| TickConditionError::Fields(error.to_string()))?);
     }
     robots.sort();
     robots.dedup();
     if robots.len() < 2 {
-        return Err(ConditionError::Overlap);
+        return Err(TickConditionError::Overlap);
     }
     Ok(Alternative::Overlap(Some(robots)))
 }
 
-fn check_stalled(table: &StalledTable) -> Result<Alternative, ConditionError> {
+fn check_stalled(table: &StalledTable) -> Result<Alternative, TickConditionError> {
     if table.lasting.0 <= 0.0 {
-        return Err(ConditionError::Lasting);
+        return Err(TickConditionError::Lasting);
     }
     if table.progress.is_empty() {
-        return Err(ConditionError::Progress);
+        return Err(TickConditionError::Progress);
     }
 
     let mut progress = Vec::new();
     for text in &table.progress {
-        let (robot, variable) = text.split_once('.').ok_or(ConditionError::Progress)?;
-        let robot = RobotName::new(robot).map_err(|_| ConditionError::Progress)?;
+        let (robot, variable) = text.split_once('.').ok_or(TickConditionError::Progress)?;
+        let robot = RobotName::new(robot).map_err(|_| TickConditionError::Progress)?;
         progress.push(VariableOfRobot {
             robot,
             variable: variable.to_owned(),
@@ -381,7 +381,7 @@ impl std::fmt::Display for VariableOfRobot {
     }
 }
 
-impl Condition {
+impl TickCondition {
     /// The patterns of its events.
     pub(super) fn patterns(&self) -> impl Iterator<Item = &Pattern> {
         self.0.iter().filter_map(|alternative| match alternative {
@@ -437,8 +437,8 @@ impl Condition {
 impl LastingState {
     fn words(&self) -> Vec<Word> {
         let (kind, states) = match &self.is {
-            Is::Emotion(states) => (words::Kind::Emotion, states),
-            Is::Behavior(states) => (words::Kind::Behavior, states),
+            Is::Emotion(states) => (words::WordKind::Emotion, states),
+            Is::Behavior(states) => (words::WordKind::Behavior, states),
             Is::Variable(..) => return Vec::new(),
         };
 
@@ -477,7 +477,7 @@ struct Tracked {
 
 impl Evaluation {
     pub(super) fn new(
-        condition: &Condition,
+        condition: &TickCondition,
         tick_s: f64,
         body_m: f64,
         roster: &[RobotName],

@@ -4,7 +4,7 @@ use config::units::Time;
 use protocol::RobotName;
 use serde::{Deserialize, Serialize};
 
-use super::condition::{self, Condition};
+use super::condition::{self, TickCondition};
 use crate::pattern::Pattern;
 use crate::words::Word;
 
@@ -33,13 +33,13 @@ pub struct Expectation {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Rule {
     /// The condition holds in no tick.
-    Never(Condition),
+    Never(TickCondition),
     /// The condition holds in every tick.
-    Always(Condition),
+    Always(TickCondition),
     /// The condition holds in some tick, at the latest this time after the beginning.
     Eventually {
         /// What is waited for.
-        condition: Condition,
+        condition: TickCondition,
         /// How long.
         within: Time,
     },
@@ -48,7 +48,7 @@ pub enum Rule {
         /// Events from each of which on the condition is waited for; one of these patterns matches.
         trigger: Vec<Pattern>,
         /// What is waited for. It counts for all events before it.
-        condition: Condition,
+        condition: TickCondition,
         /// How long.
         within: Time,
         /// Events that end the wait: the condition is not waited for any longer. Empty if there are none.
@@ -111,13 +111,13 @@ struct RuleTable {
     #[serde(skip_serializing_if = "Option::is_none")]
     what: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    never: Option<Condition>,
+    never: Option<TickCondition>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    always: Option<Condition>,
+    always: Option<TickCondition>,
     #[serde(skip_serializing_if = "Option::is_none")]
     after: Option<Patterns>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    eventually: Option<Condition>,
+    eventually: Option<TickCondition>,
     #[serde(skip_serializing_if = "Option::is_none")]
     within: Option<Time>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -220,7 +220,7 @@ impl RuleTable {
 }
 
 /// The condition, whose events can be observed.
-fn observed(condition: Condition) -> Result<Condition, ExpectError> {
+fn observed(condition: TickCondition) -> Result<TickCondition, ExpectError> {
     for pattern in condition.patterns() {
         check_observed(pattern)?;
     }

@@ -32,7 +32,7 @@ impl Judgment {
 
 /// One expectation while a run is observed.
 #[derive(Debug, Clone)]
-pub struct Watch {
+pub struct Monitor {
     rule: Rule,
     condition: Evaluation,
     tick_s: f64,
@@ -55,7 +55,7 @@ struct OpenCheck {
     event: String,
 }
 
-impl Watch {
+impl Monitor {
     /// Begins to watch a run with ticks of `tick_s` seconds, bodies with sides of `body_m` meters, and these robots.
     #[must_use]
     pub fn new(expectation: &Expectation, tick_s: f64, body_m: f64, roster: &[RobotName]) -> Self {
@@ -255,7 +255,7 @@ pub struct Monitors(Vec<Monitored>);
 #[derive(Debug, Clone)]
 struct Monitored {
     name: String,
-    watch: Watch,
+    watch: Monitor,
     judgment: Option<Judgment>,
 }
 
@@ -272,7 +272,7 @@ impl Monitors {
         for expectation in expectations {
             watches.push(Monitored {
                 name: expectation.name.clone(),
-                watch: Watch::new(expectation, tick_s, body_m, roster),
+                watch: Monitor::new(expectation, tick_s, body_m, roster),
                 judgment: None,
             });
         }

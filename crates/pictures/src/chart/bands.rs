@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use timeline::Kind;
+use timeline::StateKind;
 
 use crate::axis::draw_below;
 use crate::chart::{WIDE_PX, begin, end};
@@ -56,7 +56,7 @@ pub struct Bands {
     /// Name of the chart.
     pub title: String,
     /// Which states they are.
-    pub kind: Kind,
+    pub kind: StateKind,
     /// End of the axis of time, simulated seconds.
     pub end_s: f64,
     /// The rows, from top to bottom.

@@ -1,7 +1,7 @@
 //! Estimates with their intervals, a row for each arm: means of arms, or differences to a baseline (a forest plot).
 
 use crate::axis::draw_below;
-use crate::chart::{Estimate, PANEL_PX, begin, draw_estimate, end};
+use crate::chart::{PANEL_PX, PlottedEstimate, begin, draw_estimate, end};
 use crate::labels::{shortened, widest_px, width_px};
 use crate::markup::Markup;
 use crate::number::{decimals_for, typeset};
@@ -21,7 +21,7 @@ pub struct IntervalRow {
     /// Index of the arm, which has its color and marker.
     pub arm: usize,
     /// Its estimate; `None` if there is none.
-    pub estimate: Option<Estimate>,
+    pub estimate: Option<PlottedEstimate>,
 }
 
 /// A chart of estimates.

@@ -3,9 +3,9 @@
 use crate::chart::{PANEL_PX, WIDE_PX, begin, end};
 use crate::labels::{shortened, widest_px, width_px};
 use crate::markup::Markup;
-use crate::page::Panel;
+use crate::page::ChartPanel;
 use crate::palette::level;
-use crate::shapes::{LABEL_PX, Point, SMALL_PX};
+use crate::shapes::{LABEL_PX, Pixel, SMALL_PX};
 
 /// Most rows and columns that are drawn.
 const MOST: usize = 24;
@@ -65,10 +65,10 @@ pub struct Matrix {
 impl Matrix {
     /// The chart as a panel, which is as wide as its numbers need.
     #[must_use]
-    pub fn panel(&self, heading: impl Into<String>) -> Panel {
-        Panel {
+    pub fn panel(&self, heading: impl Into<String>) -> ChartPanel {
+        ChartPanel {
             is_wide: self.is_wide(),
-            ..Panel::new(heading, self.draw())
+            ..ChartPanel::new(heading, self.draw())
         }
     }
 
@@ -170,7 +170,7 @@ fn fits(cell: &MatrixCell, width: f64) -> bool {
     width_px(&cell.text, LABEL_PX) <= width + 4.0
 }
 
-fn draw_cell(svg: &mut Markup, cell: Option<&MatrixCell>, title: &str, (x, y): Point, width: f64) {
+fn draw_cell(svg: &mut Markup, cell: Option<&MatrixCell>, title: &str, (x, y): Pixel, width: f64) {
     let Some(cell) = cell else {
         svg.rect("none", (x, y), width, ROW_PX);
         return;

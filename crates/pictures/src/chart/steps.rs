@@ -18,7 +18,7 @@ const STEP_PX: f64 = 0.25;
 
 /// A step of a curve: from `x` on it has the share `y`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Step {
+pub struct CurveStep {
     /// Where it is.
     pub x: f64,
     /// Share from there on, 0 to 1.
@@ -37,7 +37,7 @@ pub struct Curve {
     /// Share before the first step.
     pub begin: f64,
     /// The steps, with growing `x`.
-    pub steps: Vec<Step>,
+    pub steps: Vec<CurveStep>,
     /// Where the curve ends.
     pub end: f64,
     /// Where runs were censored.
@@ -141,8 +141,8 @@ impl Curve {
     }
 
     /// The last step before each place of the picture.
-    fn visible(&self, x: &Scale) -> Vec<Step> {
-        let mut visible: Vec<Step> = Vec::new();
+    fn visible(&self, x: &Scale) -> Vec<CurveStep> {
+        let mut visible: Vec<CurveStep> = Vec::new();
         for step in &self.steps {
             let is_beside = visible
                 .last()

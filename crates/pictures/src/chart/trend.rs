@@ -2,13 +2,14 @@
 
 use crate::axis::draw_left;
 use crate::chart::{
-    ArmName, Estimate, NAME_LETTERS, PANEL_PX, begin, draw_estimate, draw_names, end, line_class,
+    ArmName, NAME_LETTERS, PANEL_PX, PlottedEstimate, begin, draw_estimate, draw_names, end,
+    line_class,
 };
 use crate::labels::{widest_px, width_px};
 use crate::markup::Markup;
 use crate::number::{decimals_for, fixed};
 use crate::scale::Scale;
-use crate::shapes::{LABEL_PX, Point};
+use crate::shapes::{LABEL_PX, Pixel};
 
 /// Height of the plot, pixels.
 const PLOT_PX: f64 = 230.0;
@@ -25,7 +26,7 @@ pub struct TrendLine {
     /// Its index, which has its color, marker and dashes.
     pub arm: usize,
     /// Its estimates, each after the value of the factor, which grows.
-    pub points: Vec<(f64, Estimate)>,
+    pub points: Vec<(f64, PlottedEstimate)>,
 }
 
 /// A chart of a measure over a factor.
@@ -117,7 +118,7 @@ impl Trend {
         let x_of = |level: f64| x.at(level) + aside;
         let points = line.points.iter();
         let points = points.map(|(level, estimate)| (x_of(*level), y.at(estimate.value)));
-        let points: Vec<Point> = points.collect();
+        let points: Vec<Pixel> = points.collect();
         svg.line(&format!("{} thin", line_class(line.arm)), &points);
 
         for (level, estimate) in &line.points {
@@ -138,7 +139,7 @@ impl Trend {
         }
     }
 
-    fn point_title(&self, line: &TrendLine, level: f64, estimate: &Estimate) -> String {
+    fn point_title(&self, line: &TrendLine, level: f64, estimate: &PlottedEstimate) -> String {
         let level = fixed(level, 4);
         let level = level.trim_end_matches('0').trim_end_matches('.');
         let numbers = estimate.words(decimals_for(self.range.1 - self.range.0));

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use protocol::Tick;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
-use timeline::Change;
+use timeline::ChangeSpan;
 use toml::Table;
 
 /// Most letters of a label; the title has everything.
@@ -53,7 +53,7 @@ struct Loss {
 }
 
 /// The changes of a tick in few words.
-pub(crate) fn in_words(changes: &[Change], tick_s: f64) -> String {
+pub(crate) fn in_words(changes: &[ChangeSpan], tick_s: f64) -> String {
     let mut words = Vec::new();
     for change in changes {
         let known = known(change, tick_s);
@@ -75,7 +75,7 @@ pub(crate) fn in_words(changes: &[Change], tick_s: f64) -> String {
 }
 
 /// What a change of one of the lists of a scenario does; `None` if it is of something else.
-fn known(change: &Change, tick_s: f64) -> Option<Vec<String>> {
+fn known(change: &ChangeSpan, tick_s: f64) -> Option<Vec<String>> {
     let (path, _) = change.set.split_once('=')?;
     let (what, words, is_empty) = match path.trim() {
         "fault" => {
@@ -112,7 +112,7 @@ struct Changed<T> {
 
 impl<T: DeserializeOwned + PartialEq> Changed<T> {
     /// `None` if what is set is not such a list.
-    fn read(change: &Change, tick_s: f64) -> Option<Self> {
+    fn read(change: &ChangeSpan, tick_s: f64) -> Option<Self> {
         let parse = |set: &str| {
             let (_, value) = set.split_once('=')?;
             let mut parsed: BTreeMap<String, Vec<T>> =
@@ -289,7 +289,7 @@ mod tests {
     const TICK_S: f64 = 0.5;
 
     fn label(tick: Tick, set: &str, before: Option<&str>) -> String {
-        let change = Change {
+        let change = ChangeSpan {
             tick,
             set: set.to_owned(),
             before: before.map(str::to_owned),
@@ -363,7 +363,7 @@ mod tests {
 
     #[test]
     fn all_changes_of_a_tick_have_one_label() {
-        let change = |robot: &str| Change {
+        let change = |robot: &str| ChangeSpan {
             tick: 8,
             set: format!(r#"robot.{robot}.on_late="continue""#),
             before: None,

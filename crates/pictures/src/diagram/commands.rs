@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 
 use protocol::Tick;
 use protocol::event::Cause;
-use timeline::{Command, CommandEnd, QueriesLost};
+use timeline::{CommandEnd, CommandSpan, QueriesLost};
 
 use crate::diagram::items::Items;
 use crate::diagram::picture::{LabelPosition, OUTSIDE_PX, Picture};
 use crate::diagram::words;
 use crate::labels::{Area, shortened};
-use crate::shapes::Point;
+use crate::shapes::Pixel;
 
 /// Distance of the first wait from the target's lane, pixels.
 const WAIT_PX: f64 = 12.0;
@@ -30,28 +30,28 @@ type Waits = BTreeMap<(usize, bool), Vec<f64>>;
 #[derive(Default)]
 struct Route {
     /// To where it waits, arrives, forks or is lost.
-    line: Vec<Point>,
+    line: Vec<Pixel>,
     /// Where it waits; empty if it does not.
-    wait: Vec<Point>,
+    wait: Vec<Pixel>,
     /// After the wait or the fork.
-    branches: Vec<[Point; 2]>,
+    branches: Vec<[Pixel; 2]>,
     /// Tips of arrows, each with the point before it.
-    heads: Vec<[Point; 2]>,
+    heads: Vec<[Pixel; 2]>,
     /// Breaks, each with its reason.
-    breaks: Vec<(Point, Cause)>,
+    breaks: Vec<(Pixel, Cause)>,
 }
 
 /// A label that is placed after all lines are known.
 pub(crate) struct PendingLabel<'a> {
-    command: &'a Command,
+    command: &'a CommandSpan,
     /// The line beside which the text is put.
-    beside: [Point; 2],
-    breaks: Vec<(Point, Cause)>,
+    beside: [Pixel; 2],
+    breaks: Vec<(Pixel, Cause)>,
 }
 
 /// Draws the commands, in the order in which they were sent. Returns the labels that are to be placed.
 pub(crate) fn draw_commands<'a>(picture: &mut Picture, items: &'a Items) -> Vec<PendingLabel<'a>> {
-    let mut commands: Vec<&Command> = items.commands.iter().collect();
+    let mut commands: Vec<&CommandSpan> = items.commands.iter().collect();
     commands.sort_by_key(|command| (command.sent, &command.from, command.seq));
 
     let mut waits = Waits::new();
@@ -64,7 +64,7 @@ pub(crate) fn draw_commands<'a>(picture: &mut Picture, items: &'a Items) -> Vec<
 
 fn draw_command<'a>(
     picture: &mut Picture,
-    command: &'a Command,
+    command: &'a CommandSpan,
     waits: &mut Waits,
 ) -> Option<PendingLabel<'a>> {
     let route = route(picture, command, waits)?;
@@ -113,7 +113,7 @@ fn draw_command<'a>(
 }
 
 fn draw_route(picture: &mut Picture, route: &Route, comes_in: bool) {
-    let mut lines: Vec<(&str, &[Point])> = vec![("line", &route.line), ("wait", &route.wait)];
+    let mut lines: Vec<(&str, &[Pixel])> = vec![("line", &route.line), ("wait", &route.wait)];
     lines.extend(route.branches.iter().map(|branch| ("line", &branch[..])));
     for (class, points) in lines {
         if !points.is_empty() {
@@ -140,7 +140,7 @@ fn draw_route(picture: &mut Picture, route: &Route, comes_in: bool) {
 
 /// Where a command begins and which lane it goes to.
 struct CommandCourse {
-    start: Point,
+    start: Pixel,
     /// The edge of the target's lane, or a place beside that of the sender if the target has none.
     end_y: f64,
     /// 1 if it goes down, -1 if it goes up.
@@ -151,7 +151,7 @@ struct CommandCourse {
 }
 
 /// The course of a command; `None` if its sender has no lane.
-fn course(picture: &Picture, command: &Command) -> Option<CommandCourse> {
+fn course(picture: &Picture, command: &CommandSpan) -> Option<CommandCourse> {
     let sender = picture.lanes.index(&command.from)?;
     let target = picture.lanes.index(&command.to);
     let goes_down = target.is_none_or(|target| target >= sender);
@@ -179,7 +179,7 @@ fn course(picture: &Picture, command: &Command) -> Option<CommandCourse> {
 }
 
 /// The way of a command; `None` if its sender has no lane or it was over before the window.
-fn route(picture: &Picture, command: &Command, waits: &mut Waits) -> Option<Route> {
+fn route(picture: &Picture, command: &CommandSpan, waits: &mut Waits) -> Option<Route> {
     let last_end = command.ends.iter().map(|end| end.tick).max();
     if last_end.is_some_and(|tick| tick < picture.window.from) {
         return None;
@@ -218,7 +218,7 @@ fn route(picture: &Picture, command: &Command, waits: &mut Waits) -> Option<Rout
 fn add_wait(
     route: &mut Route,
     picture: &Picture,
-    command: &Command,
+    command: &CommandSpan,
     course: &CommandCourse,
     over: Tick,
     waits: &mut Waits,
@@ -269,7 +269,7 @@ fn take_slot(waits: &mut Waits, key: (usize, bool), begin_x: f64, end_x: f64) ->
 }
 
 /// Adds what becomes of a command that has come to `turn` and is to arrive at `end`.
-fn add_ends(route: &mut Route, command: &Command, turn: Point, end: Point, down: f64) {
+fn add_ends(route: &mut Route, command: &CommandSpan, turn: Pixel, end: Pixel, down: f64) {
     let is_waiting = !route.wait.is_empty();
     let fork = if command.is_doubled && !is_waiting {
         at_share(turn, end, 0.6)
@@ -335,7 +335,7 @@ fn place_label(picture: &mut Picture, wanted: &PendingLabel<'_>) {
 }
 
 /// Places for a label beside a line.
-fn beside([from, to]: [Point; 2]) -> Vec<LabelPosition> {
+fn beside([from, to]: [Pixel; 2]) -> Vec<LabelPosition> {
     let mut places = Vec::new();
     for distance in [6.0, 14.0] {
         for share in [0.5, 0.35, 0.65, 0.22, 0.78] {
@@ -348,7 +348,7 @@ fn beside([from, to]: [Point; 2]) -> Vec<LabelPosition> {
 }
 
 /// The point that is at this share of a line.
-fn at_share(from: Point, to: Point, share: f64) -> Point {
+fn at_share(from: Pixel, to: Pixel, share: f64) -> Pixel {
     let x = from.0 + share * (to.0 - from.0);
     (x, from.1 + share * (to.1 - from.1))
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use protocol::Tick;
-use timeline::{Cut, Period};
+use timeline::{CutSpan, Period};
 
 use crate::diagram::items::Items;
 use crate::diagram::picture::{LabelPosition, Picture};
@@ -12,7 +12,7 @@ use crate::shapes::LABEL_PX;
 
 /// Draws the cuts.
 pub(crate) fn draw_cuts(picture: &mut Picture, items: &Items) {
-    let mut crossing: Vec<Vec<&Cut>> = vec![Vec::new(); picture.lanes.all.len()];
+    let mut crossing: Vec<Vec<&CutSpan>> = vec![Vec::new(); picture.lanes.all.len()];
     for cut in &items.cuts {
         if let Some(between) = picture.lanes.between(&cut.from, &cut.to) {
             for cuts in &mut crossing[between] {
@@ -26,7 +26,7 @@ pub(crate) fn draw_cuts(picture: &mut Picture, items: &Items) {
 }
 
 /// Draws the cuts of links that cross the space below a lane: an area for each time in which the same ones are cut.
-fn draw_below(picture: &mut Picture, above: usize, cuts: &[&Cut]) {
+fn draw_below(picture: &mut Picture, above: usize, cuts: &[&CutSpan]) {
     let mut changes: BTreeSet<Tick> = BTreeSet::new();
     for cut in cuts {
         let shown = picture.window.clip(cut.period);
@@ -45,7 +45,7 @@ fn draw_below(picture: &mut Picture, above: usize, cuts: &[&Cut]) {
     }
 }
 
-fn draw_area(picture: &mut Picture, above: usize, period: Period, cuts: &[&Cut]) {
+fn draw_area(picture: &mut Picture, above: usize, period: Period, cuts: &[&CutSpan]) {
     let Some((left, width)) = picture.extent(period) else {
         return;
     };

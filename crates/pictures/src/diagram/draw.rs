@@ -9,7 +9,7 @@ use crate::diagram::cuts::draw_cuts;
 use crate::diagram::items::Items;
 use crate::diagram::lanes::Lanes;
 use crate::diagram::legend::draw_legend;
-use crate::diagram::picture::{HEADING_PX, Picture, Window};
+use crate::diagram::picture::{HEADING_PX, Picture, VisibleTicks};
 use crate::diagram::robots::{draw_bands, draw_processes};
 use crate::diagram::time_axis::{Width, draw_axis, draw_grid, scale};
 use crate::labels::{shortened, width_px};
@@ -29,7 +29,7 @@ const NAME_LETTERS: usize = 18;
 
 /// How a diagram is drawn.
 #[derive(Debug, Clone)]
-pub struct Options {
+pub struct DiagramOptions {
     /// Text above the picture; none if it is empty.
     pub title: String,
     /// Whether lost queries are drawn.
@@ -46,7 +46,7 @@ pub struct Options {
     pub tick_px: Option<f64>,
 }
 
-impl Default for Options {
+impl Default for DiagramOptions {
     fn default() -> Self {
         Self {
             title: String::new(),
@@ -64,8 +64,8 @@ impl Default for Options {
 pub(crate) fn draw(
     robots: Vec<RobotName>,
     items: &Items,
-    window: Window,
-    options: &Options,
+    window: VisibleTicks,
+    options: &DiagramOptions,
 ) -> String {
     let heading = heading(window, options);
     let mut picture = begin(robots, items, window, &heading, options);
@@ -92,9 +92,9 @@ pub(crate) fn draw(
 fn begin(
     robots: Vec<RobotName>,
     items: &Items,
-    window: Window,
+    window: VisibleTicks,
     heading: &str,
-    options: &Options,
+    options: &DiagramOptions,
 ) -> Picture {
     let mut commands = items.commands.iter();
     let mut names = Vec::new();
@@ -162,7 +162,7 @@ fn draw_lanes(picture: &mut Picture) {
 }
 
 /// The text above the lanes.
-fn heading(window: Window, options: &Options) -> String {
+fn heading(window: VisibleTicks, options: &DiagramOptions) -> String {
     let ticks = format!("ticks {} to {}", window.from, window.to);
     if options.title.is_empty() {
         return ticks;

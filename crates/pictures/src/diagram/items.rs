@@ -4,12 +4,13 @@ use protocol::Tick;
 use protocol::messages::Awaited;
 
 use timeline::{
-    Absence, Change, Command, Cut, Fault, Joined, Missed, Period, QueriesLost, Span, Stay,
+    Absence, ChangeSpan, CommandSpan, CutSpan, FaultSpan, Joined, MissedTicks, Period, QueriesLost,
+    Span, StateSpan,
 };
 
 /// A tick for which the clock was held.
 #[derive(Debug, Clone)]
-pub(crate) struct HeldUp {
+pub(crate) struct HeldTick {
     pub(crate) tick: Tick,
     pub(crate) awaited: Awaited,
 }
@@ -17,16 +18,16 @@ pub(crate) struct HeldUp {
 /// Everything in a window.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Items {
-    pub(crate) bands: Vec<Stay>,
-    pub(crate) commands: Vec<Command>,
-    pub(crate) cuts: Vec<Cut>,
-    pub(crate) faults: Vec<Fault>,
-    pub(crate) missed: Vec<Missed>,
+    pub(crate) bands: Vec<StateSpan>,
+    pub(crate) commands: Vec<CommandSpan>,
+    pub(crate) cuts: Vec<CutSpan>,
+    pub(crate) faults: Vec<FaultSpan>,
+    pub(crate) missed: Vec<MissedTicks>,
     pub(crate) absences: Vec<Absence>,
     pub(crate) joined: Vec<Joined>,
     pub(crate) queries: Vec<QueriesLost>,
-    pub(crate) held_up: Vec<HeldUp>,
-    pub(crate) changes: Vec<Change>,
+    pub(crate) held_up: Vec<HeldTick>,
+    pub(crate) changes: Vec<ChangeSpan>,
 }
 
 impl Items {

@@ -1,10 +1,10 @@
 //! Draws the legend: signs and colors that the window has.
 
 use std::collections::BTreeSet;
-use timeline::{Command, Kind};
+use timeline::{CommandSpan, StateKind};
 
 use crate::diagram::items::Items;
-use crate::diagram::picture::{CAPTION_PX, Picture, Window};
+use crate::diagram::picture::{CAPTION_PX, Picture, VisibleTicks};
 use crate::labels::{in_rows, shortened, width_px};
 use crate::markup::Markup;
 use crate::palette::state_class;
@@ -23,7 +23,7 @@ const SIGN_PX: f64 = 17.0;
 type Draw = fn(&mut Markup, f64, f64);
 
 /// The signs that a window has, with their names.
-fn signs(window: Window, items: &Items) -> Vec<(&'static str, Draw)> {
+fn signs(window: VisibleTicks, items: &Items) -> Vec<(&'static str, Draw)> {
     let commands = &items.commands;
     let mut queries = items.queries.iter();
     let mut missed = items.missed.iter();
@@ -47,7 +47,7 @@ fn signs(window: Window, items: &Items) -> Vec<(&'static str, Draw)> {
             },
         ),
         (
-            commands.iter().any(Command::is_lost),
+            commands.iter().any(CommandSpan::is_lost),
             "lost",
             |svg, x, y| {
                 let end = (x + SIGN_PX - 3.0, y);
@@ -96,12 +96,18 @@ pub(crate) fn draw_legend(picture: &mut Picture, items: &Items) -> f64 {
             (signs[index].1)(svg, x, y - 3.5);
         },
     );
-    let y = draw_colors(picture, items, Kind::Emotion, "emotion", y);
-    draw_colors(picture, items, Kind::Behavior, "behavior", y) - 4.0
+    let y = draw_colors(picture, items, StateKind::Emotion, "emotion", y);
+    draw_colors(picture, items, StateKind::Behavior, "behavior", y) - 4.0
 }
 
 /// Draws the colors of the states of a kind; returns where the next entries are.
-fn draw_colors(picture: &mut Picture, items: &Items, kind: Kind, caption: &str, y: f64) -> f64 {
+fn draw_colors(
+    picture: &mut Picture,
+    items: &Items,
+    kind: StateKind,
+    caption: &str,
+    y: f64,
+) -> f64 {
     let mut found = BTreeSet::new();
     for band in &items.bands {
         if band.kind == kind && picture.window.clip(band.period).is_some() {

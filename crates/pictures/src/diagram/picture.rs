@@ -8,7 +8,7 @@ use crate::diagram::words::Titles;
 use crate::labels::{Area, Labels, width_px};
 use crate::markup::Markup;
 use crate::scale::Scale;
-use crate::shapes::{LABEL_PX, Point};
+use crate::shapes::{LABEL_PX, Pixel};
 
 /// Distance of the captions below the lanes from where the lanes begin, pixels.
 pub(crate) const CAPTION_PX: f64 = 22.0;
@@ -19,7 +19,7 @@ pub(crate) const OUTSIDE_PX: f64 = 10.0;
 
 /// The ticks that are shown.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Window {
+pub(crate) struct VisibleTicks {
     pub(crate) from: Tick,
     /// The last one.
     pub(crate) to: Tick,
@@ -29,7 +29,7 @@ pub(crate) struct Window {
     pub(crate) has_end: bool,
 }
 
-impl Window {
+impl VisibleTicks {
     /// The tick after the last one.
     pub(crate) fn end(&self) -> Tick {
         self.to.saturating_add(1)
@@ -72,13 +72,13 @@ pub(crate) struct Picture {
     pub(crate) labels: Labels,
     /// Labels are drawn after everything else.
     placed: Vec<Label>,
-    pub(crate) window: Window,
+    pub(crate) window: VisibleTicks,
     pub(crate) titles: Titles,
 }
 
 impl Picture {
     /// A picture in which nothing is drawn yet. What is above and below the lanes has at least `least_px`.
-    pub(crate) fn new(lanes: Lanes, scale: Scale, least_px: f64, window: Window) -> Self {
+    pub(crate) fn new(lanes: Lanes, scale: Scale, least_px: f64, window: VisibleTicks) -> Self {
         let (left, right) = (scale.begin_px(), scale.end_px());
         let right_px = right.max(left + least_px);
         let mut labels = Labels::between(left, right_px + OUTSIDE_PX);
@@ -146,7 +146,7 @@ impl Picture {
     }
 
     /// Straight lines through these points.
-    pub(crate) fn line(&mut self, class: &str, points: &[Point]) {
+    pub(crate) fn line(&mut self, class: &str, points: &[Pixel]) {
         self.svg.line(class, points);
     }
 

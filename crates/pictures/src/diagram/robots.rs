@@ -1,7 +1,7 @@
 //! Draws what the robots do: bands of emotions and behaviors, and what becomes of their processes.
 
 use protocol::{RobotName, Tick};
-use timeline::{Kind, Stay};
+use timeline::{StateKind, StateSpan};
 
 use crate::diagram::changes;
 use crate::diagram::items::Items;
@@ -22,14 +22,14 @@ pub(crate) fn draw_bands(picture: &mut Picture, items: &Items) {
     }
 }
 
-fn draw_band(picture: &mut Picture, band: &Stay) {
+fn draw_band(picture: &mut Picture, band: &StateSpan) {
     let Some((lane, left, width)) = picture.on_lane(&band.robot, band.period) else {
         return;
     };
     let emotion_top = lane.top + STRIP_PX;
     let (class, top, height, font, font_px) = match band.kind {
-        Kind::Emotion => ("emotion", emotion_top, EMOTION_PX, "", LABEL_PX),
-        Kind::Behavior => {
+        StateKind::Emotion => ("emotion", emotion_top, EMOTION_PX, "", LABEL_PX),
+        StateKind::Behavior => {
             let top = emotion_top + EMOTION_PX;
             ("behavior", top, BEHAVIOR_PX, "small ", SMALL_PX)
         }

@@ -8,7 +8,7 @@ use crate::diagram::picture::{CAPTION_PX, Picture};
 use crate::diagram::words::seconds;
 use crate::labels::width_px;
 use crate::scale::Scale;
-use crate::shapes::{LABEL_PX, Point};
+use crate::shapes::{LABEL_PX, Pixel};
 
 /// Width of a gap, pixels.
 const GAP_PX: f64 = 44.0;
@@ -149,7 +149,7 @@ fn draw_gaps(picture: &mut Picture) {
     }
 }
 
-fn zigzag(x: f64, top: f64, bottom: f64) -> Vec<Point> {
+fn zigzag(x: f64, top: f64, bottom: f64) -> Vec<Pixel> {
     const TOOTH_PX: f64 = 6.0;
     let teeth = ((bottom - top) / TOOTH_PX) as u32;
     let point = |tooth: u32| {

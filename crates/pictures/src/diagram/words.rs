@@ -5,10 +5,11 @@ use protocol::event::Cause;
 use protocol::messages::FaultKind;
 use protocol::time::time_s;
 use timeline::{
-    Absence, Change, Command, Cut, Fault, Joined, Kind, Missed, Period, QueriesLost, Stay,
+    Absence, ChangeSpan, CommandSpan, CutSpan, FaultSpan, Joined, MissedTicks, Period, QueriesLost,
+    StateKind, StateSpan,
 };
 
-use crate::diagram::items::HeldUp;
+use crate::diagram::items::HeldTick;
 use crate::labels::shortened;
 
 /// Most letters of a text from a robot in a title.
@@ -67,17 +68,17 @@ impl Titles {
         }
     }
 
-    pub(crate) fn band(self, band: &Stay) -> String {
+    pub(crate) fn band(self, band: &StateSpan) -> String {
         let kind = match band.kind {
-            Kind::Emotion => "emotion",
-            Kind::Behavior => "behavior",
+            StateKind::Emotion => "emotion",
+            StateKind::Behavior => "behavior",
         };
         let name = shortened(&band.name, TITLE_LETTERS);
         let period = self.period(band.period);
         format!("{}: {kind} {name}, {period}", band.robot)
     }
 
-    pub(crate) fn command(self, command: &Command) -> String {
+    pub(crate) fn command(self, command: &CommandSpan) -> String {
         let (from, to, seq) = (&command.from, &command.to, command.seq);
         let performative = command.performative;
         let text = shortened(&command.text, TITLE_LETTERS);
@@ -104,7 +105,7 @@ impl Titles {
         title
     }
 
-    pub(crate) fn cuts(self, cuts: &[&Cut]) -> String {
+    pub(crate) fn cuts(self, cuts: &[&CutSpan]) -> String {
         let mut title = "cut:".to_owned();
         for cut in cuts.iter().take(MAX_CUTS) {
             let what = match (cut.commands, cut.queries) {
@@ -121,7 +122,7 @@ impl Titles {
         title
     }
 
-    pub(crate) fn fault(self, fault: &Fault) -> String {
+    pub(crate) fn fault(self, fault: &FaultSpan) -> String {
         let what = match fault.kind {
             FaultKind::Crash => "the process is killed, and started again at the end",
             FaultKind::Hang => "the process is stopped",
@@ -132,7 +133,7 @@ impl Titles {
         format!("{}: {name}: {what}; {period}", fault.robot)
     }
 
-    pub(crate) fn missed(self, missed: &Missed) -> String {
+    pub(crate) fn missed(self, missed: &MissedTicks) -> String {
         let begin = missed.period.begin;
         let last = begin + missed.period.ticks(begin + 1) - 1;
         let (robot, first) = (&missed.robot, self.tick(begin));
@@ -165,11 +166,11 @@ impl Titles {
         format!("{from} cannot query {to}, {because}: {ticks} ticks from {tick} on")
     }
 
-    pub(crate) fn change(self, change: &Change) -> String {
+    pub(crate) fn change(self, change: &ChangeSpan) -> String {
         format!("{}: from now on {}", self.tick(change.tick), change.set)
     }
 
-    pub(crate) fn held_up(self, held: &HeldUp) -> String {
+    pub(crate) fn held_up(self, held: &HeldTick) -> String {
         let awaited = &held.awaited;
         format!(
             "{}: the clock was held for {:.1} s of wall clock, because {} {}. Wall clock differs from run to run.",

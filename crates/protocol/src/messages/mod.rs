@@ -29,7 +29,7 @@ pub use point::Point;
 pub use state::{Answer, PublicState};
 pub use step::{
     Clock, Command, CommandText, Correction, Delivery, End, JoinAnswer, JoinRequest, NEWS_FLAGS,
-    News, Parameters, ParametersAnswer, ParametersOffer, Refusal, Report, SensedBody, SensedKind,
-    SensedRobot, Waiting, Welcome,
+    Parameters, ParametersAnswer, ParametersOffer, Refusal, Report, SensedBody, SensedKind,
+    SensedRobot, TickUpdate, Waiting, Welcome,
 };
 pub use variables::{StateVariables, Variable};

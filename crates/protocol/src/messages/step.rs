@@ -25,7 +25,7 @@ pub struct JoinRequest {
     pub name: RobotName,
     /// Identity of this process among all that ever claim the name; any text that no other process has.
     pub instance: String,
-    /// Whether its news list the bodies around it ([`News::bodies`]).
+    /// Whether its news list the bodies around it ([`TickUpdate::bodies`]).
     #[serde(default, skip_serializing_if = "is_false")]
     pub bodies: bool,
     /// Language and version of what it is written with, for people.
@@ -187,7 +187,7 @@ pub struct Clock {
     pub epoch: Epoch,
     /// Tick that is granted.
     pub tick: Tick,
-    /// Flags of the robots that have [`News`] of this tick. A robot whose flag is set waits for its news before it acts; a
+    /// Flags of the robots that have [`TickUpdate`] of this tick. A robot whose flag is set waits for its news before it acts; a
     /// robot whose flag is not set has none. Robots may share a flag, and then all of them get news.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub news: u32,
@@ -218,7 +218,7 @@ pub enum End {
 
 /// What is new for one robot in a tick. It is put before the clock of the tick, on the same session.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
-pub struct News {
+pub struct TickUpdate {
     /// Epoch of the clock that it belongs to.
     pub epoch: Epoch,
     /// Tick of the clock that it belongs to.
@@ -248,7 +248,7 @@ pub struct News {
     pub bodies: Vec<SensedBody>,
 }
 
-impl News {
+impl TickUpdate {
     /// Whether there is nothing to send.
     #[must_use]
     pub fn is_empty(&self) -> bool {
@@ -274,7 +274,7 @@ impl News {
     }
 }
 
-impl Message for News {
+impl Message for TickUpdate {
     as_json!();
 
     fn check(&self) -> Result<(), FieldError> {

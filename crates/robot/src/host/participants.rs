@@ -6,17 +6,19 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use bus::{Inbox, WorkerThread};
-use lockstep::{Action, Answer, NoState, Participant, RobotTimer, StateQuery, Timeouts};
+use lockstep::{
+    NoState, Participant, ParticipantOutput, RobotTimer, StateQuery, TickAnswer, Timeouts,
+};
 use protocol::RobotName;
-use protocol::messages::{CommandText, News, PublicState};
+use protocol::messages::{CommandText, PublicState, TickUpdate};
 
 /// A report as it is put, so that a repetition is the same to the byte.
 type Encoded = Arc<[u8]>;
-type HostParticipant = Participant<News, Arc<PublicState>, CommandText, Encoded>;
+type HostParticipant = Participant<TickUpdate, Arc<PublicState>, CommandText, Encoded>;
 /// What a participant of a host wants done.
-pub(super) type HostAction = Action<News, Arc<PublicState>, CommandText, Encoded>;
+pub(super) type HostAction = ParticipantOutput<TickUpdate, Arc<PublicState>, CommandText, Encoded>;
 /// What came of a tick.
-pub(super) type HostAnswer = Answer<Arc<PublicState>, CommandText, Encoded>;
+pub(super) type HostAnswer = TickAnswer<Arc<PublicState>, CommandText, Encoded>;
 /// What the participants want done, in the order in which they wanted it.
 pub(super) type Actions = Inbox<(RobotName, HostAction)>;
 
@@ -54,8 +56,8 @@ impl Allowance {
             return true;
         };
         match action {
-            Action::Run(_) => true,
-            Action::Put(answer) => {
+            ParticipantOutput::Run(_) => true,
+            ParticipantOutput::Put(answer) => {
                 let rest = left.checked_sub(size_of(answer));
                 *left = rest.unwrap_or(*left);
                 rest.is_some()
@@ -270,7 +272,7 @@ impl Inner {
     /// Queues actions under the lock under which the participant wanted them: so they are carried out in that order.
     fn file(&mut self, name: &RobotName, actions: Vec<HostAction>) {
         for action in actions {
-            let Action::SetTimer(timer, after) = action else {
+            let ParticipantOutput::SetTimer(timer, after) = action else {
                 self.actions.push((name.clone(), action));
                 continue;
             };
@@ -304,7 +306,7 @@ impl Inner {
             "the simulator is there and has not admitted {name} for {waited_s} s: it is under load, or its access \
              control does not know {name}"
         );
-        let again = Action::SetTimer(RobotTimer::JoinPatience, self.join_patience);
+        let again = ParticipantOutput::SetTimer(RobotTimer::JoinPatience, self.join_patience);
         self.file(name, vec![again]);
         true
     }

@@ -5,7 +5,7 @@ use affect::akr::{Agency, Appraisal};
 use robot::Cars;
 
 use super::Butler;
-use super::tables::Behavior;
+use super::tables::ButlerBehavior;
 
 impl Butler {
     /// His judgment of this moment.
@@ -23,11 +23,12 @@ impl Butler {
             self.pressure()
         };
 
-        let may_intercept = behavior != Behavior::Intercept && self.context(cars).may_intercept();
+        let may_intercept =
+            behavior != ButlerBehavior::Intercept && self.context(cars).may_intercept();
         let open = [!state.called, !state.hurried, may_intercept];
         let count = open.iter().filter(|is_open| **is_open).count();
 
-        let is_let_down = state.need && state.called && behavior != Behavior::Exchange;
+        let is_let_down = state.need && state.called && behavior != ButlerBehavior::Exchange;
         let is_happy = self.feeling().emotion == StandardEmotion::Happy;
         let agency = if is_let_down && !is_happy {
             Agency::Other(self.parameters.refiller.clone())

@@ -8,7 +8,7 @@
 use std::collections::BTreeSet;
 
 use affect::akr::{ActionTendency, Affect, Personality, Preference, Valence};
-use affect::levels::{Candidate, Conceptual, ConceptualParameters, Memory, Outcome};
+use affect::levels::{ActionOutcome, Candidate, Conceptual, ConceptualParameters, Memory};
 use affect::progress::{need_ratio, time_to_empty_s};
 use affect::{Belief, Caution, Feeling, StandardEmotion, Urgency};
 use serde::{Deserialize, Serialize};
@@ -290,8 +290,8 @@ impl Deliberator {
         })
     }
 
-    fn outcome(&self, probability: f64, anticipated: Affect) -> Outcome {
-        Outcome {
+    fn outcome(&self, probability: f64, anticipated: Affect) -> ActionOutcome {
+        ActionOutcome {
             probability,
             after_s: self.parameters.plan_s,
             anticipated,
@@ -332,7 +332,7 @@ impl Deliberator {
 fn candidate(
     plan: FrustratedPlan,
     tendency: Option<ActionTendency>,
-    outcomes: Vec<Outcome>,
+    outcomes: Vec<ActionOutcome>,
 ) -> Candidate<FrustratedPlan> {
     match Candidate::new(plan, tendency, outcomes) {
         Ok(candidate) => candidate,

@@ -10,7 +10,7 @@ mod tables;
 use affect::behavior::{BehaviorGenerator, BehaviorState};
 use affect::progress::{need_ratio, time_to_arrive_by_depot_s, time_to_arrive_s, time_to_empty_s};
 use affect::{
-    Circumstances, DynamicGenerator, Dynamics, EmotionState, Feeling, Frame, StandardEmotion,
+    AffectFrame, Circumstances, DynamicGenerator, Dynamics, EmotionState, Feeling, StandardEmotion,
     Urgency,
 };
 use robot::{
@@ -20,13 +20,13 @@ use robot::{
 use serde::{Deserialize, Serialize};
 
 pub use deliberation::Deliberation;
-pub use parameters::{Approach, Parameters, Rate};
-pub use tables::{Act, Behavior, Context, Measures, TABLE, appraise};
+pub use parameters::{Approach, ButlerParameters, Rate};
+pub use tables::{ButlerAct, ButlerBehavior, ButlerContext, ButlerMeasures, TABLE, appraise};
 
 use crate::closing::Closing;
 use crate::commands::{GO_HOME, HURRY, REFILL, shortened};
-use crate::drive::Course;
-use crate::emotion::Emotion;
+use crate::drive::StraightDrive;
+use crate::emotion::SwitchableGenerator;
 use crate::frame::{self, publish};
 use crate::panel;
 use crate::policy::{Policy, Urge};
@@ -43,9 +43,9 @@ const JOKES: &[&str] = &[
 
 /// The waiter.
 pub struct Butler {
-    parameters: Parameters,
-    emotion: Emotion<DynamicGenerator<Measures, Behavior, StandardEmotion>>,
-    bsg: BehaviorGenerator<Behavior, Context, Act>,
+    parameters: ButlerParameters,
+    emotion: SwitchableGenerator<DynamicGenerator<ButlerMeasures, ButlerBehavior, StandardEmotion>>,
+    bsg: BehaviorGenerator<ButlerBehavior, ButlerContext, ButlerAct>,
     deliberator: Deliberator,
     state: ButlerMemory,
 }
@@ -53,16 +53,16 @@ pub struct Butler {
 /// Everything that changes in Butler: restored from it, he continues identically.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Saved {
+pub struct ButlerState {
     state: ButlerMemory,
     emotion: EmotionState<StandardEmotion>,
-    behavior: BehaviorState<Behavior>,
+    behavior: BehaviorState<ButlerBehavior>,
 }
 
 impl Default for Butler {
     /// A Butler with the default parameters; [`Robot::init`] replaces them with those of the scenario.
     fn default() -> Self {
-        match Self::new(Parameters::default()) {
+        match Self::new(ButlerParameters::default()) {
             Ok(butler) => butler,
             Err(reason) => {
                 unreachable!("the default parameters, which a test checks, are refused: {reason}")
@@ -114,11 +114,11 @@ impl Robot for Butler {
         self.state.take_over(last, self.parameters.treat_capacity);
 
         // An exchange cannot be resumed in the middle; its need is still there, and the refiller may still be near.
-        let was_going_back = text(last, "behavior") == Some(Behavior::GoBack.name());
+        let was_going_back = text(last, "behavior") == Some(ButlerBehavior::GoBack.name());
         let behavior = if was_going_back {
-            Behavior::GoBack
+            ButlerBehavior::GoBack
         } else {
-            Behavior::Serve
+            ButlerBehavior::Serve
         };
         self.bsg = BehaviorGenerator::new(TABLE, behavior);
         cars.log("is back, and takes over where the last one was lost");
@@ -160,7 +160,7 @@ impl Butler {
     ///
     /// # Errors
     /// What is wrong with the parameters.
-    pub fn new(parameters: Parameters) -> Result<Self, String> {
+    pub fn new(parameters: ButlerParameters) -> Result<Self, String> {
         parameters.check()?;
 
         let state = ButlerMemory::new(&parameters).map_err(|error| error.to_string())?;
@@ -175,8 +175,8 @@ impl Butler {
         let esg = DynamicGenerator::new(dynamics, appraise);
 
         Ok(Self {
-            emotion: Emotion::new(parameters.affect, parameters.script.clone(), esg),
-            bsg: BehaviorGenerator::new(TABLE, Behavior::Serve),
+            emotion: SwitchableGenerator::new(parameters.affect, parameters.script.clone(), esg),
+            bsg: BehaviorGenerator::new(TABLE, ButlerBehavior::Serve),
             deliberator,
             state,
             parameters,
@@ -191,20 +191,20 @@ impl Butler {
 
     /// What he feels and why, as he publishes it; `None` without emotions.
     #[must_use]
-    pub fn frame(&self) -> Option<Frame<'static>> {
+    pub fn frame(&self) -> Option<AffectFrame<'static>> {
         frame::of(self.emotion.shown(), &self.state.appraisal)
     }
 
     /// His behavior.
     #[must_use]
-    pub fn behavior(&self) -> Behavior {
+    pub fn behavior(&self) -> ButlerBehavior {
         *self.bsg.current()
     }
 
     /// Everything that changes in him.
     #[must_use]
-    pub fn save(&self) -> Saved {
-        Saved {
+    pub fn save(&self) -> ButlerState {
+        ButlerState {
             state: self.state.clone(),
             emotion: self.emotion.save(),
             behavior: self.bsg.state().clone(),
@@ -215,7 +215,7 @@ impl Butler {
     ///
     /// # Errors
     /// A Butler of these parameters cannot have the saved emotion.
-    pub fn restore(&mut self, saved: Saved) -> Result<(), String> {
+    pub fn restore(&mut self, saved: ButlerState) -> Result<(), String> {
         self.emotion.restore(saved.emotion)?;
         self.bsg.restore(saved.behavior);
         self.state = saved.state;
@@ -306,7 +306,7 @@ impl Butler {
 
     /// Notes what the refiller does, by her answer, or by the one before if there is none.
     fn note_answer(&mut self, answer: Option<&PublicState>) {
-        let is_exchanging = self.behavior() == Behavior::Exchange;
+        let is_exchanging = self.behavior() == ButlerBehavior::Exchange;
         let state = &mut self.state;
         let behavior = state.refiller.behavior(self.parameters.query_stale_s);
         let is_coming = behavior == Some("REFILL");
@@ -329,7 +329,7 @@ impl Butler {
 
     /// Watches whether the refiller comes nearer by herself while he needs her, and whether he does while he intercepts.
     fn watch_progress(&mut self, distance_m: Option<f64>, tick_s: f64) {
-        let is_intercepting = self.behavior() == Behavior::Intercept;
+        let is_intercepting = self.behavior() == ButlerBehavior::Intercept;
         let progress_m = self.parameters.progress_m;
         let state = &mut self.state;
 
@@ -355,10 +355,10 @@ impl Butler {
         // A refiller who has come no nearer for a while is expected to take at least as long again [I].
         let stalled_s = self.state.errand.stalled_s();
         let time_to_refill_s = self.time_to_refill_s(cars).max(stalled_s);
-        let exchange_is_over = self.behavior() == Behavior::Exchange
+        let exchange_is_over = self.behavior() == ButlerBehavior::Exchange
             && self.bsg.has_lasted(self.parameters.exchange_s);
 
-        self.state.measures = Measures {
+        self.state.measures = ButlerMeasures {
             rate_per_s,
             time_to_empty_s,
             time_to_refill_s,
@@ -468,7 +468,7 @@ impl Butler {
             .or(self.state.refiller.first_location())
     }
 
-    fn context(&self, cars: &Cars<'_>) -> Context {
+    fn context(&self, cars: &Cars<'_>) -> ButlerContext {
         let state = &self.state;
         let parameters = &self.parameters;
         let stale_s = parameters.query_stale_s;
@@ -480,7 +480,7 @@ impl Butler {
         let is_here = state.refiller.is_within(parameters.exchange_radius_m, cars);
         let repeats_call = self.is_due(state.since_call_s) && state.need;
 
-        Context {
+        ButlerContext {
             urge: self.urge(),
             is_happy: parameters.schematic.is_on() && self.emotion.is_happy(),
             need: state.need,
@@ -545,32 +545,32 @@ impl Butler {
         Urgency::saturating(gain * need / dynamics.rho_max).value()
     }
 
-    fn perform(&mut self, act: Act, cars: &mut Cars<'_>) {
+    fn perform(&mut self, act: ButlerAct, cars: &mut Cars<'_>) {
         let state = &mut self.state;
         match act {
-            Act::RaiseNeed => state.raise_need(),
-            Act::CallRefill => {
+            ButlerAct::RaiseNeed => state.raise_need(),
+            ButlerAct::CallRefill => {
                 state.called = true;
                 state.since_call_s = 0.0;
                 self.send_to_refiller(REFILL, cars);
             }
-            Act::CallHurry => {
+            ButlerAct::CallHurry => {
                 state.called = true;
                 state.hurried = true;
                 state.since_call_s = 0.0;
                 self.send_to_refiller(HURRY, cars);
             }
-            Act::SendHome => {
+            ButlerAct::SendHome => {
                 state.since_go_home_s = 0.0;
                 self.send_to_refiller(GO_HOME, cars);
             }
-            Act::Replenish => state.replenish(self.parameters.treat_capacity),
-            Act::GiveUp => {
+            ButlerAct::Replenish => state.replenish(self.parameters.treat_capacity),
+            ButlerAct::GiveUp => {
                 state.gave_up = state.gave_up.saturating_add(1);
                 state.rest_s = self.parameters.intercept_again_s;
                 state.mind.abandon();
             }
-            Act::Joke => {
+            ButlerAct::Joke => {
                 state.jokes.tell(JOKES, self.parameters.joke_mean_s, cars);
             }
         }
@@ -587,18 +587,20 @@ impl Butler {
     /// The motion that his behavior wants.
     fn drive(&mut self, cars: &mut Cars<'_>) -> Action {
         match self.behavior() {
-            Behavior::Serve if self.state.mind.plan() == Some(FrustratedPlan::WaitAtStart) => {
+            ButlerBehavior::Serve
+                if self.state.mind.plan() == Some(FrustratedPlan::WaitAtStart) =>
+            {
                 self.go_to_start(cars, self.parameters.v_serve_mps)
             }
-            Behavior::Serve => self.wander(cars, self.parameters.v_serve_mps),
-            Behavior::Intercept => self.intercept(cars),
-            Behavior::Exchange => self.state.drive.stay(cars),
-            Behavior::GoBack => self.go_to_start(cars, self.parameters.v_goback_mps),
+            ButlerBehavior::Serve => self.wander(cars, self.parameters.v_serve_mps),
+            ButlerBehavior::Intercept => self.intercept(cars),
+            ButlerBehavior::Exchange => self.state.drive.stay(cars),
+            ButlerBehavior::GoBack => self.go_to_start(cars, self.parameters.v_goback_mps),
         }
     }
 
     fn go_to_start(&mut self, cars: &mut Cars<'_>, speed_mps: f64) -> Action {
-        let course = Course {
+        let course = StraightDrive {
             goal: self.state.start,
             stop_m: 0.0,
             speed_mps,
@@ -621,7 +623,7 @@ impl Butler {
             return self.wander(cars, parameters.v_intercept_mps);
         };
 
-        let course = Course {
+        let course = StraightDrive {
             goal,
             stop_m: parameters.stand_off_m,
             speed_mps: parameters.v_intercept_mps,

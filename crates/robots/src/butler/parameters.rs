@@ -5,7 +5,7 @@ use affect::{Caution, DynamicsParameters};
 use serde::{Deserialize, Serialize};
 
 use super::deliberation::Deliberation;
-use super::tables::Behavior;
+use super::tables::ButlerBehavior;
 use crate::bounds::{not_negative, positive};
 use crate::drive::LOOK_S;
 use crate::policy::Policy;
@@ -17,7 +17,7 @@ use crate::units::FT_M;
 /// experiment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Parameters {
+pub struct ButlerParameters {
     /// The robot he calls. Default "Leguin" \[D\].
     pub refiller: String,
     /// The name of what he offers, for his panel. Default "treats" \[D\]; at the second venue pencils and leaflets.
@@ -46,7 +46,7 @@ pub struct Parameters {
     pub treat_mean_s: f64,
     /// Behaviors in which guests take treats. Default SERVE and GO_BACK \[D: the paper; that he stops serving to intercept:
     /// Murphy et al. 2002, abstract\].
-    pub consume_in: Vec<Behavior>,
+    pub consume_in: Vec<ButlerBehavior>,
     /// Distance within which an exchange is possible, m. Default 4 ft \[D\].
     pub exchange_radius_m: f64,
     /// Duration of an exchange, s. Default 2 \[I\].
@@ -136,7 +136,7 @@ impl Default for Approach {
     }
 }
 
-impl Default for Parameters {
+impl Default for ButlerParameters {
     fn default() -> Self {
         Self {
             refiller: "Leguin".to_owned(),
@@ -151,7 +151,7 @@ impl Default for Parameters {
             caution: Caution::default(),
             treat_capacity: 30,
             treat_mean_s: 1.0,
-            consume_in: vec![Behavior::Serve, Behavior::GoBack],
+            consume_in: vec![ButlerBehavior::Serve, ButlerBehavior::GoBack],
             exchange_radius_m: 4.0 * FT_M,
             exchange_s: 2.0,
             v_serve_mps: FT_M,
@@ -180,7 +180,7 @@ impl Default for Parameters {
     }
 }
 
-impl Parameters {
+impl ButlerParameters {
     /// Checks the values, except those of estimators and dynamics, which are checked where they are used.
     ///
     /// # Errors

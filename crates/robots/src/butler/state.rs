@@ -9,8 +9,8 @@ use robot::{Cars, Point, StateVariables};
 use serde::{Deserialize, Serialize};
 
 use super::deliberation::Mind;
-use super::parameters::Parameters;
-use super::tables::{Behavior, Measures};
+use super::parameters::ButlerParameters;
+use super::tables::{ButlerBehavior, ButlerMeasures};
 use crate::chance::Chance;
 use crate::closing::Closing;
 use crate::drive::Drive;
@@ -62,7 +62,7 @@ pub(super) struct ButlerMemory {
     pub(super) refiller_came: bool,
     /// Whether the refiller has an errand that she has not begun yet, by her last answer.
     pub(super) refiller_is_called: bool,
-    pub(super) measures: Measures,
+    pub(super) measures: ButlerMeasures,
     pub(super) taps: Chance,
     pub(super) turns: Chance,
     pub(super) jokes: Jokes,
@@ -73,7 +73,7 @@ pub(super) struct ButlerMemory {
 }
 
 impl ButlerMemory {
-    pub(super) fn new(parameters: &Parameters) -> Result<Self, ParameterError> {
+    pub(super) fn new(parameters: &ButlerParameters) -> Result<Self, ParameterError> {
         Ok(Self {
             start: Point::default(),
             table: None,
@@ -102,7 +102,7 @@ impl ButlerMemory {
             refiller_left: false,
             refiller_came: false,
             refiller_is_called: false,
-            measures: Measures::default(),
+            measures: ButlerMeasures::default(),
             taps: Chance::new(0),
             turns: Chance::new(1),
             jokes: Jokes::new(Chance::new(2), parameters.joke_mean_s),
@@ -113,7 +113,7 @@ impl ButlerMemory {
     }
 
     /// Sets what depends on the run: his start, and his random streams.
-    pub(super) fn begin(&mut self, parameters: &Parameters, cars: &mut Cars<'_>) {
+    pub(super) fn begin(&mut self, parameters: &ButlerParameters, cars: &mut Cars<'_>) {
         self.start = cars.welcome().location;
 
         self.taps = Chance::split(cars.random());
@@ -171,7 +171,7 @@ impl ButlerMemory {
     }
 
     /// The state variables: what other robots may query, and what a later incarnation needs.
-    pub(super) fn published(&self, behavior: Behavior) -> StateVariables {
+    pub(super) fn published(&self, behavior: ButlerBehavior) -> StateVariables {
         let mut variables: StateVariables = [
             ("treats", self.treats.into()),
             ("rate_per_s", self.measures.rate_per_s.into()),

@@ -8,7 +8,7 @@ use affect::behavior::{
     Row,
     Then::{Go, Stay},
 };
-use affect::{Belief, Drive, ProgressEvent, Stimulus};
+use affect::{Belief, ProgressEvent, StepInput, Stimulus};
 use serde::{Deserialize, Serialize};
 
 use crate::policy::Urge;
@@ -16,7 +16,7 @@ use crate::policy::Urge;
 /// Butler's behaviors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "SCREAMING_SNAKE_CASE")]
-pub enum Behavior {
+pub enum ButlerBehavior {
     /// Wanders around and offers treats \[D\].
     Serve,
     /// Drives straight to the refiller \[D\].
@@ -27,9 +27,9 @@ pub enum Behavior {
     GoBack,
 }
 
-use Behavior::{Exchange, GoBack, Intercept, Serve};
+use ButlerBehavior::{Exchange, GoBack, Intercept, Serve};
 
-impl Behavior {
+impl ButlerBehavior {
     /// Every behavior.
     pub const ALL: [Self; 4] = [Serve, Intercept, Exchange, GoBack];
 
@@ -47,7 +47,7 @@ impl Behavior {
 
 /// What a row of the behavior table makes Butler do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Act {
+pub enum ButlerAct {
     /// Publishes that he needs the refiller.
     RaiseNeed,
     /// Sends "refill".
@@ -66,7 +66,7 @@ pub enum Act {
 
 /// What the guard of a row sees.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Context {
+pub struct ButlerContext {
     /// How far he goes to be refilled.
     pub urge: Urge,
     /// Whether he is HAPPY.
@@ -101,7 +101,7 @@ pub struct Context {
     pub has_joke: bool,
 }
 
-impl Context {
+impl ButlerContext {
     /// Whether there is a point in driving to the refiller.
     pub(super) fn may_intercept(&self) -> bool {
         !self.refiller_is_busy && !self.rests && (self.intercept_any || self.refiller_comes)
@@ -109,32 +109,32 @@ impl Context {
 }
 
 /// The behaviors in which he can call and meet the refiller.
-const AFOOT: &[Behavior] = &[Serve, Intercept, GoBack];
+const AFOOT: &[ButlerBehavior] = &[Serve, Intercept, GoBack];
 
 /// The behavior state generator: the waiter's column of the paper's Table 2 and its experiment section as rows.
 #[rustfmt::skip]
-pub const TABLE: &[Row<Behavior, Context, Act>] = &[
-    Row { from: AFOOT, when: |c| c.urge >= Urge::Call && !c.need, act: &[Act::RaiseNeed], then: Stay },
+pub const TABLE: &[Row<ButlerBehavior, ButlerContext, ButlerAct>] = &[
+    Row { from: AFOOT, when: |c| c.urge >= Urge::Call && !c.need, act: &[ButlerAct::RaiseNeed], then: Stay },
     Row { from: AFOOT, when: |c| c.need && c.refiller_is_ready_here, act: &[], then: Go(Exchange) },
     // "hurry" calls as well: an emotion that has no CONFIDENT below it (akr4) begins with it.
-    Row { from: AFOOT, when: |c| c.urge == Urge::Call && !c.called, act: &[Act::CallRefill], then: Stay },
-    Row { from: AFOOT, when: |c| c.urge >= Urge::Hurry && !c.hurried, act: &[Act::CallHurry], then: Stay },
-    Row { from: AFOOT, when: |c| c.repeats_call && c.urge >= Urge::Hurry, act: &[Act::CallHurry], then: Stay },
-    Row { from: AFOOT, when: |c| c.repeats_call && c.urge < Urge::Hurry, act: &[Act::CallRefill], then: Stay },
-    Row { from: AFOOT, when: |c| c.repeats_go_home, act: &[Act::SendHome], then: Stay },
+    Row { from: AFOOT, when: |c| c.urge == Urge::Call && !c.called, act: &[ButlerAct::CallRefill], then: Stay },
+    Row { from: AFOOT, when: |c| c.urge >= Urge::Hurry && !c.hurried, act: &[ButlerAct::CallHurry], then: Stay },
+    Row { from: AFOOT, when: |c| c.repeats_call && c.urge >= Urge::Hurry, act: &[ButlerAct::CallHurry], then: Stay },
+    Row { from: AFOOT, when: |c| c.repeats_call && c.urge < Urge::Hurry, act: &[ButlerAct::CallRefill], then: Stay },
+    Row { from: AFOOT, when: |c| c.repeats_go_home, act: &[ButlerAct::SendHome], then: Stay },
     Row { from: &[Serve], when: |c| c.urge >= Urge::Intercept && c.may_intercept(), act: &[], then: Go(Intercept) },
-    Row { from: &[Serve], when: |c| c.is_happy && c.has_joke, act: &[Act::Joke], then: Stay },
+    Row { from: &[Serve], when: |c| c.is_happy && c.has_joke, act: &[ButlerAct::Joke], then: Stay },
     // He serves again when what made him leave has ended [D], when she has to go home first, or when he comes no nearer [I].
     Row { from: &[Intercept], when: |c| c.urge < Urge::Intercept || c.refiller_is_busy, act: &[], then: Go(Serve) },
-    Row { from: &[Intercept], when: |c| c.is_stuck, act: &[Act::GiveUp], then: Go(Serve) },
-    Row { from: &[Exchange], when: |c| c.exchange_is_over, act: &[Act::Replenish, Act::SendHome], then: Go(GoBack) },
+    Row { from: &[Intercept], when: |c| c.is_stuck, act: &[ButlerAct::GiveUp], then: Go(Serve) },
+    Row { from: &[Exchange], when: |c| c.exchange_is_over, act: &[ButlerAct::Replenish, ButlerAct::SendHome], then: Go(GoBack) },
     Row { from: &[GoBack], when: |c| c.is_at_start, act: &[], then: Go(Serve) },
 ];
 
 /// The progress measures, in SI units.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Measures {
+pub struct ButlerMeasures {
     /// Estimated rate at which treats are taken, 1/s.
     pub rate_per_s: f64,
     /// Time until the tray is empty, s.
@@ -151,11 +151,11 @@ pub struct Measures {
 
 /// Appraises the measures for the emotion state generator. While an exchange is under way what he feels stays: nothing is
 /// achieved yet. That it is completed is the most important positive input, which leads from FRUSTRATED to HAPPY \[D\].
-pub fn appraise(measures: &Measures, behavior: &Behavior) -> Stimulus {
+pub fn appraise(measures: &ButlerMeasures, behavior: &ButlerBehavior) -> Stimulus {
     let drive = if *behavior == Exchange {
-        Drive::Hold
+        StepInput::Hold
     } else {
-        Drive::Need(measures.need_ratio)
+        StepInput::Need(measures.need_ratio)
     };
     let event = measures
         .exchange_is_over

@@ -9,20 +9,22 @@ mod tables;
 use affect::akr::Agency;
 use affect::behavior::{BehaviorGenerator, BehaviorState};
 use affect::levels::{SensoryMotor, SensoryMotorParameters};
-use affect::{Circumstances, Feeling, Frame, RuleGenerator, StandardEmotion};
+use affect::{AffectFrame, Circumstances, Feeling, RuleGenerator, StandardEmotion};
 use robot::{
     Action, BadParameters, Cars, Panel, ParametersCheck, Point, ReceivedCommand, Robot,
     StateVariables, Widget, read_parameters,
 };
 use serde::{Deserialize, Serialize};
 
-pub use parameters::{Feelings, Parameters};
-pub use tables::{Act, Behavior, Context, EMOTIONS, Errand, Measures, TABLE, urgency};
+pub use parameters::{Feelings, LeguinParameters};
+pub use tables::{
+    EMOTIONS, Errand, LeguinAct, LeguinBehavior, LeguinContext, LeguinMeasures, TABLE, urgency,
+};
 
 use crate::closing::Closing;
 use crate::commands::{GO_HOME, HURRY, REFILL, shortened};
-use crate::drive::Course;
-use crate::emotion::Emotion;
+use crate::drive::StraightDrive;
+use crate::emotion::SwitchableGenerator;
 use crate::frame::{self, publish};
 use crate::panel;
 use crate::policy::Policy;
@@ -38,9 +40,9 @@ const JOKES: &[&str] = &[
 
 /// The refiller.
 pub struct Leguin {
-    parameters: Parameters,
-    emotion: Emotion<RuleGenerator<Measures, Behavior, StandardEmotion>>,
-    bsg: BehaviorGenerator<Behavior, Context, Act>,
+    parameters: LeguinParameters,
+    emotion: SwitchableGenerator<RuleGenerator<LeguinMeasures, LeguinBehavior, StandardEmotion>>,
+    bsg: BehaviorGenerator<LeguinBehavior, LeguinContext, LeguinAct>,
     haste: SensoryMotor,
     state: LeguinMemory,
 }
@@ -48,16 +50,16 @@ pub struct Leguin {
 /// Everything that changes in Leguin: restored from it, she continues identically.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Saved {
+pub struct LeguinState {
     state: LeguinMemory,
     feeling: Feeling<StandardEmotion>,
-    behavior: BehaviorState<Behavior>,
+    behavior: BehaviorState<LeguinBehavior>,
 }
 
 impl Default for Leguin {
     /// A Leguin with the default parameters; [`Robot::init`] replaces them with those of the scenario.
     fn default() -> Self {
-        match Self::new(Parameters::default()) {
+        match Self::new(LeguinParameters::default()) {
             Ok(leguin) => leguin,
             Err(reason) => {
                 unreachable!("the default parameters, which a test checks, are refused: {reason}")
@@ -101,10 +103,10 @@ impl Robot for Leguin {
         self.state.take_over(last);
 
         let name = text(last, "behavior");
-        let behavior = Behavior::ALL
+        let behavior = LeguinBehavior::ALL
             .into_iter()
             .find(|behavior| Some(behavior.name()) == name);
-        self.bsg = BehaviorGenerator::new(TABLE, behavior.unwrap_or(Behavior::GoHome));
+        self.bsg = BehaviorGenerator::new(TABLE, behavior.unwrap_or(LeguinBehavior::GoHome));
         cars.log("is back, and takes over where the last one was lost");
     }
 
@@ -137,7 +139,7 @@ impl Leguin {
     ///
     /// # Errors
     /// What is wrong with the parameters.
-    pub fn new(parameters: Parameters) -> Result<Self, String> {
+    pub fn new(parameters: LeguinParameters) -> Result<Self, String> {
         parameters.check()?;
         let esg = RuleGenerator::new(EMOTIONS, urgency, StandardEmotion::Happy);
 
@@ -151,8 +153,8 @@ impl Leguin {
         .map_err(|error| error.to_string())?;
 
         Ok(Self {
-            emotion: Emotion::new(parameters.affect, parameters.script.clone(), esg),
-            bsg: BehaviorGenerator::new(TABLE, Behavior::Wait),
+            emotion: SwitchableGenerator::new(parameters.affect, parameters.script.clone(), esg),
+            bsg: BehaviorGenerator::new(TABLE, LeguinBehavior::Wait),
             haste,
             state: LeguinMemory::new(&parameters),
             parameters,
@@ -167,20 +169,20 @@ impl Leguin {
 
     /// What she feels and why, as she publishes it; `None` without emotions.
     #[must_use]
-    pub fn frame(&self) -> Option<Frame<'static>> {
+    pub fn frame(&self) -> Option<AffectFrame<'static>> {
         frame::of(self.emotion.shown(), &self.state.appraisal)
     }
 
     /// Her behavior.
     #[must_use]
-    pub fn behavior(&self) -> Behavior {
+    pub fn behavior(&self) -> LeguinBehavior {
         *self.bsg.current()
     }
 
     /// Everything that changes in her.
     #[must_use]
-    pub fn save(&self) -> Saved {
-        Saved {
+    pub fn save(&self) -> LeguinState {
+        LeguinState {
             state: self.state.clone(),
             feeling: self.emotion.save(),
             behavior: self.bsg.state().clone(),
@@ -191,7 +193,7 @@ impl Leguin {
     ///
     /// # Errors
     /// A Leguin of these parameters cannot have the saved emotion.
-    pub fn restore(&mut self, saved: Saved) -> Result<(), String> {
+    pub fn restore(&mut self, saved: LeguinState) -> Result<(), String> {
         self.emotion.restore(saved.feeling)?;
         self.bsg.restore(saved.behavior);
         self.state = saved.state;
@@ -203,11 +205,13 @@ impl Leguin {
         let state = &mut self.state;
         match (command.text.as_str(), behavior) {
             // A call to come is obsolete once she is there.
-            (REFILL | HURRY, Behavior::Exchange) | (REFILL, Behavior::Refill) => {}
+            (REFILL | HURRY, LeguinBehavior::Exchange) | (REFILL, LeguinBehavior::Refill) => {}
             (REFILL, _) => state.pending = state.pending.or(Some(Errand::Refill)),
             (HURRY, _) => state.pending = Some(Errand::Hurry),
             // The waiter may complete the exchange a tick before her.
-            (GO_HOME, Behavior::Exchange | Behavior::AwaitGoHome) => state.sent_home = true,
+            (GO_HOME, LeguinBehavior::Exchange | LeguinBehavior::AwaitGoHome) => {
+                state.sent_home = true
+            }
             (GO_HOME, _) => {}
             _ => {
                 let text = shortened(&command.text);
@@ -227,7 +231,7 @@ impl Leguin {
 
         let parameters = &self.parameters;
         let gain = parameters.gain();
-        let blocked = if behavior == Behavior::Refill {
+        let blocked = if behavior == LeguinBehavior::Refill {
             self.state.way.stalled_s() * gain / parameters.block_patience_s
         } else {
             0.0
@@ -237,7 +241,7 @@ impl Leguin {
         } else {
             0.0
         };
-        self.state.measures = Measures {
+        self.state.measures = LeguinMeasures {
             hurried: self.state.hurried,
             hurry,
             blocked,
@@ -250,9 +254,9 @@ impl Leguin {
     fn observe_way(&mut self, tick_s: f64) {
         let distance_m = self.goal().map(|goal| self.state.at.distance_m(goal));
         let is_on_the_way = match self.behavior() {
-            Behavior::Refill => self.bsg.has_lasted(self.parameters.prep_s),
-            Behavior::GoHome => true,
-            Behavior::Wait | Behavior::Exchange | Behavior::AwaitGoHome => false,
+            LeguinBehavior::Refill => self.bsg.has_lasted(self.parameters.prep_s),
+            LeguinBehavior::GoHome => true,
+            LeguinBehavior::Wait | LeguinBehavior::Exchange | LeguinBehavior::AwaitGoHome => false,
         };
 
         if is_on_the_way {
@@ -307,12 +311,12 @@ impl Leguin {
         distance_m <= parameters.arrive_m || (distance_m <= parameters.settle_m && is_kept_away)
     }
 
-    fn context(&self, cars: &Cars<'_>) -> Context {
+    fn context(&self, cars: &Cars<'_>) -> LeguinContext {
         let state = &self.state;
         let parameters = &self.parameters;
         let waiter_is_here = state.waiter.is_within(parameters.exchange_radius_m, cars);
 
-        Context {
+        LeguinContext {
             gives_up: self.gives_up(),
             is_happy: parameters.schematic.is_on() && self.emotion.is_happy(),
             pending: state.pending,
@@ -334,29 +338,29 @@ impl Leguin {
         }
     }
 
-    fn perform(&mut self, act: Act, cars: &mut Cars<'_>) {
+    fn perform(&mut self, act: LeguinAct, cars: &mut Cars<'_>) {
         let state = &mut self.state;
         match act {
-            Act::TakeErrand => state.hurried = state.pending.take() == Some(Errand::Hurry),
-            Act::Hurry => {
+            LeguinAct::TakeErrand => state.hurried = state.pending.take() == Some(Errand::Hurry),
+            LeguinAct::Hurry => {
                 state.hurried = true;
                 state.pending = None;
             }
-            Act::FinishErrand => {
+            LeguinAct::FinishErrand => {
                 state.hurried = false;
                 state.pending = None;
                 state.sent_home = false;
             }
-            Act::TurnHome => {
+            LeguinAct::TurnHome => {
                 state.trips += 1;
                 state.sent_home = false;
             }
-            Act::GiveUp => {
+            LeguinAct::GiveUp => {
                 state.given_up += 1;
                 state.hurried = false;
                 state.way = Closing::default();
             }
-            Act::Joke => {
+            LeguinAct::Joke => {
                 state.jokes.tell(JOKES, self.parameters.joke_mean_s, cars);
             }
         }
@@ -366,22 +370,22 @@ impl Leguin {
     fn goal(&self) -> Option<Point> {
         let waiter = &self.state.waiter;
         match self.behavior() {
-            Behavior::Refill if waiter.is_missing() => None,
-            Behavior::Refill => waiter.location(),
-            Behavior::GoHome => Some(self.state.home),
-            Behavior::Wait | Behavior::Exchange | Behavior::AwaitGoHome => None,
+            LeguinBehavior::Refill if waiter.is_missing() => None,
+            LeguinBehavior::Refill => waiter.location(),
+            LeguinBehavior::GoHome => Some(self.state.home),
+            LeguinBehavior::Wait | LeguinBehavior::Exchange | LeguinBehavior::AwaitGoHome => None,
         }
     }
 
     /// The motion that her behavior wants.
     fn drive(&mut self, cars: &mut Cars<'_>) -> Action {
         match self.behavior() {
-            Behavior::Wait | Behavior::Exchange | Behavior::AwaitGoHome => {
+            LeguinBehavior::Wait | LeguinBehavior::Exchange | LeguinBehavior::AwaitGoHome => {
                 self.state.drive.stay(cars)
             }
-            Behavior::Refill => self.refill(cars),
-            Behavior::GoHome => {
-                let course = Course {
+            LeguinBehavior::Refill => self.refill(cars),
+            LeguinBehavior::GoHome => {
+                let course = StraightDrive {
                     goal: self.state.home,
                     stop_m: 0.0,
                     speed_mps: self.parameters.v_refill_mps,
@@ -400,7 +404,7 @@ impl Leguin {
 
         let speed_mps = self.parameters.v_refill_mps * self.haste();
         if let Some(goal) = self.goal() {
-            let course = Course {
+            let course = StraightDrive {
                 goal,
                 stop_m: self.parameters.stand_off_m,
                 speed_mps,

@@ -14,7 +14,7 @@ use crate::units::FT_M;
 /// experiment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Parameters {
+pub struct LeguinParameters {
     /// The robot whose tray she refills. Default "Butler" \[D\].
     pub waiter: String,
     /// The name of what she brings, for her panel. Default "treats" \[D\]; at the second venue pencils and leaflets.
@@ -109,7 +109,7 @@ impl Default for Feelings {
     }
 }
 
-impl Default for Parameters {
+impl Default for LeguinParameters {
     fn default() -> Self {
         Self {
             waiter: "Butler".to_owned(),
@@ -141,7 +141,7 @@ impl Default for Parameters {
     }
 }
 
-impl Parameters {
+impl LeguinParameters {
     /// What she gives up by, with regard to what is switched off.
     pub(super) fn policy(&self) -> Policy {
         self.policy

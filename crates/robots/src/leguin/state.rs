@@ -4,8 +4,8 @@ use affect::akr::Appraisal;
 use robot::{Cars, Point, StateVariables};
 use serde::{Deserialize, Serialize};
 
-use super::parameters::Parameters;
-use super::tables::{Behavior, Errand, Measures};
+use super::parameters::LeguinParameters;
+use super::tables::{Errand, LeguinBehavior, LeguinMeasures};
 use crate::chance::Chance;
 use crate::closing::Closing;
 use crate::commands::{HURRY, REFILL};
@@ -38,14 +38,14 @@ pub(super) struct LeguinMemory {
     pub(super) waiter_needs: bool,
     /// Whom he called for.
     pub(super) waiter_calls: Option<String>,
-    pub(super) measures: Measures,
+    pub(super) measures: LeguinMeasures,
     pub(super) appraisal: Appraisal,
     pub(super) turns: Chance,
     pub(super) jokes: Jokes,
 }
 
 impl LeguinMemory {
-    pub(super) fn new(parameters: &Parameters) -> Self {
+    pub(super) fn new(parameters: &LeguinParameters) -> Self {
         Self {
             at: Point::default(),
             home: Point::default(),
@@ -60,7 +60,7 @@ impl LeguinMemory {
             waiter: Peer::new(&parameters.waiter),
             waiter_needs: false,
             waiter_calls: None,
-            measures: Measures::default(),
+            measures: LeguinMeasures::default(),
             appraisal: Appraisal::default(),
             turns: Chance::new(0),
             jokes: Jokes::new(Chance::new(1), parameters.joke_mean_s),
@@ -68,7 +68,7 @@ impl LeguinMemory {
     }
 
     /// Sets what depends on the run: her start, which is her home, and her random streams.
-    pub(super) fn begin(&mut self, parameters: &Parameters, cars: &mut Cars<'_>) {
+    pub(super) fn begin(&mut self, parameters: &LeguinParameters, cars: &mut Cars<'_>) {
         let start = cars.welcome().location;
         self.at = start;
         self.home = start;
@@ -78,9 +78,9 @@ impl LeguinMemory {
     }
 
     /// Advances the timers by one tick that she spent in this behavior.
-    pub(super) fn advance(&mut self, behavior: Behavior, tick_s: f64) {
+    pub(super) fn advance(&mut self, behavior: LeguinBehavior, tick_s: f64) {
         self.jokes.advance(tick_s);
-        self.waiting_s = if behavior == Behavior::AwaitGoHome {
+        self.waiting_s = if behavior == LeguinBehavior::AwaitGoHome {
             self.waiting_s + tick_s
         } else {
             0.0
@@ -88,7 +88,11 @@ impl LeguinMemory {
     }
 
     /// The state variables: what other robots may query, and what a later incarnation needs.
-    pub(super) fn published(&self, behavior: Behavior, goal: Option<Point>) -> StateVariables {
+    pub(super) fn published(
+        &self,
+        behavior: LeguinBehavior,
+        goal: Option<Point>,
+    ) -> StateVariables {
         let distance_m = goal.map_or(0.0, |goal| self.at.distance_m(goal));
         let pending = match self.pending {
             Some(Errand::Refill) => REFILL,

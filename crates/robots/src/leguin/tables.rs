@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 /// Leguin's behaviors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "SCREAMING_SNAKE_CASE")]
-pub enum Behavior {
+pub enum LeguinBehavior {
     /// Stands at the table until she is called \[D\].
     Wait,
     /// Drives to the waiter \[D\].
@@ -27,9 +27,9 @@ pub enum Behavior {
     GoHome,
 }
 
-use Behavior::{AwaitGoHome, Exchange, GoHome, Refill, Wait};
+use LeguinBehavior::{AwaitGoHome, Exchange, GoHome, Refill, Wait};
 
-impl Behavior {
+impl LeguinBehavior {
     /// Every behavior.
     pub const ALL: [Self; 5] = [Wait, Refill, Exchange, AwaitGoHome, GoHome];
 
@@ -59,7 +59,7 @@ pub enum Errand {
 /// The progress measures.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Measures {
+pub struct LeguinMeasures {
     /// Whether she was commanded to hurry.
     pub hurried: bool,
     /// How strongly that concerns her, 0 to 1.
@@ -77,7 +77,7 @@ pub(super) const KEPT_WAITING: f64 = 0.5;
 
 /// The emotion state generator: the refiller's column of the paper's Table 2. The first row that holds counts.
 #[rustfmt::skip]
-pub const EMOTIONS: &[EmotionRow<Measures, Behavior, StandardEmotion>] = &[
+pub const EMOTIONS: &[EmotionRow<LeguinMeasures, LeguinBehavior, StandardEmotion>] = &[
     EmotionRow { during: &[Wait, Exchange, GoHome], when: |_| true, feel: Happy },
     EmotionRow { during: &[Refill], when: |m| m.blocked >= 1.0, feel: Frustrated },
     EmotionRow { during: &[Refill], when: |m| m.hurried || m.blocked >= m.th_concerned, feel: Concerned },
@@ -88,13 +88,13 @@ pub const EMOTIONS: &[EmotionRow<Measures, Behavior, StandardEmotion>] = &[
 ];
 
 /// The urgency of her emotion \[I\].
-pub fn urgency(measures: &Measures, _: &Behavior) -> Urgency {
+pub fn urgency(measures: &LeguinMeasures, _: &LeguinBehavior) -> Urgency {
     Urgency::saturating(measures.hurry.max(measures.blocked).max(measures.waiting))
 }
 
 /// What a row of the behavior table makes Leguin do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Act {
+pub enum LeguinAct {
     /// Begins the pending errand.
     TakeErrand,
     /// Hurries from now on.
@@ -111,7 +111,7 @@ pub enum Act {
 
 /// What the guard of a row sees.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Context {
+pub struct LeguinContext {
     /// Whether what she goes by makes her turn back.
     pub gives_up: bool,
     /// Whether she is HAPPY.
@@ -132,13 +132,13 @@ pub struct Context {
 
 /// The behavior state generator.
 #[rustfmt::skip]
-pub const TABLE: &[Row<Behavior, Context, Act>] = &[
-    Row { from: &[Wait, Refill], when: |c| c.waiter_is_needy_here, act: &[Act::FinishErrand], then: Go(Exchange) },
-    Row { from: &[Wait], when: |c| c.pending.is_some(), act: &[Act::TakeErrand], then: Go(Refill) },
-    Row { from: &[Refill], when: |c| c.pending == Some(Errand::Hurry), act: &[Act::Hurry], then: Stay },
+pub const TABLE: &[Row<LeguinBehavior, LeguinContext, LeguinAct>] = &[
+    Row { from: &[Wait, Refill], when: |c| c.waiter_is_needy_here, act: &[LeguinAct::FinishErrand], then: Go(Exchange) },
+    Row { from: &[Wait], when: |c| c.pending.is_some(), act: &[LeguinAct::TakeErrand], then: Go(Refill) },
+    Row { from: &[Refill], when: |c| c.pending == Some(Errand::Hurry), act: &[LeguinAct::Hurry], then: Stay },
     Row { from: &[Exchange], when: |c| c.exchange_is_over, act: &[], then: Go(AwaitGoHome) },
-    Row { from: &[AwaitGoHome], when: |c| c.sent_home, act: &[Act::TurnHome], then: Go(GoHome) },
-    Row { from: &[AwaitGoHome, Refill], when: |c| c.gives_up, act: &[Act::GiveUp], then: Go(GoHome) },
+    Row { from: &[AwaitGoHome], when: |c| c.sent_home, act: &[LeguinAct::TurnHome], then: Go(GoHome) },
+    Row { from: &[AwaitGoHome, Refill], when: |c| c.gives_up, act: &[LeguinAct::GiveUp], then: Go(GoHome) },
     Row { from: &[GoHome], when: |c| c.is_home, act: &[], then: Go(Wait) },
-    Row { from: &[Wait, GoHome], when: |c| c.is_happy && c.has_joke, act: &[Act::Joke], then: Stay },
+    Row { from: &[Wait, GoHome], when: |c| c.is_happy && c.has_joke, act: &[LeguinAct::Joke], then: Stay },
 ];

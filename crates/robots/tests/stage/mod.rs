@@ -18,8 +18,8 @@ use lockstep::Exchange;
 use protocol::PROTOCOL_VERSION;
 use protocol::messages::{CommandText, Delivery, NEWS_FLAGS, Performative};
 use robot::{
-    Correction, LocalHost, News, Parameters, Point, Report, Robot, RobotName, RunName, SensedBody,
-    SensedKind, SensedRobot, Variable, Welcome,
+    Correction, LocalHost, Parameters, Point, Report, Robot, RobotName, RunName, SensedBody,
+    SensedKind, SensedRobot, TickUpdate, Variable, Welcome,
 };
 
 pub(crate) const FT_M: f64 = 0.3048;
@@ -267,7 +267,7 @@ impl Stage {
         }
     }
 
-    fn news(&self, robot: &RobotName, is_blocked: bool, commands: Vec<Delivery>) -> News {
+    fn news(&self, robot: &RobotName, is_blocked: bool, commands: Vec<Delivery>) -> TickUpdate {
         let at = self.places[robot];
         let others = || self.places.iter().filter(|(other, _)| *other != robot);
         let sensed: Vec<SensedRobot> = others()
@@ -282,7 +282,7 @@ impl Stage {
             .filter(|other| (self.cuts)(self.tick, robot.as_str(), other.as_str()))
             .collect();
 
-        News {
+        TickUpdate {
             epoch: 1,
             tick: self.tick,
             joined: None,

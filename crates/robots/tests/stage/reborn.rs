@@ -72,5 +72,5 @@ macro_rules! reborn {
     };
 }
 
-reborn!(Butler, robots::butler::Saved);
-reborn!(Leguin, robots::leguin::Saved);
+reborn!(Butler, robots::butler::ButlerState);
+reborn!(Leguin, robots::leguin::LeguinState);

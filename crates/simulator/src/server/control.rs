@@ -5,19 +5,19 @@ use protocol::decode;
 use protocol::messages::{Control, ControlAnswer, End, SetupAnswer};
 use scenario::Scenario;
 
-use super::event::{Event, Exit};
+use super::event::{ServerEvent, StopReason};
 use super::frontend::{Frontend, answer, refuse};
 use super::source::TickSource;
 
 /// Handles one event.
 pub(super) fn handle<S: TickSource>(
-    event: Event,
+    event: ServerEvent,
     source: &mut S,
     frontend: &mut Frontend,
 ) -> Result<(), S::Interrupt> {
     match event {
-        Event::Control(query) => on_control(query, source, frontend),
-        Event::Terminate => Err(Exit::End(End::Stopped).into()),
+        ServerEvent::Control(query) => on_control(query, source, frontend),
+        ServerEvent::Terminate => Err(StopReason::End(End::Stopped).into()),
         other => source.handle(other, frontend),
     }
 }
@@ -51,7 +51,7 @@ pub(super) fn execute<S: TickSource>(
         Control::Stop => {
             // Answered now: a server that stops answers nothing more.
             source.answer_status(&query, frontend);
-            return Err(Exit::End(End::Stopped).into());
+            return Err(StopReason::End(End::Stopped).into());
         }
         other => match act(other, source, frontend) {
             Ok(()) => {

@@ -11,10 +11,10 @@ use record::summary::Summary;
 
 use super::control::handle;
 use super::departed::{STANDBY, Wait};
-use super::event::{Event, Exit, ServerError};
+use super::event::{ServerError, ServerEvent, StopReason};
 use super::frontend::Frontend;
 use super::live::LiveRun;
-use super::options::Stay;
+use super::options::KeepAlive;
 use super::record::EpochRecord;
 use super::source::{Next, TickSource};
 
@@ -105,9 +105,9 @@ impl LiveRun {
     /// Whether the process stays now that the run is over.
     pub(super) fn stays(&self) -> bool {
         match self.stay {
-            Stay::Never => false,
-            Stay::Viewed => self.viewers.rest().is_none_or(|rest| !rest.is_zero()),
-            Stay::Always => true,
+            KeepAlive::Never => false,
+            KeepAlive::Viewed => self.viewers.rest().is_none_or(|rest| !rest.is_zero()),
+            KeepAlive::Always => true,
         }
     }
 
@@ -129,15 +129,15 @@ impl LiveRun {
 
     /// The run is over, and the process stays: it answers requests until one begins another epoch, or no browser shows the run
     /// any more.
-    pub(super) fn linger(&mut self) -> Result<Next, Exit> {
+    pub(super) fn linger(&mut self) -> Result<Next, StopReason> {
         // Nothing of the run is granted any more.
         self.outputs.clear();
 
         if !self.stays() {
-            return Err(Exit::End(End::Stopped));
+            return Err(StopReason::End(End::Stopped));
         }
         let rest = self.viewers.rest();
-        Ok(Next::Wait(rest.filter(|_| self.stay == Stay::Viewed)))
+        Ok(Next::Wait(rest.filter(|_| self.stay == KeepAlive::Viewed)))
     }
 
     /// Ends the run and this side of the contract. The end is put also if its record could not be written.
@@ -180,11 +180,11 @@ impl LiveRun {
         while !awaited.is_empty() && Instant::now() < deadline {
             let until = deadline.min(Instant::now() + self.repeat_after);
             match frontend.inbox.take_until(until) {
-                Some(Event::Token {
+                Some(ServerEvent::Token {
                     robot,
                     is_present: false,
                 }) => awaited.retain(|name| name.as_str() != robot),
-                Some(Event::Token { .. }) | None => {
+                Some(ServerEvent::Token { .. }) | None => {
                     if let Err(error) = self.clock.put(encode(clock)) {
                         tracing::debug!("{error}");
                     }

@@ -9,7 +9,7 @@ use recording::RecordingError;
 use scenario::Scenario;
 
 /// Everything that can happen to a server. Robots are those that the keys name.
-pub(super) enum Event {
+pub(super) enum ServerEvent {
     /// A robot has done its tick.
     Report(String, Report),
     /// A robot, or the operator, sent a command.
@@ -74,14 +74,14 @@ pub enum ServerError {
 
 /// Why a server stops.
 #[derive(Debug)]
-pub(super) enum Exit {
+pub(super) enum StopReason {
     /// The run ends.
     End(End),
     /// The process cannot go on.
     Failed(ServerError),
 }
 
-impl<E: Into<ServerError>> From<E> for Exit {
+impl<E: Into<ServerError>> From<E> for StopReason {
     fn from(error: E) -> Self {
         Self::Failed(error.into())
     }
@@ -89,14 +89,14 @@ impl<E: Into<ServerError>> From<E> for Exit {
 
 /// Why an epoch of a run stops.
 #[derive(Debug)]
-pub(super) enum Interrupt {
+pub(super) enum EpochStop {
     /// Another one begins with this scenario.
     Init(Box<Scenario>),
     /// The server stops.
-    Exit(Exit),
+    Exit(StopReason),
 }
 
-impl<E: Into<Exit>> From<E> for Interrupt {
+impl<E: Into<StopReason>> From<E> for EpochStop {
     fn from(exit: E) -> Self {
         Self::Exit(exit.into())
     }

@@ -5,7 +5,7 @@ use protocol::keys::Keys;
 use protocol::messages::ControlAnswer;
 use protocol::{Message, RunName, decode, encode};
 
-use super::event::Event;
+use super::event::ServerEvent;
 use super::observers::Observers;
 use super::pace::Pace;
 
@@ -14,7 +14,7 @@ pub(super) struct Frontend {
     pub(super) run: RunName,
     pub(super) bus: Bus,
     pub(super) keys: Keys,
-    pub(super) inbox: Inbox<Event>,
+    pub(super) inbox: Inbox<ServerEvent>,
     pub(super) observers: Observers,
     pub(super) pace: Pace,
     declared: Vec<Declared>,
@@ -55,7 +55,7 @@ impl Frontend {
     pub(super) fn subscribe<M: Message + 'static>(
         &self,
         keys: &str,
-        event: fn(String, M) -> Event,
+        event: fn(String, M) -> ServerEvent,
     ) -> Result<Declared, BusError> {
         let inbox = self.inbox.clone();
         self.bus.subscribe(keys, move |key, bytes| {
@@ -64,7 +64,7 @@ impl Frontend {
             // works.
             inbox.send_and_work(match decode(key, &robot, bytes) {
                 Ok(message) => event(robot, message),
-                Err(error) => Event::Malformed(error),
+                Err(error) => ServerEvent::Malformed(error),
             });
         })
     }
@@ -73,7 +73,7 @@ impl Frontend {
     pub(super) fn declare_queryable(
         &mut self,
         key: &str,
-        event: impl Fn(Query) -> Event + Send + Sync + 'static,
+        event: impl Fn(Query) -> ServerEvent + Send + Sync + 'static,
     ) -> Result<(), BusError> {
         let inbox = self.inbox.clone();
         let queryable = self
@@ -86,9 +86,9 @@ impl Frontend {
     /// Declares where robots join and where control is answered, and then the simulator's token: when that is seen, everything
     /// declared before is in effect.
     pub(super) fn declare_simulator(&mut self) -> Result<(), BusError> {
-        self.declare_queryable(&self.keys.join(), Event::Join)?;
-        self.declare_queryable(&self.keys.joins(), Event::Join)?;
-        self.declare_queryable(&self.keys.control(), Event::Control)?;
+        self.declare_queryable(&self.keys.join(), ServerEvent::Join)?;
+        self.declare_queryable(&self.keys.joins(), ServerEvent::Join)?;
+        self.declare_queryable(&self.keys.control(), ServerEvent::Control)?;
         // Last, for the same reason as a robot's token: a robot that sees it can ask at once.
         let token = self.bus.token(&self.keys.alive_sim())?;
         self.keep(token);

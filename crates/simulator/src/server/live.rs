@@ -5,18 +5,18 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bus::{Bus, BusError, Declared, Publisher, Query};
-use lockstep::{Barrier, Output, Timing};
+use lockstep::{Barrier, BarrierOutput, Timing};
 use protocol::keys::Keys;
 use protocol::messages::{CommandText, Control, End, MAX_ENTRIES, Report, RobotStatus, Status};
 use protocol::{Epoch, RobotName, Tick, decode};
 use record::RunFolder;
-use record::summary::{Summary, Wall};
+use record::summary::{Summary, WallSummary};
 use scenario::Scenario;
 
 use super::departed::{Departed, Wait};
-use super::event::{Event, Exit, Interrupt, ServerError};
+use super::event::{EpochStop, ServerError, ServerEvent, StopReason};
 use super::frontend::{Frontend, refuse};
-use super::options::{Options, Stay};
+use super::options::{KeepAlive, ServerOptions};
 use super::orders::{Orders, PendingOrders};
 use super::process::{Server, run_to_exit};
 use super::record::EpochRecord;
@@ -32,7 +32,7 @@ const MAX_TICKS_AT_ONCE: Tick = 16;
 
 /// A run whose ticks take place now.
 pub struct LiveRun {
-    pub(super) stay: Stay,
+    pub(super) stay: KeepAlive,
     pub(super) repeat_after: Duration,
     folder: RunFolder,
     pub(super) clock: Publisher,
@@ -45,7 +45,7 @@ pub struct LiveRun {
     // The robots' processes outlive an epoch, and so does what is known of them: who is connected or has reserved its name, which
     // timers run, which faults are in effect.
     pub(super) barrier: Barrier<Arc<Report>, CommandText>,
-    pub(super) outputs: Vec<Output<Arc<Report>, CommandText>>,
+    pub(super) outputs: Vec<BarrierOutput<Arc<Report>, CommandText>>,
     pub(super) timers: Timers,
     pub(super) departed: Departed,
     pub(super) orders: Orders,
@@ -66,7 +66,7 @@ pub(super) struct LiveEpoch {
     pub(super) waiting_since: Instant,
     /// Robots that hold the clock up: awaited when people were told, and not waiting for another robot.
     pub(super) stragglers: Vec<RobotName>,
-    pub(super) wall: Wall,
+    pub(super) wall: WallSummary,
     /// Commands of the operator that are sent at the next tick boundary.
     pub(super) operator: Vec<(RobotName, String)>,
     /// Requests that wait until the next tick has begun.
@@ -110,7 +110,7 @@ impl LiveEpoch {
             waits_for: WaitsFor::Robots,
             waiting_since: Instant::now(),
             stragglers: Vec::new(),
-            wall: Wall::default(),
+            wall: WallSummary::default(),
             operator: Vec::new(),
             deferred: Vec::new(),
         })
@@ -126,7 +126,7 @@ impl Server<LiveRun> {
     pub fn open(
         bus: Bus,
         scenario: Scenario,
-        options: Options,
+        options: ServerOptions,
         folder: &RunFolder,
         replay_log: Option<ReplayLog>,
     ) -> Result<Self, ServerError> {
@@ -179,8 +179,8 @@ impl Server<LiveRun> {
     pub fn run(self) -> Result<Summary, ServerError> {
         let (Self { frontend, source }, exit) = run_to_exit(self);
         match exit {
-            Exit::End(end) => source.conclude(end, frontend),
-            Exit::Failed(error) => {
+            StopReason::End(end) => source.conclude(end, frontend),
+            StopReason::Failed(error) => {
                 // So that its robots end, too.
                 if let Err(error) = source.leave(End::Aborted, frontend) {
                     tracing::debug!("{error}");
@@ -192,7 +192,7 @@ impl Server<LiveRun> {
 }
 
 impl TickSource for LiveRun {
-    type Interrupt = Interrupt;
+    type Interrupt = EpochStop;
 
     fn begin_work(&mut self) {
         self.watchdog.note(Some(Activity::Work));
@@ -201,9 +201,9 @@ impl TickSource for LiveRun {
 
     fn end_work(
         &mut self,
-        outcome: Result<Option<Duration>, Interrupt>,
+        outcome: Result<Option<Duration>, EpochStop>,
         frontend: &mut Frontend,
-    ) -> Result<Option<Duration>, Exit> {
+    ) -> Result<Option<Duration>, StopReason> {
         // What was complete before the interruption is written whatever interrupts.
         let written = self.write_noted();
         self.watchdog.note(None);
@@ -211,17 +211,17 @@ impl TickSource for LiveRun {
 
         match outcome {
             Ok(rest) => return Ok(rest),
-            Err(Interrupt::Init(next)) => self.begin_next_epoch(*next, frontend)?,
+            Err(EpochStop::Init(next)) => self.begin_next_epoch(*next, frontend)?,
             // A client that stops a run wants its processes to end.
-            Err(Interrupt::Exit(Exit::End(end))) if end != End::Stopped && self.stays() => {
+            Err(EpochStop::Exit(StopReason::End(end))) if end != End::Stopped && self.stays() => {
                 self.end_and_stay(end, frontend)?;
             }
-            Err(Interrupt::Exit(exit)) => return Err(exit),
+            Err(EpochStop::Exit(exit)) => return Err(exit),
         }
         Ok(Some(Duration::ZERO))
     }
 
-    fn advance(&mut self, frontend: &mut Frontend) -> Result<Next, Interrupt> {
+    fn advance(&mut self, frontend: &mut Frontend) -> Result<Next, EpochStop> {
         if self.epoch.record.is_closed() {
             return Ok(self.linger()?);
         }
@@ -235,13 +235,13 @@ impl TickSource for LiveRun {
         let standby = match self.endless_wait() {
             Wait::Bounded => None,
             Wait::Standby(left) => Some(left),
-            Wait::Endless => return Err(Exit::End(End::Aborted).into()),
+            Wait::Endless => return Err(StopReason::End(End::Aborted).into()),
         };
         let simulation = &self.epoch.simulation;
         let is_waiting_for_robots = matches!(self.epoch.waits_for, WaitsFor::Robots);
         // Complete, not only granted: while robots are awaited, the last tick is open.
         if simulation.tick() >= simulation.scenario().ticks && !is_waiting_for_robots {
-            return Err(Exit::End(End::Finished).into());
+            return Err(StopReason::End(End::Finished).into());
         }
 
         // Its own thread goes on at once; this one, which may be the middleware's, receives what has come.
@@ -256,27 +256,27 @@ impl TickSource for LiveRun {
     }
 
     // The arms call; they do not decide.
-    fn handle(&mut self, event: Event, frontend: &mut Frontend) -> Result<(), Interrupt> {
+    fn handle(&mut self, event: ServerEvent, frontend: &mut Frontend) -> Result<(), EpochStop> {
         match event {
-            Event::Report(robot, report) => self.on_report(&robot, report),
-            Event::Command { from, to, command } => self.on_command(&from, &to, command),
-            Event::Waiting(robot, waiting) => self.on_waiting(&robot, &waiting),
-            Event::Panel(robot, panel) => self.on_panel(&robot, panel),
-            Event::Malformed(error) => self.ignore("malformed", &error.to_string()),
-            Event::Join(query) => self.on_join(&query, frontend),
-            Event::Token { robot, is_present } => self.on_token(&robot, is_present),
-            Event::Viewer { is_present } => self.viewers.note(is_present),
-            Event::Offered {
+            ServerEvent::Report(robot, report) => self.on_report(&robot, report),
+            ServerEvent::Command { from, to, command } => self.on_command(&from, &to, command),
+            ServerEvent::Waiting(robot, waiting) => self.on_waiting(&robot, &waiting),
+            ServerEvent::Panel(robot, panel) => self.on_panel(&robot, panel),
+            ServerEvent::Malformed(error) => self.ignore("malformed", &error.to_string()),
+            ServerEvent::Join(query) => self.on_join(&query, frontend),
+            ServerEvent::Token { robot, is_present } => self.on_token(&robot, is_present),
+            ServerEvent::Viewer { is_present } => self.viewers.note(is_present),
+            ServerEvent::Offered {
                 query,
                 control,
                 refusal: None,
             } => self.on_accepted(query, &control, frontend)?,
-            Event::Offered {
+            ServerEvent::Offered {
                 query,
                 refusal: Some(reason),
                 ..
             } => refuse(&query, &reason),
-            Event::Control(_) | Event::Terminate | Event::State(..) => {
+            ServerEvent::Control(_) | ServerEvent::Terminate | ServerEvent::State(..) => {
                 unreachable!("the same for all sources, or of a recording")
             }
         }
@@ -289,7 +289,7 @@ impl TickSource for LiveRun {
         query: Query,
         control: Control,
         frontend: &mut Frontend,
-    ) -> Result<(), Interrupt> {
+    ) -> Result<(), EpochStop> {
         let offers = self.offers(&control);
         if offers.is_empty() {
             return self.on_accepted(query, &control, frontend);
@@ -367,8 +367,8 @@ impl LiveRun {
     /// Declares what the simulator subscribes to and answers, its token last.
     fn declare(&mut self, frontend: &mut Frontend) -> Result<(), BusError> {
         let keys = &frontend.keys;
-        let reports = frontend.subscribe(&keys.reports(), Event::Report)?;
-        let waiting = frontend.subscribe(&keys.all_waiting(), Event::Waiting)?;
+        let reports = frontend.subscribe(&keys.reports(), ServerEvent::Report)?;
+        let waiting = frontend.subscribe(&keys.all_waiting(), ServerEvent::Waiting)?;
 
         let inbox = frontend.inbox.clone();
         let commands = frontend
@@ -377,8 +377,8 @@ impl LiveRun {
                 let to = Keys::robot_of(key).unwrap_or_default().to_owned();
                 let from = Keys::last_chunk(key).to_owned();
                 inbox.send_and_work(match decode(key, &from, bytes) {
-                    Ok(command) => Event::Command { from, to, command },
-                    Err(error) => Event::Malformed(error),
+                    Ok(command) => ServerEvent::Command { from, to, command },
+                    Err(error) => ServerEvent::Malformed(error),
                 });
             })?;
 
@@ -388,16 +388,16 @@ impl LiveRun {
             .bus
             .liveliness(&keys.alive_robots(), move |key, is_present| {
                 let robot = Keys::robot_of(key).unwrap_or_default().to_owned();
-                inbox.send(Event::Token { robot, is_present });
+                inbox.send(ServerEvent::Token { robot, is_present });
             })?;
         let mut declared = vec![reports, commands, waiting, tokens];
 
-        if self.stay == Stay::Viewed {
+        if self.stay == KeepAlive::Viewed {
             let inbox = frontend.inbox.clone();
             let viewers = frontend
                 .bus
                 .liveliness(&keys.alive_viewer(), move |_, is_present| {
-                    inbox.send(Event::Viewer { is_present });
+                    inbox.send(ServerEvent::Viewer { is_present });
                 })?;
             declared.push(viewers);
         }
@@ -441,7 +441,7 @@ impl LiveRun {
         if !simulation.scenario().record.has_panels() {
             self.panels = None;
         } else if self.panels.is_none() {
-            let panels = frontend.subscribe(&frontend.keys.panels(), Event::Panel)?;
+            let panels = frontend.subscribe(&frontend.keys.panels(), ServerEvent::Panel)?;
             self.panels = Some(panels);
         }
 

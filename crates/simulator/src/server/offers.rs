@@ -9,7 +9,7 @@ use protocol::keys::Keys;
 use protocol::messages::{Control, Intervention, Parameters, ParametersAnswer, ParametersOffer};
 use protocol::{RobotName, decode, encode};
 
-use super::event::Event;
+use super::event::ServerEvent;
 use super::frontend::Frontend;
 use super::live::LiveRun;
 use super::requests::load;
@@ -45,7 +45,7 @@ impl LiveRun {
             .name("offers".to_owned())
             .spawn(move || {
                 let refusal = ask_all(&bus, &keys, &offers).err();
-                inbox.send(Event::Offered {
+                inbox.send(ServerEvent::Offered {
                     query,
                     control,
                     refusal,

@@ -9,7 +9,7 @@ pub const REPEAT_AFTER: Duration = Duration::from_secs(2);
 
 /// How a simulator process runs.
 #[derive(Debug, Clone)]
-pub struct Options {
+pub struct ServerOptions {
     /// Name of the run in the keys.
     pub run: RunName,
     /// Simulated seconds per second; `None` is as fast as the barrier goes.
@@ -17,7 +17,7 @@ pub struct Options {
     /// Whether the clock waits for `start` once every robot is connected.
     pub is_paused: bool,
     /// Whether the process stays when the run is over.
-    pub stay: Stay,
+    pub stay: KeepAlive,
     /// While the clock is held it is repeated this often; [`REPEAT_AFTER`] unless a test is in a hurry.
     pub repeat_after: Duration,
 }
@@ -25,7 +25,7 @@ pub struct Options {
 /// Whether a simulator process stays when a run ends without being stopped: then `init` begins another epoch, with the same
 /// processes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Stay {
+pub enum KeepAlive {
     /// It ends.
     Never,
     /// It stays while a browser shows the run in a console.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use lockstep::{NoState, StateQuery, States};
+use lockstep::{NoState, RecentStates, StateQuery};
 use protocol::messages::{LogRecord, Panel, PublicState, RobotFrame, Status, WorldFrame};
 use protocol::{Event, RobotName, Tick};
 use recording::{Header, LastReports, PlacedRobot, RecordedTick, Recording, RecordingError, Ticks};
@@ -21,7 +21,7 @@ struct ShownTick {
     recorded: RecordedTick,
     robots: Vec<RobotFrame>,
     /// The last two states of each robot.
-    states: BTreeMap<RobotName, States<PublicState>>,
+    states: BTreeMap<RobotName, RecentStates<PublicState>>,
     /// The newest panel of each robot, with the tick in which it arrived.
     panels: BTreeMap<RobotName, (Tick, Panel)>,
 }
@@ -204,7 +204,7 @@ impl ShownTick {
 }
 
 fn add_state(
-    states: &mut BTreeMap<RobotName, States<PublicState>>,
+    states: &mut BTreeMap<RobotName, RecentStates<PublicState>>,
     robot: &RobotName,
     state: PublicState,
 ) {

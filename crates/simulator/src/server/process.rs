@@ -5,7 +5,7 @@ use std::time::Duration;
 use bus::{Worker, WorkerThread};
 
 use super::control::handle;
-use super::event::{Event, Exit};
+use super::event::{ServerEvent, StopReason};
 use super::frontend::Frontend;
 use super::source::{Next, TickSource};
 
@@ -19,12 +19,12 @@ impl<S> Server<S> {
     /// What asks this server to end, from any thread: a signal, for example.
     pub fn stopper(&self) -> impl Fn() + Clone + Send + Sync + 'static {
         let inbox = self.frontend.inbox.clone();
-        move || inbox.send(Event::Terminate)
+        move || inbox.send(ServerEvent::Terminate)
     }
 }
 
 /// Runs a server until it stops.
-pub(super) fn run_to_exit<S: TickSource>(server: Server<S>) -> (Server<S>, Exit) {
+pub(super) fn run_to_exit<S: TickSource>(server: Server<S>) -> (Server<S>, StopReason) {
     let inbox = server.frontend.inbox.clone();
     let (Loop(server), exit) = inbox.run(Loop(server));
     (server, exit)
@@ -34,9 +34,9 @@ pub(super) fn run_to_exit<S: TickSource>(server: Server<S>) -> (Server<S>, Exit)
 struct Loop<S>(Server<S>);
 
 impl<S: TickSource> Worker for Loop<S> {
-    type Exit = Exit;
+    type Exit = StopReason;
 
-    fn work(&mut self, _: WorkerThread) -> Result<Option<Duration>, Exit> {
+    fn work(&mut self, _: WorkerThread) -> Result<Option<Duration>, StopReason> {
         let Server { frontend, source } = &mut self.0;
         source.begin_work();
         // Whatever stops the work, `end_work` still writes what is complete.

@@ -7,9 +7,9 @@ use protocol::RunName;
 use protocol::event::WaitedFor;
 use protocol::messages::{End, LogRecord};
 use record::RunFolder;
-use record::summary::{Summary, Wall};
+use record::summary::{Summary, WallSummary};
 
-use super::event::{Exit, ServerError};
+use super::event::{ServerError, StopReason};
 use super::replay_log::ReplayLog;
 use crate::recorder::{Observed, Recorder};
 use crate::simulation::{Simulation, TickRecord};
@@ -113,7 +113,7 @@ impl EpochRecord {
 
     /// Compares a tick of a run that is executed again with its record. Returns whether it was the last one: then the drafts have
     /// taken the place of the record.
-    pub(super) fn compare(&mut self, record: &TickRecord) -> Result<bool, Exit> {
+    pub(super) fn compare(&mut self, record: &TickRecord) -> Result<bool, StopReason> {
         let Self::Open(open) = self else {
             return Ok(false);
         };
@@ -123,7 +123,7 @@ impl EpochRecord {
 
         // The drafts are left behind then, and the record is as it was.
         if let Some(difference) = replay_log.compare(record)? {
-            return Err(Exit::Failed(ServerError::NotRepeated(difference)));
+            return Err(StopReason::Failed(ServerError::NotRepeated(difference)));
         }
         let is_last = replay_log.is_empty();
         if is_last {
@@ -147,7 +147,7 @@ impl EpochRecord {
         end: End,
         waited_for: Vec<WaitedFor>,
         simulation: &mut Simulation,
-        wall: Wall,
+        wall: WallSummary,
     ) -> Result<(Vec<LogRecord>, Summary), FileError> {
         let Some(OpenRecord { recorder, .. }) = self.open() else {
             unreachable!("a run ends once");

@@ -21,10 +21,10 @@ use config::diagnostic::Source;
 use scenario::Scenario;
 
 use super::control::execute;
-use super::event::{Event, Exit, ServerError};
+use super::event::{ServerError, ServerEvent, StopReason};
 use super::frontend::{Frontend, refuse};
 use super::observers::{FRAME_INTERVAL, put_lossy};
-use super::options::Options;
+use super::options::ServerOptions;
 use super::player::Player;
 use super::process::{Server, run_to_exit};
 use super::source::{Next, TickSource};
@@ -55,7 +55,11 @@ impl Server<RecordedRun> {
     ///
     /// # Errors
     /// [`ServerError`] if something cannot be declared, or the recording has no tick that can be read.
-    pub fn replay(bus: Bus, recording: Recording, options: Options) -> Result<Self, ServerError> {
+    pub fn replay(
+        bus: Bus,
+        recording: Recording,
+        options: ServerOptions,
+    ) -> Result<Self, ServerError> {
         if recording.is_empty() {
             return Err(ServerError::Empty(recording.header().run.clone()));
         }
@@ -103,7 +107,8 @@ impl ShownRobot {
         for what in QUERIES.iter().chain([&STATE]) {
             let robot = name.clone();
             let key = frontend.keys.query(name, what);
-            frontend.declare_queryable(&key, move |query| Event::State(robot.clone(), query))?;
+            frontend
+                .declare_queryable(&key, move |query| ServerEvent::State(robot.clone(), query))?;
         }
 
         let state = frontend.keys.query(name, STATE);
@@ -120,17 +125,17 @@ impl ShownRobot {
 }
 
 impl TickSource for RecordedRun {
-    type Interrupt = Exit;
+    type Interrupt = StopReason;
 
     fn end_work(
         &mut self,
-        outcome: Result<Option<Duration>, Exit>,
+        outcome: Result<Option<Duration>, StopReason>,
         _: &mut Frontend,
-    ) -> Result<Option<Duration>, Exit> {
+    ) -> Result<Option<Duration>, StopReason> {
         outcome
     }
 
-    fn advance(&mut self, frontend: &mut Frontend) -> Result<Next, Exit> {
+    fn advance(&mut self, frontend: &mut Frontend) -> Result<Next, StopReason> {
         if let Err(rest) = frontend.pace.take_grant(self.player.header().tick_s) {
             return Ok(Next::Wait(rest));
         }
@@ -151,10 +156,10 @@ impl TickSource for RecordedRun {
         Ok(Next::GoOn)
     }
 
-    fn handle(&mut self, event: Event, _: &mut Frontend) -> Result<(), Exit> {
+    fn handle(&mut self, event: ServerEvent, _: &mut Frontend) -> Result<(), StopReason> {
         match event {
-            Event::Join(query) => self.refuse_join(&query),
-            Event::State(robot, query) => self.on_state(&robot, &query),
+            ServerEvent::Join(query) => self.refuse_join(&query),
+            ServerEvent::State(robot, query) => self.on_state(&robot, &query),
             _ => unreachable!("a replay subscribes to nothing else"),
         }
         Ok(())
@@ -165,7 +170,7 @@ impl TickSource for RecordedRun {
         query: Query,
         control: Control,
         frontend: &mut Frontend,
-    ) -> Result<(), Exit> {
+    ) -> Result<(), StopReason> {
         execute(query, &control, self, frontend)
     }
 

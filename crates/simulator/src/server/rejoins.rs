@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use lockstep::Outcome;
+use lockstep::TickOutcome;
 use protocol::RobotName;
 use protocol::messages::{CommandText, Report};
 
@@ -23,7 +23,7 @@ impl LiveRun {
     }
 
     /// Drops the answers that came too late when the tick was recorded.
-    pub(super) fn drop_late(&mut self, outcome: &mut Outcome<Arc<Report>, CommandText>) {
+    pub(super) fn drop_late(&mut self, outcome: &mut TickOutcome<Arc<Report>, CommandText>) {
         let Some(replay_log) = self.epoch.record.replay_log() else {
             return;
         };

@@ -7,7 +7,7 @@ use protocol::messages::{Control, ControlAnswer, FaultKind, Intervention, OnLate
 use protocol::{Epoch, RobotName};
 
 use super::control::execute;
-use super::event::Interrupt;
+use super::event::EpochStop;
 use super::frontend::{Frontend, answer, refuse, refused};
 use super::live::{LiveRun, WaitsFor};
 use super::source::TickSource;
@@ -28,7 +28,7 @@ impl LiveRun {
         query: Query,
         control: &Control,
         frontend: &mut Frontend,
-    ) -> Result<(), Interrupt> {
+    ) -> Result<(), EpochStop> {
         let simulation = &self.epoch.simulation;
         match control {
             Control::Init { seed, setup, epoch } => {
@@ -207,7 +207,7 @@ impl LiveRun {
         next: Result<Scenario, ControlAnswer>,
         query: &Query,
         frontend: &mut Frontend,
-    ) -> Result<(), Interrupt> {
+    ) -> Result<(), EpochStop> {
         match next {
             Err(refusal) => answer(query, &refusal),
             Ok(_) if frontend.pace.phase == Phase::Gathering => {
@@ -218,7 +218,7 @@ impl LiveRun {
                 // begins.
                 self.answer_stepping(frontend);
                 self.answer_status(query, frontend);
-                return Err(Interrupt::Init(Box::new(next)));
+                return Err(EpochStop::Init(Box::new(next)));
             }
         }
 

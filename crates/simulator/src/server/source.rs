@@ -7,7 +7,7 @@ use protocol::Tick;
 use protocol::messages::{Control, ControlAnswer, Status};
 use scenario::Scenario;
 
-use super::event::{Event, Exit};
+use super::event::{ServerEvent, StopReason};
 use super::frontend::{Frontend, answer};
 
 /// What a server does next.
@@ -21,7 +21,7 @@ pub(super) enum Next {
 /// Where the ticks of a run come from: robots in lock-step, or a recording.
 pub(super) trait TickSource: Send + Sized + 'static {
     /// Why handling an event stops the work.
-    type Interrupt: From<Exit>;
+    type Interrupt: From<StopReason>;
 
     /// A thread begins to work.
     fn begin_work(&mut self) {}
@@ -31,13 +31,17 @@ pub(super) trait TickSource: Send + Sized + 'static {
         &mut self,
         outcome: Result<Option<Duration>, Self::Interrupt>,
         frontend: &mut Frontend,
-    ) -> Result<Option<Duration>, Exit>;
+    ) -> Result<Option<Duration>, StopReason>;
 
     /// Goes on by at most one tick, if one is due.
     fn advance(&mut self, frontend: &mut Frontend) -> Result<Next, Self::Interrupt>;
 
     /// Handles an event that is not the same for all sources.
-    fn handle(&mut self, event: Event, frontend: &mut Frontend) -> Result<(), Self::Interrupt>;
+    fn handle(
+        &mut self,
+        event: ServerEvent,
+        frontend: &mut Frontend,
+    ) -> Result<(), Self::Interrupt>;
 
     /// Handles a request of control.
     fn request(

@@ -5,13 +5,13 @@ use std::time::{Duration, Instant};
 
 use bus::BusError;
 use config::diagnostic::FileError;
-use lockstep::{IncarnationNotice, Outcome, Output};
+use lockstep::{BarrierOutput, IncarnationNotice, TickOutcome};
 use protocol::keys::STATE;
 use protocol::messages::{Clock, CommandText, End, Reason, Report};
 use protocol::{RobotName, Tick, encode};
 
 use super::control::on_control;
-use super::event::{Exit, Interrupt};
+use super::event::{EpochStop, StopReason};
 use super::frame::frame;
 use super::frontend::Frontend;
 use super::live::{LiveRun, WaitsFor};
@@ -20,7 +20,7 @@ use super::watchdog::Activity;
 
 impl LiveRun {
     /// Opens the next tick if it is due, or finds out how long to wait at most before looking again.
-    pub(super) fn open_next_tick(&mut self, frontend: &mut Frontend) -> Result<Next, Interrupt> {
+    pub(super) fn open_next_tick(&mut self, frontend: &mut Frontend) -> Result<Next, EpochStop> {
         match &self.epoch.waits_for {
             WaitsFor::Robots => return Ok(Next::Wait(self.timers.next(Instant::now()))),
             WaitsFor::Rejoins(_) => {
@@ -110,23 +110,28 @@ impl LiveRun {
     }
 
     /// Carries out what the barrier wants done, also what it wants because of that.
-    pub(super) fn carry_out(&mut self, frontend: &mut Frontend) -> Result<(), Exit> {
+    pub(super) fn carry_out(&mut self, frontend: &mut Frontend) -> Result<(), StopReason> {
         // Until nothing is left: `Gathered`, for example, opens tick 0, which is granted by a further
         // output.
         while !self.outputs.is_empty() {
             for output in std::mem::take(&mut self.outputs) {
                 match output {
                     // The faults of the epoch before are ended first, and then robots are gathered once more.
-                    Output::Gathered if matches!(self.epoch.waits_for, WaitsFor::Faults(_)) => {}
-                    Output::Gathered => self.open_tick_zero(),
-                    Output::Grant { news, clock } => self.put(&news, clock)?,
-                    Output::Complete(outcome) => self.complete(outcome, frontend)?,
-                    Output::StandIn(robot) => self.stand_in(&robot, frontend)?,
-                    Output::Held => self.report_held(frontend),
-                    Output::Released => self.report_released(frontend),
-                    Output::Aborted => return Err(Exit::End(End::Aborted)),
-                    Output::SetTimer(timer, after) => self.timers.set(timer, after, Instant::now()),
-                    Output::Ignored(reason, robot) => self.ignore(reason.as_str(), robot.as_str()),
+                    BarrierOutput::Gathered
+                        if matches!(self.epoch.waits_for, WaitsFor::Faults(_)) => {}
+                    BarrierOutput::Gathered => self.open_tick_zero(),
+                    BarrierOutput::Grant { news, clock } => self.put(&news, clock)?,
+                    BarrierOutput::Complete(outcome) => self.complete(outcome, frontend)?,
+                    BarrierOutput::StandIn(robot) => self.stand_in(&robot, frontend)?,
+                    BarrierOutput::Held => self.report_held(frontend),
+                    BarrierOutput::Released => self.report_released(frontend),
+                    BarrierOutput::Aborted => return Err(StopReason::End(End::Aborted)),
+                    BarrierOutput::SetTimer(timer, after) => {
+                        self.timers.set(timer, after, Instant::now())
+                    }
+                    BarrierOutput::Ignored(reason, robot) => {
+                        self.ignore(reason.as_str(), robot.as_str())
+                    }
                 }
             }
         }
@@ -167,9 +172,9 @@ impl LiveRun {
     /// A tick is complete.
     fn complete(
         &mut self,
-        mut outcome: Outcome<Arc<Report>, CommandText>,
+        mut outcome: TickOutcome<Arc<Report>, CommandText>,
         frontend: &mut Frontend,
-    ) -> Result<(), Exit> {
+    ) -> Result<(), StopReason> {
         // First, because it measures until now how long the tick was held.
         self.count_stragglers();
         // Before the tick ends: what does not count must not reach the events.

@@ -5,7 +5,7 @@ use crate::halls::{
 };
 use proptest::prelude::*;
 use rand::{Rng, RngExt};
-use world::{Blocker, Body, Hall, Point, Verdict, World};
+use world::{Blocker, Body, Hall, MoveOutcome, Point, World};
 
 /// The rules of a tick in their simplest form: every body is compared with every other.
 struct Plain {
@@ -53,23 +53,23 @@ impl Plain {
         }
     }
 
-    fn judge(&mut self, world: &TestWorld, robot: usize, proposal: Option<Point>) -> Verdict {
+    fn judge(&mut self, world: &TestWorld, robot: usize, proposal: Option<Point>) -> MoveOutcome {
         let Some(to) = proposal else {
-            return Verdict::Stayed;
+            return MoveOutcome::Stayed;
         };
         if !(to.x.is_finite() && to.y.is_finite()) {
-            return Verdict::NotFinite;
+            return MoveOutcome::NotFinite;
         }
 
         let step = to - self.movers[robot];
         let distance_m = (step.x * step.x + step.y * step.y).sqrt();
         if distance_m > world.stride_m() + 1e-9 {
-            return Verdict::TooFast;
+            return MoveOutcome::TooFast;
         }
 
         match self.attempt(world, robot, to) {
-            Some(by) => Verdict::Blocked { by },
-            None => Verdict::Advanced,
+            Some(by) => MoveOutcome::Blocked { by },
+            None => MoveOutcome::Advanced,
         }
     }
 }
@@ -233,8 +233,8 @@ fn go(x: f64, y: f64) -> Option<Point> {
     Some(Point::new(x, y))
 }
 
-fn blocked(body: Body) -> Verdict {
-    Verdict::Blocked {
+fn blocked(body: Body) -> MoveOutcome {
+    MoveOutcome::Blocked {
         by: Blocker::Body(body),
     }
 }
@@ -245,17 +245,17 @@ fn robots_move_in_index_order() {
     let mut world = quiet(&[], &[(5.5, 5.0), (4.5, 5.0)]);
     assert_eq!(
         world.advance(&[go(6.5, 5.0), go(5.5, 5.0)]),
-        [Verdict::Advanced, Verdict::Advanced]
+        [MoveOutcome::Advanced, MoveOutcome::Advanced]
     );
 
     let mut world = quiet(&[], &[(4.5, 5.0), (5.5, 5.0)]);
     let verdicts = world.advance(&[go(5.5, 5.0), go(6.5, 5.0)]);
-    assert_eq!(verdicts, [blocked(Body::Robot(1)), Verdict::Advanced]);
+    assert_eq!(verdicts, [blocked(Body::Robot(1)), MoveOutcome::Advanced]);
 
     // The first of two robots that propose the same location gets it.
     let mut world = quiet(&[], &[(4.0, 5.0), (6.0, 5.0)]);
     let verdicts = world.advance(&[go(5.0, 5.0), go(5.0, 5.0)]);
-    assert_eq!(verdicts, [Verdict::Advanced, blocked(Body::Robot(0))]);
+    assert_eq!(verdicts, [MoveOutcome::Advanced, blocked(Body::Robot(0))]);
 }
 
 #[test]
@@ -278,7 +278,7 @@ fn robots_move_before_guests() {
         }
 
         tried += 1;
-        assert_eq!(world.advance(&[Some(to)]), [Verdict::Advanced]);
+        assert_eq!(world.advance(&[Some(to)]), [MoveOutcome::Advanced]);
         assert_eq!(
             world.guest_blockers(),
             [Some(Blocker::Body(Body::Robot(0)))]
@@ -293,11 +293,11 @@ fn touching_is_not_colliding() {
     let mut world = quiet(&[(2.5, 5.0)], &[(4.0, 5.0), (4.0, 6.0)]);
     assert_eq!(
         world.advance(&[go(3.5, 5.0), go(3.5, 6.0)]),
-        [Verdict::Advanced, Verdict::Advanced]
+        [MoveOutcome::Advanced, MoveOutcome::Advanced]
     );
     assert_eq!(
         world.advance(&[go(3.5 - 5e-10, 5.0), None]),
-        [Verdict::Advanced, Verdict::Stayed]
+        [MoveOutcome::Advanced, MoveOutcome::Stayed]
     );
     let verdicts = world.advance(&[go(3.5 - 2e-9, 5.0), go(3.5, 6.0 - 2e-9)]);
     assert_eq!(
@@ -315,7 +315,7 @@ fn touching_is_not_colliding() {
 #[test]
 fn robots_cannot_leave_the_field() {
     let mut world = quiet(&[], &[(0.5, 0.5), (9.5, 9.5)]);
-    let edge = Verdict::Blocked { by: Blocker::Edge };
+    let edge = MoveOutcome::Blocked { by: Blocker::Edge };
 
     let past_left_and_right = [go(0.4, 0.5), go(9.6, 9.5)];
     assert_eq!(world.advance(&past_left_and_right), [edge, edge]);
@@ -333,11 +333,11 @@ fn the_first_of_several_blockers_is_reported() {
 
     assert_eq!(
         world.advance(&[go(1.9, 5.2), None]),
-        [blocked(Body::Obstacle(0)), Verdict::Stayed]
+        [blocked(Body::Obstacle(0)), MoveOutcome::Stayed]
     );
     assert_eq!(
         world.advance(&[go(2.5, 5.8), None]),
-        [blocked(Body::Robot(1)), Verdict::Stayed]
+        [blocked(Body::Robot(1)), MoveOutcome::Stayed]
     );
 }
 
@@ -346,18 +346,18 @@ fn a_rejected_proposal_keeps_the_robot_in_place() {
     let mut world = quiet(&[], &[(5.0, 5.0)]);
 
     for (proposal, verdict) in [
-        (None, Verdict::Stayed),
-        (go(6.0 + 1e-6, 5.0), Verdict::TooFast),
-        (go(5.8, 5.8), Verdict::TooFast),
-        (go(1e300, -1e300), Verdict::TooFast),
-        (go(f64::NAN, 5.0), Verdict::NotFinite),
-        (go(5.0, f64::INFINITY), Verdict::NotFinite),
+        (None, MoveOutcome::Stayed),
+        (go(6.0 + 1e-6, 5.0), MoveOutcome::TooFast),
+        (go(5.8, 5.8), MoveOutcome::TooFast),
+        (go(1e300, -1e300), MoveOutcome::TooFast),
+        (go(f64::NAN, 5.0), MoveOutcome::NotFinite),
+        (go(5.0, f64::INFINITY), MoveOutcome::NotFinite),
     ] {
         assert_eq!(world.advance(&[proposal]), [verdict]);
         assert_eq!(world.robots(), [Point::new(5.0, 5.0)]);
     }
 
-    assert_eq!(world.advance(&[go(6.0, 5.0)]), [Verdict::Advanced]);
+    assert_eq!(world.advance(&[go(6.0, 5.0)]), [MoveOutcome::Advanced]);
     assert_eq!(world.robots(), [Point::new(6.0, 5.0)]);
 }
 

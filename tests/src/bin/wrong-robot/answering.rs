@@ -6,12 +6,12 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use bus::Query;
 use lockstep::{Participant, StateQuery};
 use protocol::keys::Keys;
-use protocol::messages::{CommandText, News, PublicState, Report};
+use protocol::messages::{CommandText, PublicState, Report, TickUpdate};
 use protocol::{Epoch, encode};
 
 use crate::wrong::Wrong;
 
-pub(crate) type Machine = Participant<News, PublicState, CommandText, Report>;
+pub(crate) type Machine = Participant<TickUpdate, PublicState, CommandText, Report>;
 
 /// What the robot is doing when a query arrives.
 #[derive(Clone, Copy, PartialEq, Eq)]

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use lockstep::{Admission, IncarnationNotice, Leave};
-use protocol::messages::{Clock, End, JoinAnswer, JoinRequest, News, Refusal, Welcome};
+use protocol::messages::{Clock, End, JoinAnswer, JoinRequest, Refusal, TickUpdate, Welcome};
 use protocol::{PROTOCOL_VERSION, encode};
 
 use crate::answering::Phase;
@@ -40,7 +40,7 @@ impl Host {
             if self.wrong.is("clock.late") && is_late_tick
                 || self.wrong.is("clock.late:epoch") && clock.epoch < epoch
             {
-                let (_, _, report) = self.act(clock.epoch, clock.tick, &News::default())?;
+                let (_, _, report) = self.act(clock.epoch, clock.tick, &TickUpdate::default())?;
                 let key = self.keys.report(&self.name);
                 self.bus.put(&key, encode(&report))?;
                 return Ok(());
@@ -63,7 +63,7 @@ impl Host {
                     joined: Some(generation),
                     rejoin: None,
                 };
-                machine.news(clock.epoch, clock.tick, naming, News::default(), out);
+                machine.news(clock.epoch, clock.tick, naming, TickUpdate::default(), out);
             })?;
         }
 
@@ -91,7 +91,7 @@ impl Host {
         }
     }
 
-    pub(crate) fn on_news(&mut self, mut news: News) -> Result<(), Failure> {
+    pub(crate) fn on_news(&mut self, mut news: TickUpdate) -> Result<(), Failure> {
         let generation = self
             .welcome
             .as_ref()
@@ -184,7 +184,7 @@ impl Host {
                 rejoin: None,
             };
             self.drive(|machine, out| {
-                machine.news(clock.epoch, clock.tick, naming, News::default(), out);
+                machine.news(clock.epoch, clock.tick, naming, TickUpdate::default(), out);
                 machine.clock(clock, out);
             })?;
         }
@@ -206,7 +206,7 @@ impl Host {
         if self.wrong.is("tick.answer:unasked") {
             let welcome = self.welcome.clone().ok_or("no welcome")?;
             self.walker = Some(Walker::new(&welcome, &self.wrong));
-            let (_, _, report) = self.act(welcome.epoch, 0, &News::default())?;
+            let (_, _, report) = self.act(welcome.epoch, 0, &TickUpdate::default())?;
             self.bus
                 .put(&self.keys.report(&self.name), encode(&report))?;
         }

@@ -8,16 +8,16 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use bus::{Bus, BusError, Declared, Publisher, Reply, Role};
-use lockstep::{Action, Leave, RobotTimer, Timeouts};
+use lockstep::{Leave, ParticipantOutput, RobotTimer, Timeouts};
 use protocol::keys::{Keys, QUERIES, STATE};
-use protocol::messages::{Clock, CommandText, News, PublicState, Report, Waiting, Welcome};
+use protocol::messages::{Clock, CommandText, PublicState, Report, TickUpdate, Waiting, Welcome};
 use protocol::{Epoch, RobotName, RunName, Tick, encode};
 
 use crate::answering::{Machine, Phase, Shared, lock};
 use crate::walker::Walker;
 use crate::wrong::Wrong;
 
-pub(crate) type Actions = Vec<Action<News, PublicState, CommandText, Report>>;
+pub(crate) type Actions = Vec<ParticipantOutput<TickUpdate, PublicState, CommandText, Report>>;
 pub(crate) type Failure = Box<dyn std::error::Error>;
 
 /// Most events in the queue.
@@ -26,7 +26,7 @@ const QUEUE: usize = 4096;
 /// What arrives from the bus. Malformed messages are dropped before.
 pub(crate) enum Event {
     Clock(Clock),
-    News(News),
+    News(TickUpdate),
     Simulator(bool),
     Reply(RobotName, Option<Reply>),
 }
@@ -53,7 +53,7 @@ pub(crate) struct Host {
     pub(crate) last: Option<(Epoch, Tick)>,
     pub(crate) last_clock: Clock,
     /// All news that arrived, if the robot is to keep them.
-    pub(crate) strays: Vec<News>,
+    pub(crate) strays: Vec<TickUpdate>,
     /// The number of the last command of the first epoch.
     pub(crate) numbered: u32,
     /// Whether the queryables are still to be declared.
@@ -248,20 +248,20 @@ impl Host {
     pub(crate) fn perform(&mut self, actions: Actions) -> Result<(), Failure> {
         for action in actions {
             match action {
-                Action::Join => self.ask_to_join()?,
-                Action::DeclareToken => self.on_declare_token()?,
-                Action::Run(turn) => self.run_tick(turn)?,
-                Action::Put(answer) => self.put(&answer)?,
-                Action::Query { of, tick, epoch } => self.query(of, tick, epoch)?,
-                Action::PutWaiting { tick, epoch, on } => {
+                ParticipantOutput::Join => self.ask_to_join()?,
+                ParticipantOutput::DeclareToken => self.on_declare_token()?,
+                ParticipantOutput::Run(turn) => self.run_tick(turn)?,
+                ParticipantOutput::Put(answer) => self.put(&answer)?,
+                ParticipantOutput::Query { of, tick, epoch } => self.query(of, tick, epoch)?,
+                ParticipantOutput::PutWaiting { tick, epoch, on } => {
                     let key = self.keys.waiting(&self.name);
                     self.bus.put(&key, encode(&Waiting { epoch, tick, on }))?;
                 }
-                Action::SetTimer(timer, after) => {
+                ParticipantOutput::SetTimer(timer, after) => {
                     self.timers.insert(timer, Instant::now() + after);
                 }
-                Action::Unfollow(_) => {}
-                Action::Leave(leave) => {
+                ParticipantOutput::Unfollow(_) => {}
+                ParticipantOutput::Leave(leave) => {
                     self.leave.get_or_insert(leave);
                 }
             }

@@ -4,10 +4,10 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use bus::Qos;
-use lockstep::Answer;
+use lockstep::TickAnswer;
 use protocol::encode;
 use protocol::keys::STATE;
-use protocol::messages::{CommandText, News, PublicState, Report};
+use protocol::messages::{CommandText, PublicState, Report, TickUpdate};
 
 use crate::host::{Failure, Host};
 
@@ -15,7 +15,7 @@ impl Host {
     /// Puts the results of a tick: the commands, the state, the report.
     pub(crate) fn put(
         &mut self,
-        answer: &Answer<PublicState, CommandText, Report>,
+        answer: &TickAnswer<PublicState, CommandText, Report>,
     ) -> Result<(), Failure> {
         let at = (answer.epoch, answer.tick);
         let is_again = self.last == Some(at);
@@ -24,7 +24,7 @@ impl Host {
 
         let mut report = answer.report.clone();
         if is_again && self.wrong.is("clock.duplicate") {
-            (_, _, report) = self.act(answer.epoch, answer.tick, &News::default())?;
+            (_, _, report) = self.act(answer.epoch, answer.tick, &TickUpdate::default())?;
             report.commands = answer.report.commands;
         }
         if is_again && self.wrong.is("clock.duplicate:bytes") {
@@ -60,7 +60,7 @@ impl Host {
 
     fn put_commands(
         &mut self,
-        answer: &Answer<PublicState, CommandText, Report>,
+        answer: &TickAnswer<PublicState, CommandText, Report>,
     ) -> Result<(), Failure> {
         let mut first = 1;
         if self.wrong.is("command.sent:numbers") {

@@ -5,7 +5,8 @@ use std::time::Duration;
 use lockstep::{Begin, Sent, Turn};
 use protocol::keys::STATE;
 use protocol::messages::{
-    CommandText, News, Performative, Point, PublicState, Report, StateVariables, Variable, Welcome,
+    CommandText, Performative, Point, PublicState, Report, StateVariables, TickUpdate, Variable,
+    Welcome,
 };
 use protocol::random::unit;
 use protocol::{Epoch, RobotName, Tick};
@@ -22,7 +23,7 @@ const SLOW_TICK: Tick = 11;
 pub(crate) type Outcome = (Vec<Sent<CommandText>>, PublicState, Report);
 
 impl Host {
-    pub(crate) fn run_tick(&mut self, turn: Turn<News>) -> Result<(), Failure> {
+    pub(crate) fn run_tick(&mut self, turn: Turn<TickUpdate>) -> Result<(), Failure> {
         self.shared.enter(Phase::Computing);
         if turn.begin != Begin::GoOn {
             self.begin();
@@ -68,7 +69,7 @@ impl Host {
         &mut self,
         epoch: Epoch,
         tick: Tick,
-        news: &News,
+        news: &TickUpdate,
     ) -> Result<Outcome, Failure> {
         let wrong = self.wrong.clone();
         let welcome = self.welcome.clone().ok_or("no welcome")?;
@@ -198,7 +199,7 @@ impl Host {
         &mut self,
         tick: Tick,
         epoch: Epoch,
-        news: &News,
+        news: &TickUpdate,
         welcome: &Welcome,
     ) -> Result<Option<Point>, Failure> {
         let other = welcome.roster.iter().find(|name| **name != self.name);

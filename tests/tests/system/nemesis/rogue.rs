@@ -12,8 +12,8 @@ use std::time::{Duration, Instant};
 use bus::{Bus, Role};
 use protocol::keys::{Keys, STATE};
 use protocol::messages::{
-    Clock, Command, Control, ControlAnswer, End, JoinAnswer, News, Performative, Point, Report,
-    StateVariables, Waiting,
+    Clock, Command, Control, ControlAnswer, End, JoinAnswer, Performative, Point, Report,
+    StateVariables, TickUpdate, Waiting,
 };
 use protocol::random::{Stream, stream};
 use protocol::{Epoch, Generation, PROTOCOL_VERSION, RobotName, RunName, Tick, decode, encode};
@@ -266,11 +266,11 @@ impl Intruder<'_> {
                 (keys.command(other, robot), encode(&command))
             }
             6 => {
-                let news = News {
+                let news = TickUpdate {
                     epoch,
                     tick,
                     unreachable: vec![other.clone()],
-                    ..News::default()
+                    ..TickUpdate::default()
                 };
                 (keys.news(robot), encode(&news))
             }
@@ -307,11 +307,11 @@ impl Intruder<'_> {
                 (keys.clock(), encode(&end))
             }
             2 => {
-                let news = News {
+                let news = TickUpdate {
                     epoch: 1,
                     tick,
                     unreachable: self.rogue.robots.clone(),
-                    ..News::default()
+                    ..TickUpdate::default()
                 };
                 (keys.news(robot), encode(&news))
             }
