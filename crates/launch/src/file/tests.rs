@@ -141,7 +141,7 @@ fn a_misspelt_key_is_shown_with_file_line_and_caret() {
 
     assert!(shown.contains("launch/x.toml:4:1"), "{shown}");
     assert!(
-        shown.lines().nth(line + 1).unwrap().contains('^'),
+        shown.lines().nth(line + 1).unwrap().contains("· ───┬──"),
         "{shown}"
     );
     assert!(shown.contains("unknown field `comand`"), "{shown}");
