@@ -2,6 +2,8 @@
 
 use std::error::Error;
 use std::fmt::Display;
+use std::io;
+use std::path::Path;
 
 use config::FileError;
 use recording::RecordingError;
@@ -39,6 +41,11 @@ impl LabError {
     /// The error of a record that is damaged, incomplete, or not there.
     pub fn record(reason: impl Into<String>) -> Self {
         Self::Record(FileError::new(reason))
+    }
+
+    /// The error of a part of a record that cannot be read.
+    pub(crate) fn unreadable(path: &Path) -> impl Fn(io::Error) -> Self {
+        move |error| Self::Record(FileError::unreadable(path, &error))
     }
 
     /// The error of a request that cannot be met.

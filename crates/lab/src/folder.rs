@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use config::FileError;
 use protocol::{Epoch, RunName};
 use record::names::{LATEST, SUMMARY};
 use record::{EpochFiles, RunFolder, Summary};
@@ -117,8 +116,7 @@ pub fn read_summary(folder: &RunFolder) -> Result<Option<Summary>, LabError> {
         return Ok(None);
     }
 
-    let text =
-        std::fs::read_to_string(&path).map_err(|error| FileError::unreadable(&path, &error))?;
+    let text = std::fs::read_to_string(&path).map_err(LabError::unreadable(&path))?;
     let summary = serde_json::from_str(&text).map_err(|error| not_a_summary(&path, &error))?;
     Ok(Some(summary))
 }

@@ -3,7 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use config::{Changes, FileError};
+use config::Changes;
 use protocol::Event;
 use protocol::event::log_line;
 use protocol::messages::LogRecord;
@@ -162,7 +162,7 @@ fn has_ended(events: Option<&Checked>) -> bool {
 }
 
 /// Checks that nothing in a folder is a pipe, a socket or a device. There may be no such folder.
-fn check_files(folder: &Path) -> Result<(), FileError> {
+fn check_files(folder: &Path) -> Result<(), LabError> {
     let entries = std::fs::read_dir(folder).into_iter().flatten();
     for entry in entries.flatten() {
         let path = entry.path();
@@ -170,7 +170,8 @@ fn check_files(folder: &Path) -> Result<(), FileError> {
             .metadata()
             .is_ok_and(|found| !found.is_file() && !found.is_dir())
         {
-            return Err(FileError::new(format!("{} is not a file", path.display())));
+            let place = path.display();
+            return Err(LabError::record(format!("{place} is not a file")));
         }
     }
     Ok(())
@@ -308,24 +309,24 @@ fn is_line_of(line: &str, expected: &LogRecord) -> bool {
 
 /// Reads every file of a folder to its end.
 fn read_all(folder: &Path) -> Result<(), LabError> {
-    let unreadable = |error: io::Error| FileError::unreadable(folder, &error);
+    let unreadable = LabError::unreadable(folder);
     let entries = match std::fs::read_dir(folder) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
-        entries => entries.map_err(unreadable)?,
+        entries => entries.map_err(&unreadable)?,
     };
     for entry in entries {
-        let path: PathBuf = entry.map_err(unreadable)?.path();
+        let path: PathBuf = entry.map_err(&unreadable)?.path();
         if path.is_file() {
             let read = std::fs::File::open(&path)
                 .and_then(|mut file| io::copy(&mut file, &mut io::sink()));
-            read.map_err(|error| FileError::unreadable(&path, &error))?;
+            read.map_err(LabError::unreadable(&path))?;
         }
     }
     Ok(())
 }
 
 fn read(path: &Path) -> Result<String, LabError> {
-    let bytes = std::fs::read(path).map_err(|error| FileError::unreadable(path, &error))?;
+    let bytes = std::fs::read(path).map_err(LabError::unreadable(path))?;
     String::from_utf8(bytes).map_err(|_| damaged(path, &"it is not UTF-8"))
 }
 

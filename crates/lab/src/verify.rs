@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use config::{Changes, FileError};
+use config::Changes;
 use protocol::{RobotName, RunName, Tick};
 use record::Record;
 use record::difference::{Difference, between, between_headers, between_summaries, in_recording};
@@ -180,8 +180,7 @@ fn read_summary(files: &EpochFiles) -> Result<Option<(PathBuf, Value)>, LabError
         return Ok(None);
     }
 
-    let text =
-        std::fs::read_to_string(&path).map_err(|error| FileError::unreadable(&path, &error))?;
+    let text = std::fs::read_to_string(&path).map_err(LabError::unreadable(&path))?;
     let written = serde_json::from_str(&text).map_err(|error| not_a_summary(&path, &error))?;
     Ok(Some((path, written)))
 }
@@ -195,8 +194,8 @@ fn header_difference(record: &Record, simulation: &Simulation) -> Option<Differe
 /// Checks that the scenario beside the record is the one that the recording contains.
 pub(crate) fn check_scenario(files: &EpochFiles, recording: &Recording) -> Result<(), LabError> {
     let recorded = recording.scenario()?;
-    let scenario = std::fs::read_to_string(&files.scenario)
-        .map_err(|error| FileError::unreadable(&files.scenario, &error))?;
+    let scenario =
+        std::fs::read_to_string(&files.scenario).map_err(LabError::unreadable(&files.scenario))?;
     if scenario != recorded {
         return Err(LabError::record(format!(
             "{} was changed since the run",

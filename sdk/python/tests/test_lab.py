@@ -184,16 +184,15 @@ def test_errors_can_be_told_apart(lab: Lab) -> None:
         cars.run(wrong)
     with pytest.raises(cars.RecordError, match="there is no run other"):
         cars.load("other", out=lab.folder)
-    with pytest.raises(cars.RefusedError, match="needs a process of its own"):
-        cars.run(PAPER, set={"fault": [{"robot": "Leguin", "kind": "crash", "at": "1 s", "until": "2 s"}]}, duration=5)
+    with pytest.raises(cars.RefusedError, match="a robot of another kind runs as a process of its own"):
+        cars.run(PAPER, set={"robot.Leguin.class": "Rosie"}, duration=5)
     with pytest.raises(cars.RobotError, match="parameters of Leguin"):
         cars.run(PAPER, set={"robot.Leguin.params.affect": "perhaps"}, duration=5)
 
-    damaged = cars.run(PAPER, out=lab.folder, duration=5)
-    events = damaged.folder / "events.jsonl"
-    events.write_text(events.read_text().replace("Leguin", "Vonda", 1))
-    with pytest.raises(cars.RecordError, match="line"):
-        _ = cars.load(damaged.folder).events
+    damaged = cars.run(PAPER, name="damaged", out=lab.folder, duration=5)
+    (damaged.folder / "events.jsonl").write_text("no event\n")
+    with pytest.raises(cars.RecordError, match="events.jsonl, line 1"):
+        cars.load("damaged", out=lab.folder).report()
 
 
 LONG = """
