@@ -108,6 +108,11 @@ impl FileError {
         }
     }
 
+    /// Whether it is about a place in a text.
+    pub(crate) fn has_place(&self) -> bool {
+        self.place.is_some()
+    }
+
     /// The error in one line, without the file: the number of the line and the reason.
     #[must_use]
     pub fn in_words(&self) -> String {

@@ -56,14 +56,25 @@ impl Error for ErrorWithHelp<'_> {
     }
 }
 
+impl ErrorWithHelp<'_> {
+    /// The cause, if it is an error of a file.
+    fn cause(&self) -> Option<&FileError> {
+        self.error.source()?.downcast_ref()
+    }
+}
+
 impl Diagnostic for ErrorWithHelp<'_> {
     fn help<'a>(&'a self) -> Option<Box<dyn Display + 'a>> {
-        self.help.map(|help| Box::new(help) as Box<dyn Display>)
+        if let Some(help) = self.help {
+            return Some(Box::new(help));
+        }
+        // A cause with a place shows its help there.
+        self.cause().filter(|cause| !cause.has_place())?.help()
     }
 
     fn diagnostic_source(&self) -> Option<&dyn Diagnostic> {
-        let file = self.error.source()?.downcast_ref::<FileError>()?;
-        Some(file)
+        let cause = self.cause().filter(|cause| cause.has_place())?;
+        Some(cause)
     }
 }
 
@@ -109,9 +120,14 @@ mod tests {
 
     #[test]
     fn any_error_is_shown_with_its_causes_and_its_help() {
-        let outer = Outer(FileError::new("no file"));
-        let shown = render_plain(&outer, Some("look elsewhere"), 80);
         let expected = "  × the unit cannot be played\n  ╰─▶ no file\n  help: look elsewhere\n";
-        assert_eq!(shown, expected);
+        let helped = Outer(FileError::new("no file").with_help("look elsewhere"));
+        assert_eq!(render_plain(&helped, None, 80), expected);
+
+        let unhelped = Outer(FileError::new("no file"));
+        assert_eq!(
+            render_plain(&unhelped, Some("look elsewhere"), 80),
+            expected
+        );
     }
 }

@@ -31,7 +31,7 @@
 //! ```
 //! use rand::SeedableRng;
 //! use rand_xoshiro::Xoshiro256PlusPlus;
-//! use world::{Field, Guests, Hall, Point, Triangular, Verdict, World};
+//! use world::{Field, Guests, Hall, MoveOutcome, Point, Triangular, World};
 //!
 //! const FT: f64 = 0.3048;
 //! let hall = Hall {
@@ -50,7 +50,7 @@
 //!
 //! let here = world.robots()[0];
 //! let verdicts = world.advance(&[Some(here + Point::new(10.0, 0.0))]);
-//! assert_eq!(verdicts, [Verdict::TooFast]);
+//! assert_eq!(verdicts, [MoveOutcome::TooFast]);
 //! assert_eq!(world.robots()[0], here);
 //! assert_eq!(world.guests().len(), 100);
 //! # Ok::<(), Box<dyn std::error::Error>>(())

@@ -40,7 +40,8 @@ fn sources(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// The name of the type or trait that a line declares. Associated types, which are declared by their traits, are none.
+/// The name of the type or trait that a line declares. Not those that only stand for another type in a file or an implementation, and
+/// not what a macro names.
 fn declared(line: &str) -> Option<&str> {
     let mut words = line.split_whitespace().peekable();
     while words.peek()?.starts_with("pub") {
@@ -53,13 +54,14 @@ fn declared(line: &str) -> Option<&str> {
     if !["struct", "enum", "trait", "type"].contains(&keyword) {
         return None;
     }
-    if keyword == "type" && line.starts_with(' ') {
+    if keyword == "type" && !line.trim_start().starts_with("pub") {
         return None;
     }
 
     let name = words.next()?;
     let end = name.find(|c: char| !c.is_alphanumeric() && c != '_');
-    Some(&name[..end.unwrap_or(name.len())])
+    let name = &name[..end.unwrap_or(name.len())];
+    Some(name).filter(|name| !name.is_empty())
 }
 
 /// For each name the crates and files that declare a type with it.
@@ -95,6 +97,7 @@ fn declarations_are_found() {
         Some("Pixel")
     );
     assert_eq!(declared("    type Output = Self;"), None);
+    assert_eq!(declared("        pub struct $type(pub f64);"), None);
     assert_eq!(declared("// struct"), None);
     assert_eq!(declared("let structure = 1;"), None);
     assert!(declarations().len() > 500);
