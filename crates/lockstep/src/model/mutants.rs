@@ -320,7 +320,7 @@ impl Simulator {
         for output in out {
             match output {
                 BarrierOutput::Grant { news, clock } => {
-                    self.alter_grant(news, clock, is_repetition)
+                    self.alter_grant(news, clock, is_repetition);
                 }
                 BarrierOutput::Complete(outcome) if self.is(Mutant::NamesReplacementOnce) => {
                     for (name, (report, _)) in &outcome.reports {
