@@ -210,7 +210,7 @@ impl Leguin {
             (HURRY, _) => state.pending = Some(Errand::Hurry),
             // The waiter may complete the exchange a tick before her.
             (GO_HOME, LeguinBehavior::Exchange | LeguinBehavior::AwaitGoHome) => {
-                state.sent_home = true
+                state.sent_home = true;
             }
             (GO_HOME, _) => {}
             _ => {

@@ -127,10 +127,10 @@ impl LiveRun {
                     BarrierOutput::Released => self.report_released(frontend),
                     BarrierOutput::Aborted => return Err(StopReason::End(End::Aborted)),
                     BarrierOutput::SetTimer(timer, after) => {
-                        self.timers.set(timer, after, Instant::now())
+                        self.timers.set(timer, after, Instant::now());
                     }
                     BarrierOutput::Ignored(reason, robot) => {
-                        self.ignore(reason.as_str(), robot.as_str())
+                        self.ignore(reason.as_str(), robot.as_str());
                     }
                 }
             }
