@@ -554,17 +554,52 @@ mod tests {
                 });
             }
             if self.fails(&lost) {
-                let failure = FailedExpectation {
-                    tick: 10,
-                    because: String::new(),
-                };
-                played.failed.insert(NAME.to_owned(), failure);
+                played.failed.insert(NAME.to_owned(), failure(10));
             }
             Ok(played)
         }
     }
 
-    fn shrunk(trial: &Synthetic, case: FaultCase, runs: u64, jobs: usize) -> Shrunk {
+    /// Runs that fail at a tick if their faults are as the function says.
+    struct FailsAt<F>(Tick, F);
+
+    impl<F: Fn(&FaultCase) -> bool + Sync> Trial for FailsAt<F> {
+        fn play(&self, case: &FaultCase, _: &BTreeSet<String>) -> Result<TrialResult, LabError> {
+            let Self(tick, does_fail) = self;
+            let mut played = TrialResult::default();
+            if does_fail(case) {
+                played.failed.insert(NAME.to_owned(), failure(*tick));
+            }
+            Ok(played)
+        }
+    }
+
+    fn failure(tick: Tick) -> FailedExpectation {
+        FailedExpectation {
+            tick,
+            because: String::new(),
+        }
+    }
+
+    fn crash(from: Tick, until: Tick) -> PlannedFault {
+        PlannedFault::Absence {
+            robot: RobotName::new("A").unwrap(),
+            why: AbsenceReason::Crash,
+            span: TickSpan { from, until },
+        }
+    }
+
+    fn shrunk(trial: &impl Trial, case: FaultCase, runs: u64, jobs: usize) -> Shrunk {
+        shrunk_with(trial, case, &ScenarioParts::default(), runs, jobs)
+    }
+
+    fn shrunk_with(
+        trial: &impl Trial,
+        case: FaultCase,
+        parts: &ScenarioParts,
+        runs: u64,
+        jobs: usize,
+    ) -> Shrunk {
         let played = trial.play(&case, &BTreeSet::new()).unwrap();
         assert!(played.failed.contains_key(NAME), "it fails before");
         let bounds = Bounds {
@@ -572,7 +607,7 @@ mod tests {
             jobs,
             stop: &AtomicBool::new(false),
         };
-        shrink(trial, NAME, case, played, &ScenarioParts::default(), bounds)
+        shrink(trial, NAME, case, played, parts, bounds)
     }
 
     proptest! {
@@ -618,61 +653,21 @@ mod tests {
     #[test]
     fn a_crash_becomes_the_message_that_it_lost() {
         let trial = Synthetic::of(&[&[7]]);
-        let crash = PlannedFault::Absence {
-            robot: RobotName::new("A").unwrap(),
-            why: AbsenceReason::Crash,
-            span: TickSpan { from: 2, until: 9 },
-        };
-        let result = shrunk(&trial, FaultCase::of(vec![lose(1), crash]), 10_000, 2);
+        let case = FaultCase::of(vec![lose(1), crash(2, 9)]);
+        let result = shrunk(&trial, case, 10_000, 2);
         assert_eq!(result.case.faults, [lose(7)]);
     }
 
     #[test]
     fn a_fault_that_no_message_replaces_becomes_short() {
-        struct Absent;
-        impl Trial for Absent {
-            fn play(
-                &self,
-                case: &FaultCase,
-                _: &BTreeSet<String>,
-            ) -> Result<TrialResult, LabError> {
-                let mut played = TrialResult::default();
-                for fault in &case.faults {
-                    if let PlannedFault::Absence { span, .. } = fault
-                        && span.from <= 55
-                        && span.until >= 60
-                    {
-                        let failure = FailedExpectation {
-                            tick: 60,
-                            because: String::new(),
-                        };
-                        played.failed.insert(NAME.to_owned(), failure);
-                    }
-                }
-                Ok(played)
-            }
-        }
-
-        let crash = |from, until| PlannedFault::Absence {
-            robot: RobotName::new("A").unwrap(),
-            why: AbsenceReason::Crash,
-            span: TickSpan { from, until },
-        };
+        let absent = FailsAt(60, |case: &FaultCase| {
+            case.faults.iter().any(|fault| match fault {
+                PlannedFault::Absence { span, .. } => span.from <= 55 && span.until >= 60,
+                _ => false,
+            })
+        });
         let case = FaultCase::of(vec![lose(1), crash(10, 300)]);
-        let played = Absent.play(&case, &BTreeSet::new()).unwrap();
-        let bounds = Bounds {
-            runs: 10_000,
-            jobs: 2,
-            stop: &AtomicBool::new(false),
-        };
-        let result = shrink(
-            &Absent,
-            NAME,
-            case,
-            played,
-            &ScenarioParts::default(),
-            bounds,
-        );
+        let result = shrunk(&absent, case, 10_000, 2);
         assert_eq!(result.case.faults, [crash(55, 60)]);
         assert_eq!(result.case.ticks, Some(60));
     }
@@ -680,57 +675,21 @@ mod tests {
     /// A fault for which many times do becomes one at the earliest of them that steps lead to.
     #[test]
     fn a_fault_moves_to_an_earlier_time() {
-        struct Later;
-        impl Trial for Later {
-            fn play(
-                &self,
-                case: &FaultCase,
-                _: &BTreeSet<String>,
-            ) -> Result<TrialResult, LabError> {
-                let mut played = TrialResult::default();
-                let does_fail = |fault: &PlannedFault| match fault {
-                    PlannedFault::Absence { span, .. } => {
-                        span.from >= 12 && span.until - span.from >= 5
-                    }
-                    PlannedFault::Lose { number, .. } => *number >= 3,
-                    _ => false,
-                };
-                if case.faults.iter().any(does_fail) {
-                    let failure = FailedExpectation {
-                        tick: 60,
-                        because: String::new(),
-                    };
-                    played.failed.insert(NAME.to_owned(), failure);
+        let later = FailsAt(60, |case: &FaultCase| {
+            case.faults.iter().any(|fault| match fault {
+                PlannedFault::Absence { span, .. } => {
+                    span.from >= 12 && span.until - span.from >= 5
                 }
-                Ok(played)
-            }
-        }
-
-        let crash = |from, until| PlannedFault::Absence {
-            robot: RobotName::new("A").unwrap(),
-            why: AbsenceReason::Crash,
-            span: TickSpan { from, until },
-        };
+                PlannedFault::Lose { number, .. } => *number >= 3,
+                _ => false,
+            })
+        });
         for (fault, expected) in [
             (crash(180, 300), crash(12, 17)),
             (lose(29), lose(3)),
             (lose(3), lose(3)),
         ] {
-            let case = FaultCase::of(vec![fault]);
-            let played = Later.play(&case, &BTreeSet::new()).unwrap();
-            let bounds = Bounds {
-                runs: 10_000,
-                jobs: 2,
-                stop: &AtomicBool::new(false),
-            };
-            let result = shrink(
-                &Later,
-                NAME,
-                case,
-                played,
-                &ScenarioParts::default(),
-                bounds,
-            );
+            let result = shrunk(&later, FaultCase::of(vec![fault]), 10_000, 2);
             assert_eq!(result.case.faults, [expected]);
             assert!(result.is_minimal);
         }
@@ -739,38 +698,15 @@ mod tests {
     /// A scenario that fails without faults is no smaller case of one in which a fault is the cause.
     #[test]
     fn what_is_left_of_the_scenario_does_not_fail_by_itself() {
-        struct Lonely;
-        impl Trial for Lonely {
-            fn play(
-                &self,
-                case: &FaultCase,
-                _: &BTreeSet<String>,
-            ) -> Result<TrialResult, LabError> {
-                let mut played = TrialResult::default();
-                let is_lonely = !case.without.is_empty();
-                if is_lonely || case.faults.contains(&lose(3)) {
-                    let failure = FailedExpectation {
-                        tick: 5,
-                        because: String::new(),
-                    };
-                    played.failed.insert(NAME.to_owned(), failure);
-                }
-                Ok(played)
-            }
-        }
-
+        let lonely = FailsAt(5, |case: &FaultCase| {
+            !case.without.is_empty() || case.faults.contains(&lose(3))
+        });
         let case = FaultCase::of(vec![lose(3), lose(4)]);
-        let played = Lonely.play(&case, &BTreeSet::new()).unwrap();
-        let bounds = Bounds {
-            runs: 10_000,
-            jobs: 1,
-            stop: &AtomicBool::new(false),
-        };
-        let world = ScenarioParts {
+        let parts = ScenarioParts {
             roster: vec![RobotName::new("C").unwrap()],
             guests: 100,
         };
-        let result = shrink(&Lonely, NAME, case, played, &world, bounds);
+        let result = shrunk_with(&lonely, case, &parts, 10_000, 1);
         assert_eq!(result.case.faults, [lose(3)]);
         assert_eq!(result.case.without, BTreeSet::new());
         assert_eq!(result.case.guests, Some(0));
