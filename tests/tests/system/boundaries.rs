@@ -340,7 +340,7 @@ fn errors_are_rendered_in_one_crate() {
 }
 
 /// All Rust files under a folder.
-fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+pub(super) fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(folder).unwrap().map(Result::unwrap) {
         match entry.path() {
             path if path.is_dir() => sources(&path, found),

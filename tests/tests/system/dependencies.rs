@@ -1,7 +1,9 @@
 //! What the project is built from: advisories that `deny.toml` ignores, for as long as their reasons hold (all else in it is `cargo deny
 //! check`'s), features, and the packages in `vendor`.
 
-use std::{collections::BTreeSet, path::Path, process::Command};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use serde_json::Value;
 use system_tests::{cargo, root, tools::skip};
@@ -12,18 +14,20 @@ fn toml(name: &str) -> toml::Table {
     text.parse().unwrap()
 }
 
-/// The packages that are compiled, and how they depend on each other.
-fn metadata() -> Value {
+/// The packages that are compiled for the package in a folder, and how they depend on each other; an error is what cargo says.
+fn metadata(folder: &Path, more: &[&str]) -> Result<Value, String> {
     let output = cargo()
-        .current_dir(root())
-        .args(["metadata", "--format-version=1", "--offline", "--locked"])
+        .current_dir(folder)
+        .args(["metadata", "--format-version=1"])
         .args(["--filter-platform", "x86_64-unknown-linux-gnu"])
+        .args(more)
         .output()
         .unwrap();
 
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{errors}");
-    serde_json::from_slice(&output.stdout).unwrap()
+    if !output.status.success() {
+        return Err(String::from_utf8_lossy(&output.stderr).into_owned());
+    }
+    Ok(serde_json::from_slice(&output.stdout).unwrap())
 }
 
 /// An advisory that is ignored is about a package that is there.
@@ -55,7 +59,7 @@ fn every_ignored_advisory_is_still_needed() {
 /// Why RUSTSEC-2026-0041 can be ignored: nothing calls lz4_flex without this feature.
 #[test]
 fn compression_is_not_compiled_in() {
-    let metadata = metadata();
+    let metadata = metadata(&root(), &["--offline", "--locked"]).unwrap();
     let nodes = metadata["resolve"]["nodes"].as_array().unwrap();
     let transport = nodes
         .iter()
@@ -115,8 +119,8 @@ fn zenoh_is_built_with_the_same_features_everywhere() {
     }
 }
 
-/// The folder of a published package, which cargo downloads unless it is there; `None` if it cannot.
-fn published(name: &str, version: &str) -> Option<std::path::PathBuf> {
+/// The folder of a published package, which cargo downloads unless it is there; an error is what cargo says.
+fn published(name: &str, version: &str) -> Result<PathBuf, String> {
     let folder = tempfile::tempdir().unwrap();
     std::fs::create_dir(folder.path().join("src")).unwrap();
     std::fs::write(folder.path().join("src/lib.rs"), "").unwrap();
@@ -127,17 +131,11 @@ fn published(name: &str, version: &str) -> Option<std::path::PathBuf> {
     );
     std::fs::write(folder.path().join("Cargo.toml"), manifest).unwrap();
 
-    let output = cargo()
-        .current_dir(folder.path())
-        .args(["metadata", "--format-version=1"])
-        .args(["--filter-platform", "x86_64-unknown-linux-gnu"])
-        .output()
-        .unwrap();
-    let metadata: Value = serde_json::from_slice(&output.stdout).ok()?;
+    let metadata = metadata(folder.path(), &[])?;
     let packages = metadata["packages"].as_array().unwrap();
     let package = packages.iter().find(|package| package["name"] == name);
     let manifest = package.unwrap()["manifest_path"].as_str().unwrap();
-    Some(Path::new(manifest).parent().unwrap().to_owned())
+    Ok(Path::new(manifest).parent().unwrap().to_owned())
 }
 
 /// The names and contents of the files of a package that are compiled.
@@ -159,21 +157,21 @@ fn sources(package: &Path) -> Vec<(String, String)> {
 fn vendored_packages_are_the_published_ones_and_their_patches() {
     for folder in std::fs::read_dir(root().join("vendor")).unwrap() {
         let folder = folder.unwrap().path();
-        let manifest: toml::Table = std::fs::read_to_string(folder.join("Cargo.toml"))
-            .unwrap()
-            .parse()
-            .unwrap();
+        let manifest = toml(folder.join("Cargo.toml").to_str().unwrap());
         let name = manifest["package"]["name"].as_str().unwrap();
         let version = manifest["package"]["version"].as_str().unwrap();
         let license = std::fs::read_to_string(folder.join("LICENSE")).unwrap();
         assert!(license.contains("Apache License"), "{name}");
 
-        let Some(published) = published(name, version) else {
-            skip(
-                "vendored_packages_are_the_published_ones_and_their_patches",
-                "cargo cannot download the published packages; connect to the network",
-            );
-            return;
+        let published = match published(name, version) {
+            Ok(published) => published,
+            Err(why) => {
+                skip(
+                    "vendored_packages_are_the_published_ones_and_their_patches",
+                    &format!("{name} cannot be downloaded; connect to the network: {why}"),
+                );
+                return;
+            }
         };
         let patched = tempfile::tempdir().unwrap();
         std::fs::create_dir(patched.path().join("src")).unwrap();

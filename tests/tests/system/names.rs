@@ -7,6 +7,8 @@ use std::{
 
 use system_tests::root;
 
+use super::boundaries::sources;
+
 /// Types of several crates with one name: they are the same idea, on the two sides of a border that no dependency crosses.
 const SHARED: [(&str, &str); 5] = [
     ("Blocker", "what the environment finds, and the event of it"),
@@ -25,19 +27,11 @@ const SHARED: [(&str, &str); 5] = [
     ),
 ];
 
-/// The Rust files of a folder, without tests and without the skeletons of `cars new`.
-fn sources(folder: &Path) -> Vec<PathBuf> {
-    let mut found = Vec::new();
-    for entry in std::fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        let name = path.file_name().unwrap().to_str().unwrap();
-        if path.is_dir() && !["tests", "new"].contains(&name) {
-            found.extend(sources(&path));
-        } else if name.ends_with(".rs") && name != "tests.rs" {
-            found.push(path);
-        }
-    }
-    found
+/// Whether a file of the project is part of a product: not a test, and not a skeleton of `cars new`.
+fn is_of_product(file: &Path) -> bool {
+    let file = file.strip_prefix(root()).unwrap();
+    let mut names = file.iter().filter_map(|name| name.to_str());
+    !names.any(|name| ["tests", "tests.rs", "new"].contains(&name))
 }
 
 /// The name of the type or trait that a line declares. Not those that only stand for another type in a file or an implementation, and
@@ -70,7 +64,9 @@ fn declarations() -> BTreeMap<String, BTreeMap<String, Vec<PathBuf>>> {
     for folder in std::fs::read_dir(root().join("crates")).unwrap() {
         let folder = folder.unwrap();
         let package = folder.file_name().into_string().unwrap();
-        for file in sources(&folder.path().join("src")) {
+        let mut files = Vec::new();
+        sources(&folder.path().join("src"), &mut files);
+        for file in files.into_iter().filter(|file| is_of_product(file)) {
             let text = std::fs::read_to_string(&file).unwrap();
             let product = text.split("#[cfg(test)]").next().unwrap();
             for name in product.lines().filter_map(declared) {
