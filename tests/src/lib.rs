@@ -237,6 +237,17 @@ impl Lab {
         });
     }
 
+    /// Requests something that the launcher of a run carries out, as soon as it observes the run: the simulator may be ready before.
+    pub fn ctl_of_launcher(&self, run: &str, args: &[&str]) {
+        eventually("the launcher to observe the run", || {
+            let mut all = vec!["ctl"];
+            all.extend(args);
+            all.extend(["--run", run]);
+            let output = self.cars(&all).output().unwrap();
+            output.status.success().then_some(())
+        });
+    }
+
     /// Steps a run that is paused by so many ticks; returns the last one, which is complete.
     pub fn step(&self, run: &str, ticks: u64) -> u64 {
         let last = self.settled(run) + ticks;

@@ -18,15 +18,6 @@ fn paused(lab: &Lab, run: &str, more: &[&str]) -> Running {
     lab.paused(run, FILE, more)
 }
 
-/// Restarts Leguin as soon as the launcher, which carries it out, observes the run: the clock may be there before.
-fn restart_leguin(lab: &Lab, run: &str) {
-    eventually("the launcher", || {
-        let order = ["ctl", "restart", "Leguin", "--run", run];
-        let output = lab.cars(&order).output().unwrap();
-        output.status.success().then_some(())
-    });
-}
-
 #[test]
 fn step_answers_with_the_tick_reached_and_the_buttons_do_what_they_say() {
     let lab = Lab::new();
@@ -323,7 +314,7 @@ fn orders_are_carried_out_whatever_a_launch_prints() {
         args.extend(more);
         let mut launch = paused(&lab, run, &args);
         lab.step(run, 10);
-        restart_leguin(&lab, run);
+        lab.ctl_of_launcher(run, &["restart", "Leguin"]);
         lab.step(run, 10);
         lab.ctl(run, &["hang", "Butler", "--for", "0.2 s"]);
         lab.ctl(run, &["start"]);
@@ -341,7 +332,7 @@ fn a_run_with_orders_is_resumed_without_a_word_and_without_a_console() {
     let quiet = ["--duration", "30 s", "--quiet", "--no-console"];
     let mut launch = paused(&lab, run, &quiet);
     lab.step(run, 10);
-    restart_leguin(&lab, run);
+    lab.ctl_of_launcher(run, &["restart", "Leguin"]);
     lab.step(run, 20);
     let simulator = launch.process("cars-sim");
     send(simulator, Signal::SIGKILL);

@@ -1,8 +1,8 @@
 //! What a program does that is understood in part, or has no effect: one line each, with the limit.
 
+use system_tests::Lab;
 use system_tests::processes::nobody_is_left;
 use system_tests::tools::has_python;
-use system_tests::{Lab, eventually};
 
 use super::stage::{Stage, says};
 
@@ -43,11 +43,9 @@ fn what_has_no_effect_is_told_once_in_terminal_and_log_and_counted() {
         let mut launch = stage.start(&run, &["--duration", "3 s", "--paused"]);
         stage.lab.until_ready(&run);
         // The launcher shows what is said once it observes the run, and from then on it carries out orders.
-        eventually("the launcher", || {
-            let order = ["ctl", "hang", "Butler", "--for", "0.1 s", "--run", &run];
-            let output = stage.lab.cars(&order).output().unwrap();
-            output.status.success().then_some(())
-        });
+        stage
+            .lab
+            .ctl_of_launcher(&run, &["hang", "Butler", "--for", "0.1 s"]);
         stage.lab.write("go", "");
         stage.lab.ctl(&run, &["start"]);
         launch.finish();
