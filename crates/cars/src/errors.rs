@@ -12,7 +12,7 @@ use launch::LaunchError;
 pub(crate) type Result<T, E = Box<dyn Error + Send + Sync>> = std::result::Result<T, E>;
 
 /// What the command line itself refuses, or what it was about when a library failed.
-#[derive(Debug, Default, thiserror::Error)]
+#[derive(Debug, thiserror::Error)]
 #[error("{reason}")]
 pub(crate) struct RefusedCommand {
     pub(crate) reason: String,
