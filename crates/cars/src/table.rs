@@ -7,8 +7,6 @@ use protocol::messages::{End, Verdict};
 use protocol::time::seconds;
 use record::Summary;
 use record::summary::{ExpectationVerdict, RobotSummary};
-use tabled::builder::Builder;
-use tabled::settings::Style;
 use terminal::OutputError;
 
 /// Width of a full bar, characters.
@@ -29,15 +27,8 @@ const HEAD: [&str; 5] = ["robot", "emotion", "behavior", "commands", "moves"];
 /// # Errors
 /// [`OutputError`] if the standard output cannot be written.
 pub(crate) fn print(summary: &Summary, folder: &Path) -> Result<(), OutputError> {
-    let mut table = Builder::default();
-    table.push_record(HEAD);
-    for row in rows(summary) {
-        table.push_record(row);
-    }
-
     let heading = heading(summary);
-    let mut table = table.build();
-    let table = table.with(Style::rounded());
+    let table = terminal::table(HEAD, rows(summary), HEAD.len());
     let mut text = format!("\n{heading}\n{table}");
     for line in verdicts(&summary.expectations) {
         text += &format!("\n{line}");

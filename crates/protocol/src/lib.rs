@@ -6,7 +6,6 @@
 //! SI units and REP 103 throughout: meters, seconds, radians counter-clockwise from +x.
 
 pub mod access;
-pub mod asyncapi;
 pub mod codec;
 pub mod event;
 pub mod keys;
@@ -15,7 +14,6 @@ pub mod name;
 mod path;
 pub mod plain;
 pub mod random;
-pub mod schema;
 pub mod time;
 
 pub use codec::{FieldError, Malformed, Message, decode, encode};

@@ -5,6 +5,8 @@
 //! message for any other failure, such as a full disk. The standard error is written as far as possible: a run goes on when
 //! its terminal is closed. Text for people is escaped, because robots, files and other processes write parts of it.
 
+mod table;
+
 use std::error::Error;
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
@@ -15,6 +17,8 @@ use clap::error::Error as UsageError;
 use clap::{Command, Parser};
 use clap_mangen::Man;
 use protocol::plain::{escape_report, escape_text};
+
+pub use table::table;
 
 /// Exit status of a simulator that cannot listen because another process does at its address.
 pub const ADDRESS_TAKEN: u8 = 3;

@@ -1,8 +1,5 @@
 //! The table of results.
 
-use tabled::builder::Builder;
-use tabled::settings::object::Columns;
-use tabled::settings::{Alignment, Style};
 use terminal::OutputError;
 
 use crate::results::{Results, median, paired_ratio};
@@ -11,16 +8,8 @@ use crate::subject::Subject;
 /// Prints median, best and worst of each subject, and medians of ratios.
 pub(crate) fn print(all: &[Results]) -> Result<(), OutputError> {
     let is_compared = all.iter().any(|results| !results.there.is_empty());
-    let mut table = Builder::default();
-    table.push_record(head(is_compared));
-    for results in all {
-        table.push_record(row(results, all, is_compared));
-    }
-
-    let mut table = table.build();
-    table
-        .with(Style::rounded())
-        .modify(Columns::new(1..), Alignment::right());
+    let rows = all.iter().map(|results| row(results, all, is_compared));
+    let table = terminal::table(head(is_compared), rows, 1);
     terminal::print_line(format_args!(
         "{table}\nRatios are medians over rounds of pairs that were measured in the same round."
     ))

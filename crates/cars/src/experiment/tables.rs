@@ -4,10 +4,6 @@ use experiments::{
     ArmDifference, ArmMeasure, Contrast, Estimated, Experiment, Measure, Results, SHOWN_P,
     least_p_holm,
 };
-use tabled::builder::Builder;
-use tabled::settings::formatting::AlignmentStrategy;
-use tabled::settings::object::Columns;
-use tabled::settings::{Alignment, Style};
 
 use crate::errors::Result;
 
@@ -59,7 +55,7 @@ pub(super) fn print(results: &Results) -> Result<()> {
 }
 
 /// The estimates as a table with one line for each arm under each condition.
-fn render(experiment: &Experiment, cells: &[ArmMeasure]) -> tabled::Table {
+fn render(experiment: &Experiment, cells: &[ArmMeasure]) -> String {
     let mut head = vec![experiment.conditions.head(), "arm".to_owned()];
     for measure in &experiment.measures {
         if measure.column.is_some() {
@@ -202,23 +198,15 @@ impl Rows {
 }
 
 /// A table whose first column names a condition in its first line only.
-fn table(head: Vec<String>, rows: Vec<Vec<String>>) -> tabled::Table {
-    let mut table = Builder::default();
-    table.push_record(head);
+fn table(head: Vec<String>, mut rows: Vec<Vec<String>>) -> String {
     let mut above = String::new();
-    for mut row in rows {
+    for row in &mut rows {
         if row[0] == above {
             row[0].clear();
         } else {
             above.clone_from(&row[0]);
         }
-        table.push_record(row);
     }
 
-    let mut table = table.build();
-    table
-        .with(Style::rounded())
-        .modify(Columns::new(2..), Alignment::right())
-        .modify(Columns::new(2..), AlignmentStrategy::PerLine);
-    table
+    terminal::table(head, rows, 2)
 }

@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 
 use schemars::{JsonSchema, Schema, schema_for};
 
-use crate::messages::{
-    Answer, Clock, Command, Control, ControlAnswer, JoinAnswer, JoinRequest, LogRecord, Panel,
-    ParametersAnswer, ParametersOffer, PublicState, Report, TickUpdate, Waiting, WorldFrame,
+use protocol::messages::{
+    Answer, Clock, Command, Control, ControlAnswer, FaultOrder, JoinAnswer, JoinRequest, LogRecord,
+    Panel, ParametersAnswer, ParametersOffer, PublicState, Report, TickUpdate, Waiting, WorldFrame,
 };
 
 /// The schema of every message, by the name of its file.
@@ -23,8 +23,8 @@ pub fn all() -> BTreeMap<&'static str, Schema> {
         ("command", one::<Command>()),
         ("control", one::<Control>()),
         ("control_answer", one::<ControlAnswer>()),
-        ("event", one::<crate::event::Line>()),
-        ("fault_order", one::<crate::messages::FaultOrder>()),
+        ("event", one::<protocol::Line>()),
+        ("fault_order", one::<FaultOrder>()),
         ("join_answer", one::<JoinAnswer>()),
         ("join_request", one::<JoinRequest>()),
         ("news", one::<TickUpdate>()),

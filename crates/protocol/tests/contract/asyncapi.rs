@@ -6,12 +6,12 @@ use schemars::generate::{SchemaGenerator, SchemaSettings};
 use schemars::{JsonSchema, Schema};
 use serde_json::{Map, Value, json};
 
-use crate::keys::{Keys, QUERIES, STATE};
-use crate::messages::{
+use protocol::keys::{Keys, QUERIES, STATE};
+use protocol::messages::{
     Answer, Clock, Command, Control, ControlAnswer, FaultOrder, JoinAnswer, JoinRequest, LogRecord,
     Panel, ParametersAnswer, ParametersOffer, PublicState, Report, TickUpdate, Waiting, WorldFrame,
 };
-use crate::name::{RobotName, RunName};
+use protocol::name::{RobotName, RunName};
 
 /// Names that stand for what an address leaves open. They are legal names, so that [`Keys`] builds the addresses.
 const PLACEHOLDERS: [(&str, &str); 3] =
@@ -342,14 +342,14 @@ pub fn document() -> Value {
         "asyncapi": "3.0.0",
         "info": {
             "title": "CARS",
-            "version": crate::PROTOCOL_VERSION.to_string(),
+            "version": protocol::PROTOCOL_VERSION.to_string(),
             "description": "The contract between simulator and robots, from a robot's point of view. What it means, and \
                             the order in which things happen, is in protocol.md. Channels are key expressions of zenoh.",
         },
         "defaultContentType": "application/json",
         "servers": {
             "simulator": {
-                "host": crate::DEFAULT_ENDPOINT.rsplit('/').next(),
+                "host": protocol::DEFAULT_ENDPOINT.rsplit('/').next(),
                 "protocol": "zenoh",
                 "description": "The simulator is a router of its own; robots are clients of it.",
             },

@@ -2,12 +2,15 @@
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
+mod asyncapi;
+mod schema;
+
 use protocol::messages::{
     Clock, Command, Control, Correction, Delivery, End, Face, JoinRequest, LogRecord, MAX_ENTRIES,
     MAX_TEXT_BYTES, NEWS_FLAGS, Panel, Performative, Point, Report, SensedBody, SensedKind,
     SensedRobot, TickUpdate, Tone, Variable, Widget,
 };
-use protocol::{Message, RobotName, RunName, decode, encode, schema};
+use protocol::{Message, RobotName, RunName, decode, encode};
 
 fn name(name: &str) -> RobotName {
     RobotName::new(name).unwrap()
@@ -420,7 +423,7 @@ fn the_schemas_on_file_are_those_of_the_types() {
 /// Set `CARS_UPDATE=1` to write the file anew.
 #[test]
 fn the_asyncapi_document_on_file_is_that_of_the_types() {
-    let document = protocol::asyncapi::document();
+    let document = asyncapi::document();
     let text = serde_json::to_string_pretty(&document).unwrap() + "\n";
     let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/asyncapi.json");
     if std::env::var_os("CARS_UPDATE").is_some() {
@@ -451,7 +454,7 @@ fn references(value: &serde_json::Value) -> Vec<&str> {
 
 #[test]
 fn the_asyncapi_document_holds_together() {
-    let document = protocol::asyncapi::document();
+    let document = asyncapi::document();
     let references = references(&document);
     assert!(references.len() > 100, "{}", references.len());
     for reference in references {
