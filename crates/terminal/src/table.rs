@@ -1,13 +1,14 @@
 //! Tables for people.
 
 use comfy_table::presets::UTF8_FULL_CONDENSED;
-use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};
+use comfy_table::{CellAlignment, ContentLineStyle, LineStyle, Table, TableStyle};
 
 /// Rounded corners, lines between columns, and one line below the head.
 const STYLE: TableStyle = UTF8_FULL_CONDENSED
+    .header_lines(ContentLineStyle::new('│', '│', '│'))
     .header_separator(LineStyle::new('├', '─', '┼', '┤'))
-    .with_rounded_corners()
-    .with_solid_inner_borders();
+    .content_lines(ContentLineStyle::new('│', '│', '│'))
+    .with_rounded_corners();
 
 /// Rows as a table with a head; a cell may have several lines. Columns from number `first_right` on are aligned to the right.
 #[must_use]

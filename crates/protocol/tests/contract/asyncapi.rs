@@ -322,7 +322,7 @@ fn messages(schemas: &mut SchemaGenerator) -> Map<String, Value> {
 
 /// The document.
 #[must_use]
-pub fn document() -> Value {
+pub(crate) fn document() -> Value {
     // The schemas of AsyncAPI are those of draft 7.
     let mut settings = SchemaSettings::draft07();
     settings.definitions_path = "/components/schemas".into();

@@ -12,7 +12,7 @@ use protocol::messages::{
 
 /// The schema of every message, by the name of its file.
 #[must_use]
-pub fn all() -> BTreeMap<&'static str, Schema> {
+pub(crate) fn all() -> BTreeMap<&'static str, Schema> {
     fn one<M: JsonSchema>() -> Schema {
         schema_for!(M)
     }
