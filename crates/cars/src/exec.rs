@@ -2,6 +2,7 @@
 
 use std::ffi::OsString;
 use std::process::ExitCode;
+use std::time::Duration;
 
 use clap::Args;
 use launch::child::{AtExit, become_program};
@@ -15,6 +16,15 @@ use crate::errors::{Result, refusal};
 pub(crate) struct ExecArgs {
     #[command(flatten)]
     robot: RobotArgs,
+    /// After how long without an answer people are told that the program may not have flushed its output, seconds.
+    #[arg(
+        long = "flush-notice-s",
+        env = "CARS_FLUSH_NOTICE_S",
+        default_value = "5",
+        value_name = "SECONDS",
+        value_parser = seconds
+    )]
+    flush_notice: Duration,
     /// The program and its arguments.
     #[arg(last = true, required = true, value_name = "PROGRAM")]
     command: Vec<OsString>,
@@ -44,8 +54,9 @@ pub(crate) fn exec(args: &ExecArgs) -> Result<ExitCode> {
         ));
     };
 
-    let silence = conform::unflushed(&args.command);
-    match run_program(name, args.robot.options(), &args.command, &silence)? {
+    let notice = conform::unflushed(&args.command);
+    let options = args.robot.options();
+    match run_program(name, options, &args.command, &notice, args.flush_notice)? {
         ProgramEnd::WithRun => Ok(ExitCode::SUCCESS),
         ProgramEnd::BySignal(code) => Ok(ExitCode::from(code)),
         ProgramEnd::Failed(reason) => {
@@ -53,6 +64,11 @@ pub(crate) fn exec(args: &ExecArgs) -> Result<ExitCode> {
             Ok(ExitCode::FAILURE)
         }
     }
+}
+
+fn seconds(text: &str) -> Result<Duration, String> {
+    let seconds: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    Duration::try_from_secs_f64(seconds).map_err(|error| error.to_string())
 }
 
 /// Replaces this process by a program that ends with its parent.

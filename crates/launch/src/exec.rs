@@ -38,8 +38,8 @@ pub enum ProgramEnd {
 
 /// Runs a program as the robot `name` until the run or the program ends.
 ///
-/// It must be called before this process has other threads, because it blocks the signals to end. `silence` is what to report,
-/// once, when the program does not answer for some seconds.
+/// It must be called before this process has other threads, because it blocks the signals to end. `notice` is what to
+/// report, once, when the program does not answer for `notice_after`.
 ///
 /// # Errors
 /// If the program cannot be started.
@@ -47,7 +47,8 @@ pub fn exec(
     name: &RobotName,
     options: HostOptions,
     command: &[OsString],
-    silence: &str,
+    notice: &str,
+    notice_after: Duration,
 ) -> Result<ProgramEnd, LaunchError> {
     // All later threads inherit the mask, so only the thread in `listen` receives these signals. So does the program, until
     // `cars child` empties it.
@@ -64,7 +65,8 @@ pub fn exec(
     let proxy = Box::new(ProgramRobot::new(
         program.clone(),
         events,
-        format!("{name}: {silence}"),
+        format!("{name}: {notice}"),
+        notice_after,
         remarks.clone(),
     ));
     let outcome = Host::connect(vec![(name.clone(), proxy)], options).and_then(|host| {

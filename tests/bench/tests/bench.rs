@@ -23,6 +23,7 @@ fn bench(args: &[&str]) -> (i32, String) {
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn a_build_is_compared_with_its_floor_and_with_another_build() {
     let other = programs().to_str().unwrap();
     let (code, text) = bench(&[
@@ -77,6 +78,7 @@ fn a_build_is_compared_with_its_floor_and_with_another_build() {
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn a_part_of_the_hall_is_measured_whatever_a_whole_run_is_to_show() {
     let args = ["--rounds", "1", "--robots", "2", "--ticks", "6000"];
     let (code, text) = bench(&[&["--only", "the hall"], &args[..]].concat());

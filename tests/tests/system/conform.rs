@@ -61,6 +61,7 @@ fn cars(more: &[&str], command: &[&str]) -> std::process::Output {
     // Whether Python flushes is for each program to decide.
     cars.current_dir(root())
         .env_remove("PYTHONUNBUFFERED")
+        .env("CARS_FLUSH_NOTICE_S", "1")
         .arg("conform")
         .args(more)
         .arg("--")

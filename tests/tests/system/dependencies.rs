@@ -100,6 +100,7 @@ fn tree(arguments: &[&str]) -> BTreeSet<String> {
 
 /// Programs and SDK are built with what the workspace was built with: zenoh is compiled once (`crates/workspace-hack`).
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn zenoh_is_built_with_the_same_features_everywhere() {
     let package = |line: &str| line.split(' ').take(2).collect::<Vec<_>>().join(" ");
     let zenoh: BTreeSet<String> = tree(&["-p=zenoh", "-e=normal,build"])
@@ -154,6 +155,7 @@ fn sources(package: &Path) -> Vec<(String, String)> {
 
 /// A package in `vendor` is the published one with the changes of its `changes.patch`, and comes with its license.
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn vendored_packages_are_the_published_ones_and_their_patches() {
     for folder in std::fs::read_dir(root().join("vendor")).unwrap() {
         let folder = folder.unwrap().path();

@@ -18,8 +18,6 @@ use super::remarks::Remarks;
 
 /// Most lines that a program may write in a tick.
 const MAX_LINES: usize = 1 << 16;
-/// How long a program may take to answer before people are told what may be wrong.
-const SILENCE: Duration = Duration::from_secs(5);
 /// Most commands that it may send in a tick, as a report allows.
 const MAX_COMMANDS: usize = protocol::messages::MAX_ENTRIES;
 /// Most bytes of its lines that become part of the report. The rest of a message is for the other fields of the report.
@@ -29,8 +27,9 @@ const MAX_REPORTED: usize = MAX_MESSAGE_BYTES - (1 << 17);
 pub(super) struct ProgramRobot {
     program: Arc<Program>,
     events: Receiver<ProgramEvent>,
-    /// What to report when the program does not answer for [`SILENCE`]; `None` once it has been reported.
-    silence: Option<String>,
+    /// What to report when the program does not answer for `notice_after`; `None` once it has been reported.
+    notice: Option<String>,
+    notice_after: Duration,
     /// Whether the line `init` was the last one that the program was sent, so that it may be answering it.
     is_initializing: bool,
     remarks: Remarks,
@@ -43,13 +42,15 @@ impl ProgramRobot {
     pub(super) fn new(
         program: Arc<Program>,
         events: Receiver<ProgramEvent>,
-        silence: String,
+        notice: String,
+        notice_after: Duration,
         remarks: Remarks,
     ) -> Self {
         Self {
             program,
             events,
-            silence: Some(silence),
+            notice: Some(notice),
+            notice_after,
             is_initializing: false,
             remarks,
             done: DoneLine::default(),
@@ -126,13 +127,13 @@ impl ProgramRobot {
 
     /// Waits for the next event of the program. The first long wait is reported.
     fn next(&mut self) -> ProgramEvent {
-        if let Some(silence) = &self.silence {
-            match self.events.recv_timeout(SILENCE) {
+        if let Some(notice) = &self.notice {
+            match self.events.recv_timeout(self.notice_after) {
                 Ok(event) => return event,
                 Err(RecvTimeoutError::Disconnected) => return ProgramEvent::Ended,
-                Err(RecvTimeoutError::Timeout) => terminal::note(silence),
+                Err(RecvTimeoutError::Timeout) => terminal::note(notice),
             }
-            self.silence = None;
+            self.notice = None;
         }
 
         // Without a limit: the clock waits for a robot as long as it takes. A signal or the program's

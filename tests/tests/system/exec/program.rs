@@ -167,14 +167,14 @@ fn a_program_that_does_not_flush_is_told_once_and_waited_for() {
     // sed keeps what it writes to a pipe back.
     let stage = Stage::new(
         r#"while hear; do say '{"type":"done"}'; done | sed 's/x/x/'"#,
-        "",
+        "env = { CARS_FLUSH_NOTICE_S = \"0.3\" }",
     );
     let mut launch = stage.start("exec-unflushed", &[]);
     launch.prints("Leguin: its program has not flushed its standard output");
     let once = launch.prints("sed -u, grep --line-buffered, stdbuf -oL");
     launch.prints_after("waiting for Leguin", None);
 
-    std::thread::sleep(std::time::Duration::from_secs(6));
+    std::thread::sleep(std::time::Duration::from_secs(1));
     assert_eq!(
         launch.prints("has not flushed"),
         once,
