@@ -18,6 +18,8 @@ fn a_killed_launcher_leaves_no_process_no_port_and_a_whole_record() {
     let mut command = lab.cars(&["launch", "launch/hors_doeuvres.toml", "--speed", "10"]);
     // The simulator prints, also while its standard error has no reader.
     command.args(["--run", run]).env("RUST_LOG", "debug");
+    // A port of its own: the usual one may be the console's of another test as soon as this one leaves it.
+    command.env("CARS_CONSOLE_BIND", "127.0.0.1:0");
     let mut launch = Running::start(command, run, lab.out().join(run));
     launch.prints("console: http://");
     for program in ["cars-sim", "cars-butler", "cars-leguin", "cars-console"] {
