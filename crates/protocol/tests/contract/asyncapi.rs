@@ -2,16 +2,12 @@
 //! does with them as operations, messages with their schemas. Generated from the types; `docs/asyncapi.json` holds it as a
 //! file, and a test keeps both equal.
 
+use protocol::keys::{Keys, QUERIES, STATE};
+use protocol::name::{RobotName, RunName};
 use schemars::generate::{SchemaGenerator, SchemaSettings};
-use schemars::{JsonSchema, Schema};
 use serde_json::{Map, Value, json};
 
-use protocol::keys::{Keys, QUERIES, STATE};
-use protocol::messages::{
-    Answer, Clock, Command, Control, ControlAnswer, FaultOrder, JoinAnswer, JoinRequest, LogRecord,
-    Panel, ParametersAnswer, ParametersOffer, PublicState, Report, TickUpdate, Waiting, WorldFrame,
-};
-use protocol::name::{RobotName, RunName};
+use super::schema::MESSAGES;
 
 /// Names that stand for what an address leaves open. They are legal names, so that [`Keys`] builds the addresses.
 const PLACEHOLDERS: [(&str, &str); 3] =
@@ -45,17 +41,11 @@ enum Operation {
 }
 use Operation::{Answer as Replies, Ask, Receive, Send};
 
-fn placeholder(name: &'static str) -> RobotName {
-    RobotName::new(name)
-        .unwrap_or_else(|error| unreachable!("a placeholder is a legal name: {error}"))
-}
-
 /// The keys of a run, with placeholders for what is open.
 fn channels() -> Vec<ChannelEntry> {
-    let run = RunName::new("RUN-").unwrap_or_else(|error| unreachable!("a legal name: {error}"));
-    let keys = Keys::new(&run);
-    let robot = placeholder("NAME-");
-    let from = placeholder("FROM-");
+    let keys = Keys::new(&RunName::new("RUN-").unwrap());
+    let robot = RobotName::new("NAME-").unwrap();
+    let from = RobotName::new("FROM-").unwrap();
 
     let channel = |name, key, what, messages, operations| ChannelEntry {
         name,
@@ -286,33 +276,11 @@ impl ChannelEntry {
 
 /// The messages by name, with their schemas.
 fn messages(schemas: &mut SchemaGenerator) -> Map<String, Value> {
-    fn one<M: JsonSchema>(schemas: &mut SchemaGenerator) -> Schema {
-        schemas.subschema_for::<M>()
-    }
-
-    type Of = fn(&mut SchemaGenerator) -> Schema;
-    let all: [(&str, Of); 17] = [
-        ("answer", one::<Answer>),
-        ("clock", one::<Clock>),
-        ("command", one::<Command>),
-        ("control", one::<Control>),
-        ("control_answer", one::<ControlAnswer>),
-        ("fault_order", one::<FaultOrder>),
-        ("join_answer", one::<JoinAnswer>),
-        ("join_request", one::<JoinRequest>),
-        ("log_record", one::<LogRecord>),
-        ("panel", one::<Panel>),
-        ("parameters_answer", one::<ParametersAnswer>),
-        ("parameters_offer", one::<ParametersOffer>),
-        ("news", one::<TickUpdate>),
-        ("public_state", one::<PublicState>),
-        ("report", one::<Report>),
-        ("waiting", one::<Waiting>),
-        ("world_frame", one::<WorldFrame>),
-    ];
-
-    let described = |(name, of): (&str, Of)| (name.to_owned(), json!({ "payload": of(schemas) }));
-    let mut messages: Map<String, Value> = all.into_iter().map(described).collect();
+    let described = MESSAGES.iter().map(|message| {
+        let payload = (message.part)(schemas);
+        (message.name.to_owned(), json!({ "payload": payload }))
+    });
+    let mut messages: Map<String, Value> = described.collect();
 
     let summary =
         "A query without a payload; its parameters say as of which tick: `tick=12;epoch=1`.";
@@ -321,7 +289,6 @@ fn messages(schemas: &mut SchemaGenerator) -> Map<String, Value> {
 }
 
 /// The document.
-#[must_use]
 pub(crate) fn document() -> Value {
     // The schemas of AsyncAPI are those of draft 7.
     let mut settings = SchemaSettings::draft07();

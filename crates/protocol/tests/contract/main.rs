@@ -5,12 +5,17 @@
 mod asyncapi;
 mod schema;
 
+use std::path::{Path, PathBuf};
+
 use protocol::messages::{
     Clock, Command, Control, Correction, Delivery, End, Face, JoinRequest, LogRecord, MAX_ENTRIES,
     MAX_TEXT_BYTES, NEWS_FLAGS, Panel, Performative, Point, Report, SensedBody, SensedKind,
     SensedRobot, TickUpdate, Tone, Variable, Widget,
 };
 use protocol::{Message, RobotName, RunName, decode, encode};
+use serde::Serialize;
+
+use schema::{EVENT, MESSAGES, MessageSchema};
 
 fn name(name: &str) -> RobotName {
     RobotName::new(name).unwrap()
@@ -401,40 +406,37 @@ fn a_name_that_breaks_keys_cannot_be_a_run() {
     assert!(RunName::new("a/b").is_err());
 }
 
-/// Set `CARS_UPDATE=1` to write the files anew.
-#[test]
-fn the_schemas_on_file_are_those_of_the_types() {
-    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/schemas");
-    for (name, schema) in schema::all() {
-        let file = folder.join(format!("{name}.json"));
-        let text = serde_json::to_string_pretty(&schema).unwrap() + "\n";
-        if std::env::var_os("CARS_UPDATE").is_some() {
-            std::fs::write(&file, &text).unwrap();
-        }
-        let on_file = std::fs::read_to_string(&file).unwrap_or_default();
-        assert!(
-            on_file == text,
-            "{} is out of date: run the test with CARS_UPDATE=1",
-            file.display()
-        );
-    }
+fn docs() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs")
 }
 
-/// Set `CARS_UPDATE=1` to write the file anew.
-#[test]
-fn the_asyncapi_document_on_file_is_that_of_the_types() {
-    let document = asyncapi::document();
-    let text = serde_json::to_string_pretty(&document).unwrap() + "\n";
-    let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/asyncapi.json");
+/// A file has this value; with `CARS_UPDATE=1` it is written anew.
+#[track_caller]
+fn is_on_file(file: &Path, value: &impl Serialize) {
+    let text = serde_json::to_string_pretty(value).unwrap() + "\n";
     if std::env::var_os("CARS_UPDATE").is_some() {
-        std::fs::write(&file, &text).unwrap();
+        std::fs::write(file, &text).unwrap();
     }
-    let on_file = std::fs::read_to_string(&file).unwrap_or_default();
+
+    let on_file = std::fs::read_to_string(file).unwrap_or_default();
     assert!(
         on_file == text,
         "{} is out of date: run the test with CARS_UPDATE=1",
         file.display()
     );
+}
+
+#[test]
+fn the_schemas_on_file_are_those_of_the_types() {
+    let folder = docs().join("schemas");
+    for MessageSchema { name, whole, .. } in MESSAGES.iter().chain([&EVENT]) {
+        is_on_file(&folder.join(format!("{name}.json")), &whole());
+    }
+}
+
+#[test]
+fn the_asyncapi_document_on_file_is_that_of_the_types() {
+    is_on_file(&docs().join("asyncapi.json"), &asyncapi::document());
 }
 
 /// All values of `$ref` in a document.
@@ -481,11 +483,11 @@ fn the_asyncapi_document_holds_together() {
     }
     // Every message that has a schema on file and travels has one here, too.
     let messages = document["components"]["messages"].as_object().unwrap();
-    let on_disk_only = ["event"];
-    for name in schema::all()
-        .keys()
-        .filter(|name| !on_disk_only.contains(name))
-    {
-        assert!(messages.contains_key(*name), "{name}");
+    for file in std::fs::read_dir(docs().join("schemas")).unwrap() {
+        let file = file.unwrap().path();
+        let name = file.file_stem().unwrap().to_str().unwrap();
+        if name != EVENT.name {
+            assert!(messages.contains_key(name), "{name}");
+        }
     }
 }

@@ -1,41 +1,52 @@
-//! JSON Schemas of all messages, for authors in other languages. Generated from the types; `schemas/` holds them as
+//! JSON Schemas of all messages, for authors in other languages. Generated from the types; `docs/schemas/` holds them as
 //! files, and a test keeps both equal.
 
-use std::collections::BTreeMap;
-
-use schemars::{JsonSchema, Schema, schema_for};
-
+use protocol::Line;
 use protocol::messages::{
     Answer, Clock, Command, Control, ControlAnswer, FaultOrder, JoinAnswer, JoinRequest, LogRecord,
     Panel, ParametersAnswer, ParametersOffer, PublicState, Report, TickUpdate, Waiting, WorldFrame,
 };
+use schemars::generate::SchemaGenerator;
+use schemars::{JsonSchema, Schema, schema_for};
 
-/// The schema of every message, by the name of its file.
-#[must_use]
-pub(crate) fn all() -> BTreeMap<&'static str, Schema> {
-    fn one<M: JsonSchema>() -> Schema {
-        schema_for!(M)
-    }
-
-    [
-        ("answer", one::<Answer>()),
-        ("clock", one::<Clock>()),
-        ("command", one::<Command>()),
-        ("control", one::<Control>()),
-        ("control_answer", one::<ControlAnswer>()),
-        ("event", one::<protocol::Line>()),
-        ("fault_order", one::<FaultOrder>()),
-        ("join_answer", one::<JoinAnswer>()),
-        ("join_request", one::<JoinRequest>()),
-        ("news", one::<TickUpdate>()),
-        ("log_record", one::<LogRecord>()),
-        ("panel", one::<Panel>()),
-        ("parameters_answer", one::<ParametersAnswer>()),
-        ("parameters_offer", one::<ParametersOffer>()),
-        ("public_state", one::<PublicState>()),
-        ("report", one::<Report>()),
-        ("waiting", one::<Waiting>()),
-        ("world_frame", one::<WorldFrame>()),
-    ]
-    .into()
+/// A message and its schema.
+pub(crate) struct MessageSchema {
+    /// Name of its file.
+    pub(crate) name: &'static str,
+    /// The schema by itself.
+    pub(crate) whole: fn() -> Schema,
+    /// The schema as a part of a document.
+    pub(crate) part: fn(&mut SchemaGenerator) -> Schema,
 }
+
+const fn of<M: JsonSchema>(name: &'static str) -> MessageSchema {
+    MessageSchema {
+        name,
+        whole: || schema_for!(M),
+        part: |schemas| schemas.subschema_for::<M>(),
+    }
+}
+
+/// What only files have, and no message has.
+pub(crate) const EVENT: MessageSchema = of::<Line>("event");
+
+/// Every message that travels.
+pub(crate) const MESSAGES: [MessageSchema; 17] = [
+    of::<Answer>("answer"),
+    of::<Clock>("clock"),
+    of::<Command>("command"),
+    of::<Control>("control"),
+    of::<ControlAnswer>("control_answer"),
+    of::<FaultOrder>("fault_order"),
+    of::<JoinAnswer>("join_answer"),
+    of::<JoinRequest>("join_request"),
+    of::<LogRecord>("log_record"),
+    of::<Panel>("panel"),
+    of::<ParametersAnswer>("parameters_answer"),
+    of::<ParametersOffer>("parameters_offer"),
+    of::<TickUpdate>("news"),
+    of::<PublicState>("public_state"),
+    of::<Report>("report"),
+    of::<Waiting>("waiting"),
+    of::<WorldFrame>("world_frame"),
+];
