@@ -193,6 +193,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("workspace-hack", &[]),
     ("zenoh-link-tcp", &[]),
     ("zenoh-link-tls", &["zenoh-link-tcp"]),
+    ("zenoh-plugin-trait", &[]),
     (
         "system-tests",
         &[

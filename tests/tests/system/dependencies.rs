@@ -1,7 +1,7 @@
 //! What the project is built from: advisories that `deny.toml` ignores, for as long as their reasons hold (all else in it is `cargo deny
 //! check`'s), features, and the packages in `vendor`.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -140,17 +140,20 @@ fn published(name: &str, version: &str) -> Result<PathBuf, String> {
 }
 
 /// The names and contents of the files of a package that are compiled.
-fn sources(package: &Path) -> Vec<(String, String)> {
-    let mut files = vec!["Cargo.toml".to_owned()];
-    for file in std::fs::read_dir(package.join("src")).unwrap() {
-        let name = file.unwrap().file_name().into_string().unwrap();
-        files.push(format!("src/{name}"));
+fn sources(package: &Path) -> BTreeMap<PathBuf, String> {
+    let mut folders = vec![package.join("src")];
+    let mut files = vec![package.join("Cargo.toml")];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            let kind = if path.is_dir() { &mut folders } else { &mut files };
+            kind.push(path);
+        }
     }
-    files.sort();
 
-    let read = |name: &String| std::fs::read_to_string(package.join(name)).unwrap();
-    let texts: Vec<String> = files.iter().map(read).collect();
-    files.into_iter().zip(texts).collect()
+    let name = |file: &PathBuf| file.strip_prefix(package).unwrap().to_owned();
+    let text = |file: &PathBuf| std::fs::read_to_string(file).unwrap();
+    files.iter().map(|file| (name(file), text(file))).collect()
 }
 
 /// A package in `vendor` is the published one with the changes of its `changes.patch`, and comes with its license.
@@ -176,9 +179,10 @@ fn vendored_packages_are_the_published_ones_and_their_patches() {
             }
         };
         let patched = tempfile::tempdir().unwrap();
-        std::fs::create_dir(patched.path().join("src")).unwrap();
         for (file, text) in sources(&published) {
-            std::fs::write(patched.path().join(file), text).unwrap();
+            let file = patched.path().join(file);
+            std::fs::create_dir_all(file.parent().unwrap()).unwrap();
+            std::fs::write(file, text).unwrap();
         }
         let output = Command::new("git")
             .current_dir(patched.path())
