@@ -408,6 +408,7 @@ Object.assign(window, {
     frame: () => store.frame,
     history: () => store.history,
     lines: () => store.log.length,
+    log: () => store.log,
     unlikeLines: () => new Set(store.log.map((line) => JSON.stringify(line))).size,
     window: () => shownTime.range_s(),
     chartScale: () => [charts.plot?.scales.x.min, charts.plot?.scales.x.max],

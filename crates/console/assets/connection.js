@@ -4,7 +4,7 @@
 /** @typedef {import("./types/messages.js").Control} Control */
 /** @typedef {import("./types/messages.js").ControlAnswer} ControlAnswer */
 /** @typedef {import("./types/messages.js").WorldFrame} WorldFrame */
-/** @typedef {import("./types/messages.js").Panel} Panel */
+/** @typedef {import("./types/messages.js").TickPanel} TickPanel */
 /** @typedef {import("./types/messages.js").LogRecord} LogRecord */
 
 /**
@@ -12,7 +12,7 @@
  * @typedef {{type: "hello", mode: "live" | "recording", run: string, endpoint?: string, version: string}
  *   | {type: "simulator", present: boolean}
  *   | {type: "frame", frame: WorldFrame}
- *   | {type: "panel", robot: string, panel: Panel}
+ *   | {type: "panel", robot: string, panel: TickPanel}
  *   | {type: "log", lines: LogRecord[], dropped: number}
  *   | {type: "failed", failed: Failed}
  *   | {type: "answer", id: number, answer?: ControlAnswer, error?: string}} ServerMessage

@@ -6,7 +6,7 @@ import { seconds, short } from "./units.js";
 
 /** @typedef {import("./types/messages.js").Awaited} Awaited */
 /** @typedef {import("./types/messages.js").LogRecord} LogRecord */
-/** @typedef {import("./types/messages.js").Panel} Panel */
+/** @typedef {import("./widgets.js").Panel} Panel */
 /** @typedef {import("./types/messages.js").RobotFrame} RobotFrame */
 /** @typedef {import("./types/messages.js").Widget} Widget */
 

@@ -5,8 +5,8 @@
 import { spread } from "./history.js";
 
 /** @typedef {import("./types/messages.js").WorldFrame} WorldFrame */
-/** @typedef {import("./types/messages.js").Panel} Panel */
-/** A frame without its guests, whose places are packed, and the panels at that time.
+/** @typedef {import("./widgets.js").Panel} Panel */
+/** A frame without its guests, whose places are packed, and the panels of its tick.
  * @typedef {{frame: WorldFrame, guests_m: Float64Array, panels: Map<string, Panel>}} Seen */
 
 /** Most frames; beyond, older ones are dropped where they are close together, so that the whole time stays in reach. */
@@ -30,16 +30,14 @@ export class Memory {
 
   /**
    * @param {WorldFrame} frame
-   * @param {Map<string, Panel>} panels
+   * @param {Map<string, Panel>} panels of its tick; one that comes later is added by the caller
    */
   add(frame, panels) {
     const last = this.seen.at(-1);
     if (last && frame.tick <= last.frame.tick) return;
 
-    // Most frames bring no panel, or not of many robots: those that are alike are kept once.
-    const isAlike = last && last.panels.size === panels.size && [...panels].every(([robot, panel]) => last.panels.get(robot) === panel);
     const guests_m = new Float64Array(frame.guests.flat());
-    const seen = { frame: { ...frame, guests: [] }, guests_m, panels: isAlike ? last.panels : new Map(panels) };
+    const seen = { frame: { ...frame, guests: [] }, guests_m, panels };
     this.seen.push(seen);
     this.bodies += weight(seen);
     if (this.seen.length > MOST_FRAMES || this.bodies > MOST_BODIES) this.thin();

@@ -11,7 +11,7 @@ import { drawWidget } from "./widgets.js";
 
 /** @typedef {import("./store.js").Store} Store */
 /** @typedef {import("./units.js").Units} Units */
-/** @typedef {import("./types/messages.js").Panel} Panel */
+/** @typedef {import("./widgets.js").Panel} Panel */
 /** @typedef {import("./types/messages.js").RobotFrame} RobotFrame */
 /** @typedef {import("./types/messages.js").Widget} Widget */
 
@@ -136,6 +136,9 @@ export class Panels {
         <p class="where">${this.units.length(robot.location.x)}, ${this.units.length(robot.location.y)}
           <span>${this.units.speed(robot.speed_mps)}</span>
           ${robot.blocked ? html`<span class="blocked">blocked</span>` : nothing}</p>
+        ${this.store.displaying.has(name) && !this.store.panels.has(name) && robot.presence === "here"
+          ? html`<p class="no-panel" data-testid="no-panel">Without its own panel, which there is not of this tick.</p>`
+          : nothing}
         <div class="widgets">${widgets.map((widget) => drawWidget(widget, send))}</div>
         ${details.length
           ? html`<details class="details" data-testid="details" ?open=${this.unfolded.has(name)} @toggle=${fold}><summary>Details</summary>

@@ -10,7 +10,7 @@ import { seconds } from "./units.js";
 import { Vector } from "./vector.js";
 
 /** @typedef {import("./types/messages.js").Face} Face */
-/** @typedef {import("./types/messages.js").Panel} Panel */
+/** @typedef {import("./widgets.js").Panel} Panel */
 /** @typedef {import("./types/messages.js").RobotFrame} RobotFrame */
 /** @typedef {import("./theme.js").Theme} Theme */
 

@@ -9,7 +9,7 @@ import { History } from "./history.js";
 /** @typedef {import("./types/messages.js").Cut} Cut */
 /** @typedef {import("./types/messages.js").Flight} Flight */
 /** @typedef {import("./types/messages.js").LogRecord} LogRecord */
-/** @typedef {import("./types/messages.js").Panel} Panel */
+/** @typedef {import("./widgets.js").Panel} Panel */
 /** @typedef {import("./types/messages.js").RobotFrame} RobotFrame */
 /** @typedef {import("./types/messages.js").Standing} Standing */
 /** @typedef {import("./types/messages.js").WorldFrame} WorldFrame */
@@ -23,7 +23,7 @@ import { History } from "./history.js";
  * @typedef {{tick: number, robots: RobotFrame[], guests_mm: number[], cuts: Cut[], awaiting: Awaited[],
  *   expectations: Standing[]}} RecordedTick
  */
-/** A panel and the tick in which it arrived. @typedef {{tick: number, robot: string, panel: Panel}} RecordedPanel */
+/** A panel and its tick. @typedef {{tick: number, robot: string, panel: Panel}} RecordedPanel */
 /** Ticks before `end`. @typedef {{end: number, ticks: RecordedTick[], panels: RecordedPanel[], flights: Flight[], log: LogRecord[]}} Chunk */
 
 /** Ticks in a chunk: few, because a seek waits for a whole one. */
@@ -46,8 +46,6 @@ const BEGINNING_MS = 5000;
 const SEEN = 5;
 /** Least time between two frames. */
 const FRAME_MS = 33;
-/** How long a panel is shown, simulated seconds. In a fast run panels arrive more seldom, and would show old states. */
-const PANEL_S = 2;
 /** The factor of playback at speed "max". */
 const FASTEST = 200;
 
@@ -435,7 +433,8 @@ export class Player {
 
     const flights = isPlayed ? chunk.flights.filter((flight) => flight.tick > this.chosen && flight.tick <= tick) : [];
     this.chosen = record.tick;
-    this.store.showPast(this.frame(header, record, flights), panelsAt(chunk, record.tick, header.tick_s));
+    const panels = chunk.panels.filter((one) => one.tick === record.tick);
+    this.store.showPast(this.frame(header, record, flights), new Map(panels.map(({ robot, panel }) => [robot, panel])));
   }
 
   /** Shows what the page saw of a tick, or of one before. @param {number} tick */
@@ -546,22 +545,6 @@ export class Player {
 function samples(epoch, from, every = Math.ceil((epoch.ticks + 1) / SAMPLES)) {
   const query = { from, count: READ_AT_ONCE, every, epoch: epoch.epoch };
   return get("recording/ticks", new URLSearchParams(Object.entries(query).map(([name, value]) => [name, String(value)])));
-}
-
-/**
- * The newest panel of each robot at a tick of a chunk.
- * @param {Chunk} chunk
- * @param {number} tick
- * @param {number} tick_s
- */
-function panelsAt(chunk, tick, tick_s) {
-  const lifetime = Math.max(1, Math.round(PANEL_S / tick_s));
-  /** @type {Map<string, Panel>} */
-  const panels = new Map();
-  for (const one of chunk.panels) {
-    if (one.tick <= tick && one.tick > tick - lifetime) panels.set(one.robot, one.panel);
-  }
-  return panels;
 }
 
 /** @param {Chunk} chunk */

@@ -6,7 +6,8 @@ import { Marks } from "./marks.js";
 import { Memory } from "./memory.js";
 
 /** @typedef {import("./types/messages.js").WorldFrame} WorldFrame */
-/** @typedef {import("./types/messages.js").Panel} Panel */
+/** @typedef {import("./widgets.js").Panel} Panel */
+/** @typedef {import("./types/messages.js").TickPanel} TickPanel */
 /** @typedef {import("./types/messages.js").LogRecord} LogRecord */
 /** @typedef {import("./types/messages.js").Status} Status */
 /** @typedef {import("./connection.js").Broadcast} Broadcast */
@@ -46,10 +47,14 @@ export class Store {
     this.frameAt_ms = 0;
     /** The newest status that answered a request. @type {Status | null} */
     this.status = null;
-    /** @type {Map<string, Panel>} */
+    /** The panels of the tick that is shown. @type {Map<string, Panel>} */
     this.panels = new Map();
-    /** The newest panels of a run in progress. @type {Map<string, Panel>} */
+    /** Those of the newest frame of a run in progress. @type {Map<string, Panel>} */
     this.livePanels = this.panels;
+    /** Panels whose frame comes next. @type {Map<string, TickPanel>} */
+    this.earlyPanels = new Map();
+    /** Robots that have shown a panel. @type {Set<string>} */
+    this.displaying = new Set();
     /** @type {LogRecord[]} */
     this.log = [];
     /** How often lines were inserted before others. */
@@ -121,10 +126,7 @@ export class Store {
         this.receive(message.frame);
         break;
       case "panel":
-        if (this.livePanels.size < MOST_PANELS || this.livePanels.has(message.robot)) {
-          this.livePanels.set(message.robot, message.panel);
-          if (!this.isBack) this.emit("panel");
-        }
+        this.receivePanel(message.robot, message.panel);
         break;
       case "log":
         this.logMissed += message.dropped;
@@ -168,12 +170,30 @@ export class Store {
     // Another run of the name, or a replay that has been moved.
     if (last && compare(frame, last) < 0) this.marks.restart(this.log);
 
+    this.livePanels = new Map([...this.earlyPanels].filter(([, panel]) => isOfTick(panel, frame)));
+    if (!this.isBack) this.panels = this.livePanels;
     this.liveHistory.add(frame.time_s, frame.robots);
     this.memory.add(frame, this.livePanels);
+    if (!this.isBack) this.emit("panel");
     if (!this.isBack) this.show(frame);
     else if (isChanged && this.frame) this.show({ ...this.frame, phase: frame.phase, speed: frame.speed, flights: [] });
     if (isNew) this.emit("live-epoch");
     this.emit("live");
+  }
+
+  /**
+   * A panel is shown with the frame of its tick, which comes after it or is here already.
+   * @param {string} robot
+   * @param {TickPanel} panel
+   */
+  receivePanel(robot, panel) {
+    if (!this.earlyPanels.has(robot) && this.earlyPanels.size >= MOST_PANELS) return;
+    this.earlyPanels.set(robot, panel);
+    if (panel.widgets.length > 0) this.displaying.add(robot);
+    if (!this.live || !isOfTick(panel, this.live)) return;
+
+    this.livePanels.set(robot, panel);
+    if (!this.isBack) this.emit("panel");
   }
 
   /** Forgets what was seen of an epoch that is over. */
@@ -201,6 +221,7 @@ export class Store {
   showPast(frame, panels) {
     this.isBack = this.mode === "live";
     this.panels = panels;
+    for (const robot of panels.keys()) this.displaying.add(robot);
     this.emit("panel");
     this.show(frame);
   }
@@ -376,6 +397,14 @@ export class Store {
  */
 function isSameEpoch(one, other) {
   return one.run === other.run && one.epoch === other.epoch;
+}
+
+/**
+ * @param {TickPanel} panel
+ * @param {WorldFrame} frame
+ */
+function isOfTick(panel, frame) {
+  return panel.epoch === frame.epoch && panel.tick === frame.tick;
 }
 
 /** @typedef {{epoch: number, tick: number}} Moment */

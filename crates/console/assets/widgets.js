@@ -8,6 +8,7 @@ import { html, nothing, svg } from "./vendor/lit-html.js";
 
 /** @typedef {import("./types/messages.js").Widget} Widget */
 /** @typedef {import("./types/messages.js").Tone} Tone */
+/** What a robot displays of a tick. @typedef {Pick<import("./types/messages.js").TickPanel, "widgets">} Panel */
 /** @typedef {(command: string) => void} Send */
 
 const TONES = ["good", "neutral", "warning", "bad"];

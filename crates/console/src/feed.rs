@@ -1,15 +1,15 @@
 //! What a run shows now. The live connection writes it; every browser reads it at its own pace.
 //!
-//! A browser has a [`Cursor`] and no queue: when it is ready, it takes what is new since its last batch. Frames and panels
-//! replace their predecessors, so the newest wins. The last lines of the log are kept, and a browser that is too slow for
+//! A browser has a [`Cursor`] and no queue: when it is ready, it takes what is new since its last batch. A frame replaces its
+//! predecessor, so the newest wins, and comes with the panels of its tick: one of another tick is never shown. The last lines of the log are kept, and a browser that is too slow for
 //! some is told how many it missed. So memory is bounded however slowly a browser reads.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use axum::extract::ws::Utf8Bytes;
-use protocol::RobotName;
-use protocol::messages::{Flight, LogRecord, MAX_FLIGHTS, Panel, WorldFrame};
+use protocol::messages::{Flight, LogRecord, MAX_FLIGHTS, TickPanel, WorldFrame};
+use protocol::{Epoch, RobotName, Tick};
 use tokio::sync::watch;
 
 use crate::page::ServerMessage;
@@ -39,9 +39,12 @@ struct FeedState {
     frame_count: u64,
     /// The fates of commands, numbered like the frames that reported them.
     flights: VecDeque<Numbered<Flight>>,
+    /// The panels of the frame's tick.
     panels: BTreeMap<RobotName, Numbered<Utf8Bytes>>,
-    /// Number of the newest panel, counted over all robots, from 1.
+    /// Number of the newest of these, counted over all robots, from 1.
     panel_count: u64,
+    /// The newest panels of other ticks: robots put theirs before the simulator can put the frame of their tick.
+    early_panels: BTreeMap<RobotName, EarlyPanel>,
     lines: VecDeque<Numbered<LogRecord>>,
     /// Lines that arrived since the simulator appeared, each with the number of lines that were lost before it. Those before
     /// them are yet to come.
@@ -53,6 +56,12 @@ struct FeedState {
 struct Numbered<T> {
     number: u64,
     value: T,
+}
+
+/// A panel whose frame has not arrived.
+struct EarlyPanel {
+    at: (Epoch, Tick),
+    text: Utf8Bytes,
 }
 
 /// A frame, and the message for browsers that have seen the frame before.
@@ -131,7 +140,7 @@ impl Feed {
         self.lock().frame_count
     }
 
-    /// Replaces the frame. Panels of robots that are not in it are removed.
+    /// Replaces the frame. The panels that are shown are those of its tick.
     pub(crate) fn put_frame(&self, frame: WorldFrame) {
         let text = ServerMessage::Frame { frame: &frame }.text();
         let encoded = EncodedFrame {
@@ -146,10 +155,11 @@ impl Feed {
     ///
     /// # Errors
     /// All panels together would exceed [`MAX_PANEL_BYTES`].
-    pub(crate) fn put_panel(&self, robot: &RobotName, panel: &Panel) -> Result<(), String> {
+    pub(crate) fn put_panel(&self, robot: &RobotName, panel: &TickPanel) -> Result<(), String> {
+        let at = (panel.epoch, panel.tick);
         let text = ServerMessage::Panel { robot, panel }.text();
 
-        self.change(|state| state.put_panel(robot, text))
+        self.change(|state| state.put_panel(robot, EarlyPanel { at, text }))
     }
 
     /// Adds the lines of the simulator before its first one that arrived here, of its last lines; without them, what has
@@ -198,34 +208,56 @@ impl FeedState {
         let surplus = self.flights.len().saturating_sub(MAX_FLIGHTS);
         self.flights.drain(..surplus);
 
-        self.panels
-            .retain(|name, _| frame.robots.iter().any(|robot| robot.name == *name));
+        let at = (frame.epoch, frame.tick);
+        if previous.is_none_or(|previous| (previous.epoch, previous.tick) != at) {
+            self.panels.clear();
+        }
         self.frame = Some(encoded);
+        for (robot, panel) in std::mem::take(&mut self.early_panels) {
+            // The others are of a tick whose frame is yet to come, or of one that no frame has shown.
+            if panel.at == at {
+                self.show_panel(robot, panel.text);
+            } else {
+                self.early_panels.insert(robot, panel);
+            }
+        }
     }
 
-    fn put_panel(&mut self, robot: &RobotName, text: Utf8Bytes) -> Result<(), String> {
-        // Its own panel is replaced, so it does not count.
-        if self.panel_bytes_without(robot) + text.len() > MAX_PANEL_BYTES {
+    fn put_panel(&mut self, robot: &RobotName, panel: EarlyPanel) -> Result<(), String> {
+        let is_of_frame = self
+            .frame
+            .as_ref()
+            .is_some_and(|EncodedFrame { frame, .. }| (frame.epoch, frame.tick) == panel.at);
+        // What it replaces does not count.
+        if is_of_frame {
+            self.panels.remove(robot);
+        } else {
+            self.early_panels.remove(robot);
+        }
+        if self.panel_bytes() + panel.text.len() > MAX_PANEL_BYTES {
             return Err(format!(
                 "panels are larger than the {MAX_PANEL_BYTES} bytes allowed together"
             ));
         }
 
-        self.panel_count += 1;
-        let panel = Numbered {
-            number: self.panel_count,
-            value: text,
-        };
-        self.panels.insert(robot.clone(), panel);
+        if is_of_frame {
+            self.show_panel(robot.clone(), panel.text);
+        } else {
+            self.early_panels.insert(robot.clone(), panel);
+        }
         Ok(())
     }
 
-    fn panel_bytes_without(&self, robot: &RobotName) -> usize {
-        self.panels
-            .iter()
-            .filter(|(name, _)| *name != robot)
-            .map(|(_, panel)| panel.value.len())
-            .sum()
+    fn show_panel(&mut self, robot: RobotName, value: Utf8Bytes) {
+        self.panel_count += 1;
+        let number = self.panel_count;
+        self.panels.insert(robot, Numbered { number, value });
+    }
+
+    fn panel_bytes(&self) -> usize {
+        let shown = self.panels.values().map(|panel| panel.value.len());
+        let early = self.early_panels.values().map(|panel| panel.text.len());
+        shown.chain(early).sum()
     }
 
     /// Adds those of the simulator's last lines that are not known, and then those that were held and are newer.
@@ -436,12 +468,15 @@ mod tests {
         }
     }
 
-    fn panel(bytes: usize) -> Panel {
+    /// A panel of a tick, which has a picture of this size.
+    fn panel(tick: Tick, bytes: usize) -> TickPanel {
         let picture = Widget::Svg {
             label: String::new(),
             svg: "x".repeat(bytes),
         };
-        Panel {
+        TickPanel {
+            epoch: 1,
+            tick,
             widgets: vec![picture],
         }
     }
@@ -610,25 +645,65 @@ mod tests {
     }
 
     #[test]
-    fn a_panel_replaces_its_predecessor_and_is_removed_with_its_robot() {
+    fn a_panel_is_shown_with_the_frame_of_its_tick_and_with_no_other_one() {
         let feed = Feed::new();
-        feed.put_panel(&robot("A"), &panel(1)).unwrap();
-        feed.put_panel(&robot("A"), &panel(2)).unwrap();
-
-        let new = take_new(&feed, &mut Cursor::default());
-        assert_eq!(new[1]["panel"]["widgets"][0]["svg"], "xx");
+        let mut cursor = Cursor::default();
+        feed.put_panel(&robot("A"), &panel(1, 1)).unwrap();
+        assert_eq!(types(&take_new(&feed, &mut cursor)), ["simulator"]);
 
         feed.put_frame(frame(1));
+        let new = take_new(&feed, &mut cursor);
+        assert_eq!(types(&new), ["panel", "frame"], "the panel first");
+        assert_eq!(new[0]["panel"]["tick"], 1);
+
+        // Of the next tick, whose frame is yet to come.
+        feed.put_panel(&robot("A"), &panel(2, 2)).unwrap();
+        assert!(take_new(&feed, &mut cursor).is_empty());
+        let late = take_new(&feed, &mut Cursor::default());
+        assert_eq!(late[1]["panel"]["tick"], 1, "for another browser, too");
+
+        // Of a tick that is not shown.
+        feed.put_frame(frame(3));
+        assert_eq!(types(&take_new(&feed, &mut cursor)), ["frame"]);
+
+        // After its frame, and again.
+        feed.put_panel(&robot("A"), &panel(3, 3)).unwrap();
+        feed.put_panel(&robot("A"), &panel(3, 4)).unwrap();
+        let new = take_new(&feed, &mut cursor);
+        assert_eq!(types(&new), ["panel"]);
+        assert_eq!(new[0]["panel"]["widgets"][0]["svg"], "xxxx");
+
+        // The same tick, now paused, and then another one of another epoch.
+        feed.put_frame(frame(3));
+        let new = take_new(&feed, &mut Cursor::default());
+        assert_eq!(types(&new), ["simulator", "panel", "frame"]);
+        feed.put_frame(WorldFrame {
+            epoch: 2,
+            ..frame(3)
+        });
         let new = take_new(&feed, &mut Cursor::default());
         assert_eq!(types(&new), ["simulator", "frame"]);
     }
 
     #[test]
+    fn a_replay_that_goes_back_shows_the_panel_of_that_tick() {
+        let feed = Feed::new();
+        feed.put_frame(frame(9));
+        feed.put_panel(&robot("A"), &panel(4, 1)).unwrap();
+        feed.put_frame(frame(4));
+
+        let new = take_new(&feed, &mut Cursor::default());
+        assert_eq!(types(&new), ["simulator", "panel", "frame"]);
+    }
+
+    #[test]
     fn panels_are_bounded_together() {
         let feed = Feed::new();
+        feed.put_frame(frame(1));
+        // Those that are shown, and those that are early.
         let refused = (0..100).find(|i| {
             let name = robot(&format!("r{i}"));
-            feed.put_panel(&name, &panel(1 << 20)).is_err()
+            feed.put_panel(&name, &panel(i % 2, 1 << 20)).is_err()
         });
         let accepted = refused.expect("there is a limit");
         assert!((25..40).contains(&accepted), "{accepted}");

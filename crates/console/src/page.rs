@@ -2,7 +2,7 @@
 
 use axum::extract::ws::Utf8Bytes;
 use protocol::RobotName;
-use protocol::messages::{Control, ControlAnswer, LogRecord, Panel, WorldFrame};
+use protocol::messages::{Control, ControlAnswer, LogRecord, TickPanel, WorldFrame};
 use serde::{Deserialize, Serialize};
 
 use crate::failed::Failed;
@@ -33,12 +33,12 @@ pub(crate) enum ServerMessage<'a> {
         /// The frame, with the flights of the frames that this browser skipped.
         frame: &'a WorldFrame,
     },
-    /// The newest panel of a robot.
+    /// The panel of a robot in the tick of the newest frame.
     Panel {
         /// The robot that published it.
         robot: &'a RobotName,
         /// Its widgets.
-        panel: &'a Panel,
+        panel: &'a TickPanel,
     },
     /// Lines of the log, in order.
     Log {

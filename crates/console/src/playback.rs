@@ -76,7 +76,7 @@ struct EncodedRange {
     end: Tick,
     /// Elements of a list: each tick as a frame of a run in progress shows it.
     ticks: List,
-    /// Panels that arrived in these ticks, or shortly before.
+    /// Panels of these ticks.
     panels: List,
     flights: Vec<Flight>,
     log: Vec<LogRecord>,
@@ -200,22 +200,14 @@ impl RecordedEpoch {
         let file = self.file();
         let Wanted { from, count, every } = wanted;
         let to = file.fitting(from, from.saturating_add(count), MAX_BYTES);
-        // A panel is shown for some time: those that arrived shortly before the first tick are part of
-        // it.
-        let begin = if every.is_none() {
-            self.header.first_of_panels(from)
-        } else {
-            from
-        };
-
         let mut range = EncodedRange {
             end: to.min(file.len()).max(from),
             ..EncodedRange::default()
         };
         // Whether a robot is lost in the first tick depends on ticks before the range.
-        let mut timeline = self.diagrams.before(&file, begin)?;
+        let mut timeline = self.diagrams.before(&file, from)?;
         let mut last_reports = BTreeMap::new();
-        for mut recorded in file.read_raw(begin, to)? {
+        for mut recorded in file.read_raw(from, to)? {
             let tick = recorded.tick();
             timeline.tick(tick, &recorded.events);
             if every.is_some() {
@@ -225,10 +217,6 @@ impl RecordedEpoch {
             for (robot, panel) in &recorded.panels {
                 range.add_panel(tick, robot, panel);
             }
-            if tick < from {
-                continue;
-            }
-
             if every.is_none() {
                 for event in &recorded.events {
                     range.flights.extend(event.flight(tick));

@@ -127,7 +127,7 @@ impl Fork<'_> {
             let recorded =
                 recorded.ok_or_else(|| LabError::record("the record has become shorter"))?;
             let executed = again.play(&recorded)?;
-            observe(&mut recorder, &again.local, &executed.record, opened);
+            observe(&mut recorder, &again.local, opened);
             recorder.write(&again.local.simulation, &executed.record)?;
             check_same(&recorded, &executed.into_entry())?;
             if recorded.tick == self.tick {
@@ -137,7 +137,7 @@ impl Fork<'_> {
 
         let mut local = again.end().map_err(|robot| cannot_go_on(&robot))?;
         go_on(&mut local, run, |local, record, opened| {
-            observe(&mut recorder, local, record, opened);
+            observe(&mut recorder, local, opened);
             recorder.write(&local.simulation, record)?;
             Ok(())
         })?;

@@ -5,9 +5,8 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use protocol::messages::{End, FaultKind, OnLate};
-use protocol::{Epoch, Event, RobotName, RunName, Tick};
+use protocol::{Epoch, RobotName, RunName, Tick};
 use record::{RunFolder, Summary};
-use recording::panel_ticks;
 use robot::{BadParameters, LocalHost, Robot, RobotError, Welcome};
 use scenario::FaultEnd;
 use scenario::Scenario;
@@ -53,7 +52,7 @@ pub fn execute_with(
             Some(recorder) => recorder,
             none => none.insert(Recorder::begin(folder, run, simulation)?),
         };
-        observe(recorder, local, record, opened);
+        observe(recorder, local, opened);
         recorder.write(simulation, record)?;
         goes_on()?;
         if let Some(speed) = speed {
@@ -68,34 +67,16 @@ pub fn execute_with(
     Ok(recorder.finish(&simulation)?)
 }
 
-/// Observes a tick for the recording: panels as often as they are shown, and that of a robot whose emotion or behavior has
-/// changed.
-pub(crate) fn observe(
-    recorder: &mut Recorder,
-    local: &Local,
-    record: &TickRecord,
-    opened: Instant,
-) {
+/// Observes a tick for the recording: its time, and the robots' panels.
+pub(crate) fn observe(recorder: &mut Recorder, local: &Local, opened: Instant) {
     let Some(observed) = recorder.observed() else {
         return;
     };
     observed.opened = Some(opened);
 
-    let scenario = local.simulation.scenario();
-    let is_due = record.tick.is_multiple_of(panel_ticks(scenario.tick_s));
-    if scenario.record.has_panels() {
-        observed.panels = local
-            .robots
-            .panels(|robot| is_due || has_changed(robot, record));
+    if local.simulation.scenario().record.has_panels() {
+        observed.panels = local.robots.panels();
     }
-}
-
-/// Whether the emotion or the behavior of a robot is another one from a tick on.
-fn has_changed(name: &RobotName, record: &TickRecord) -> bool {
-    record.events.iter().any(|event| match event {
-        Event::Emotion { robot, .. } | Event::Behavior { robot, .. } => robot == name,
-        _ => false,
-    })
 }
 
 /// Sleeps until this many seconds after `begun`.

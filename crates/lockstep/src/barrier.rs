@@ -383,8 +383,8 @@ impl<R, C> Barrier<R, C> {
         Clock {
             epoch: self.epoch,
             tick: self.tick,
-            news: 0,
             end: Some(end),
+            ..Clock::default()
         }
     }
 
@@ -505,7 +505,9 @@ impl<R, C> Barrier<R, C> {
         self.members.get(robot).is_some_and(is)
     }
 
-    fn is_open_at(&self, epoch: Epoch, tick: Tick) -> bool {
+    /// Whether this tick is open.
+    #[must_use]
+    pub fn is_open_at(&self, epoch: Epoch, tick: Tick) -> bool {
         self.phase == BarrierPhase::Open && (epoch, tick) == (self.epoch, self.tick)
     }
 
@@ -581,7 +583,7 @@ impl<R, C> Barrier<R, C> {
                 epoch: self.epoch,
                 tick: self.tick,
                 news: flags,
-                end: None,
+                ..Clock::default()
             },
         });
     }

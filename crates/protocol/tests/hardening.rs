@@ -6,8 +6,8 @@
 use proptest::prelude::*;
 use protocol::messages::{
     Answer, Clock, Command, Control, ControlAnswer, FaultOrder, JoinAnswer, JoinRequest, LogRecord,
-    MAX_ENTRIES, MAX_TEXT_BYTES, MAX_WIDGETS, Panel, PublicState, Report, TickUpdate, Waiting,
-    WorldFrame,
+    MAX_ENTRIES, MAX_TEXT_BYTES, MAX_WIDGETS, Panel, PublicState, Report, TickPanel, TickUpdate,
+    Waiting, WorldFrame,
 };
 use protocol::{Message, RobotName, RunName, decode, encode};
 use serde_json::Value;
@@ -103,6 +103,7 @@ fn survives(bytes: &[u8]) {
     one::<LogRecord>(bytes);
     one::<TickUpdate>(bytes);
     one::<Panel>(bytes);
+    one::<TickPanel>(bytes);
     one::<PublicState>(bytes);
     one::<Report>(bytes);
     one::<Waiting>(bytes);
@@ -121,8 +122,8 @@ fn is_bounded(bytes: &[u8]) {
         assert!(texts.map(String::len).all(|bytes| bytes <= MAX_TEXT_BYTES));
         assert!(news.tick < 1 << 53);
     }
-    if let Ok(panel) = decode::<Panel>("key", "a sender", bytes) {
-        assert!(panel.widgets.len() <= MAX_WIDGETS);
+    if let Ok(panel) = decode::<TickPanel>("key", "a sender", bytes) {
+        assert!(panel.widgets.len() <= MAX_WIDGETS && panel.tick < 1 << 53);
     }
 }
 

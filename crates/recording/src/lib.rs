@@ -24,7 +24,7 @@ pub use content::{
 };
 pub use damage::RecordingError;
 pub use read::Recording;
-pub use shown::{LastReports, panel_ticks};
+pub use shown::LastReports;
 pub use ticks::Ticks;
 pub use write::{WriteError, Writer};
 

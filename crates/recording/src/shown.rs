@@ -1,31 +1,13 @@
-//! What observers see of a recorded tick, as in a run in progress: frames have the last report of each robot, and panels
-//! are shown for a while.
+//! What observers see of a recorded tick, as in a run in progress: frames have the last report of each robot.
 
 use std::collections::BTreeMap;
 
+use protocol::RobotName;
 use protocol::messages::{Presence, Report, RobotFrame};
-use protocol::{RobotName, Tick};
 
-use crate::content::{Header, PlacedRobot, RecordedTick};
+use crate::content::{PlacedRobot, RecordedTick};
 use crate::damage::RecordingError;
 use crate::read::Recording;
-
-/// How long a panel is shown, simulated seconds. In a fast run panels arrive more seldom, and would show old states.
-const PANEL_S: f64 = 2.0;
-
-/// For how many ticks a panel is shown: in one process, until the next one.
-#[must_use]
-pub fn panel_ticks(tick_s: f64) -> Tick {
-    (PANEL_S / tick_s).round().max(1.0) as Tick
-}
-
-impl Header {
-    /// The first of the ticks of which panels are shown in a tick.
-    #[must_use]
-    pub fn first_of_panels(&self, tick: Tick) -> Tick {
-        tick.saturating_sub(panel_ticks(self.tick_s) - 1)
-    }
-}
 
 /// The last report of each robot, as far as ticks have been read.
 #[derive(Debug, Default)]

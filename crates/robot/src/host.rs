@@ -20,7 +20,7 @@ use lockstep::{
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{
     Clock, End, JoinAnswer, JoinRequest, ParametersAnswer, ParametersOffer, PublicState, Refusal,
-    TickUpdate, Waiting, Welcome,
+    TickPanel, TickUpdate, Waiting, Welcome,
 };
 use protocol::{Malformed, PROTOCOL_VERSION, RobotName, RunName, decode, encode};
 
@@ -33,8 +33,6 @@ use participants::{Actions, Allowance, Asked, HostAction, HostAnswer, Participan
 /// Most robots for which a publisher of commands is declared. Without one, zenoh compares each command's key with all keys that
 /// anyone has declared in the network; with one, it does so once.
 const MAX_COMMANDED: usize = 64;
-/// Panels are put no more often than this: people look at them.
-const PANEL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// How to reach a run.
 #[derive(Debug, Clone)]
@@ -149,7 +147,6 @@ struct HostedRobot {
     panel: Publisher,
     /// Publishers of the commands to the robots that it has commanded.
     commands: BTreeMap<RobotName, Publisher>,
-    painted: Option<Instant>,
     token: Option<Declared>,
 }
 
@@ -206,7 +203,6 @@ impl Host {
                 state: bus.publisher(&keys.query(&name, STATE))?,
                 panel: bus.observer_publisher(&keys.panel(&name))?,
                 commands: BTreeMap::new(),
-                painted: None,
                 token: None,
             };
             members.insert(name, member);
@@ -303,6 +299,10 @@ impl Host {
             match decode::<Clock>(key, "simulator", bytes) {
                 // In the order of names and under one lock: no other message comes between two robots.
                 Ok(clock) => {
+                    // Noted first: what the participants want done may be done at once.
+                    if clock.panels {
+                        participants.show(clock.epoch, clock.tick);
+                    }
                     participants.each(|participant, actions| participant.clock(clock, actions));
                 }
                 Err(error) => tracing::warn!("{error}"),
@@ -518,16 +518,14 @@ impl Host {
             member.state.put(encode(answer.state.as_ref()))?;
         }
 
-        // Before the report, which may complete the tick: the panel is recorded with the tick that it shows.
-        let is_due = member
-            .painted
-            .is_none_or(|at| at.elapsed() >= PANEL_INTERVAL);
+        // Before the report, which may complete the tick: observers have the panel before the frame. The robot has not run a tick
+        // after this one, because what participants want is done in its order.
         if let Some(runner) = &member.runner
+            && self.participants.shows(answer.epoch, answer.tick)
             && member.panel.has_subscribers()
-            && is_due
         {
-            member.painted = Some(Instant::now());
-            member.panel.put(encode(&runner.panel()))?;
+            let panel = TickPanel::new(answer.epoch, answer.tick, runner.panel());
+            member.panel.put(encode(&panel))?;
         }
         member.report.put(answer.report.to_vec())?;
         Ok(())

@@ -221,12 +221,12 @@ impl LocalHost {
         self.runners[index] = Runner::new(robot, welcome);
     }
 
-    /// The panels of the robots that are chosen and not stopped.
+    /// The panels of the robots that are not stopped.
     #[must_use]
-    pub fn panels(&self, is_chosen: impl Fn(&RobotName) -> bool) -> BTreeMap<RobotName, Panel> {
+    pub fn panels(&self) -> BTreeMap<RobotName, Panel> {
         let mut panels = BTreeMap::new();
         for (index, name) in self.names.iter().enumerate() {
-            if !self.stopped.contains(&index) && is_chosen(name) {
+            if !self.stopped.contains(&index) {
                 panels.insert(name.clone(), self.runners[index].panel());
             }
         }

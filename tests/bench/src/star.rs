@@ -115,8 +115,8 @@ impl Center {
             Content::Messages => encode(&Clock {
                 epoch: 1,
                 tick,
-                news: 0,
                 end,
+                ..Clock::default()
             }),
         };
 

@@ -146,7 +146,11 @@ fn sources(package: &Path) -> BTreeMap<PathBuf, String> {
     while let Some(folder) = folders.pop() {
         for entry in std::fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();
-            let kind = if path.is_dir() { &mut folders } else { &mut files };
+            let kind = if path.is_dir() {
+                &mut folders
+            } else {
+                &mut files
+            };
             kind.push(path);
         }
     }

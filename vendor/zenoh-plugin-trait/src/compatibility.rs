@@ -29,7 +29,7 @@ pub trait StructVersion {
 #[derive(Debug, Clone)]
 pub struct Compatibility {
     rust_version: RustVersion,
-    zenoh_version: &'static str, // CARS: was a string of `stabby`
+    zenoh_version: &'static str,  // CARS: was a string of `stabby`
     zenoh_features: &'static str, // CARS: was a string of `stabby`
 }
 

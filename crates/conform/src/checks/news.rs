@@ -95,7 +95,7 @@ fn others_flags(kit: &Kit) -> Result<(), RuleFailure> {
         epoch: 1,
         tick: 3,
         news: !harness.flag(),
-        end: None,
+        ..Clock::default()
     })?;
 
     harness.complete().map(drop).map_err(|failure| {

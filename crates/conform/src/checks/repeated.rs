@@ -175,7 +175,7 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
                     epoch,
                     tick,
                     news: flag,
-                    end: None,
+                    ..Clock::default()
                 })?;
             }
             Ok(())

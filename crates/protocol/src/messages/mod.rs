@@ -22,7 +22,7 @@ pub use log::{LogKind, LogRecord};
 pub use numbers::{Epoch, Generation, Seq, Tick};
 pub use observe::{
     Cut, Face, Fate, Flight, HeldProcess, MAX_FLIGHTS, MAX_WIDGETS, Panel, RobotFrame, Standing,
-    Tone, Verdict, Widget, WorldFrame,
+    TickPanel, Tone, Verdict, Widget, WorldFrame,
 };
 pub use performative::Performative;
 pub use point::Point;

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::control::{Awaited, FaultKind, Phase, Presence};
-use super::limits::{few, finite, short};
+use super::limits::{counted, few, finite, short};
 use super::numbers::{Epoch, Generation, Seq, Tick};
 use super::point::Point;
 use super::variables::StateVariables;
@@ -218,22 +218,58 @@ impl Message for Panel {
     as_json!();
 
     fn check(&self) -> Result<(), FieldError> {
-        if self.widgets.len() > MAX_WIDGETS {
-            let reason = format!(
-                "{} widgets, more than the {MAX_WIDGETS} allowed",
-                self.widgets.len()
-            );
-            return Err(FieldError::new("widgets", reason));
-        }
-
-        for (i, widget) in self.widgets.iter().enumerate() {
-            widget.check().map_err(|error| {
-                FieldError::new(format!("widgets[{i}].{}", error.field), error.reason)
-            })?;
-        }
-
-        Ok(())
+        check_widgets(&self.widgets)
     }
+}
+
+/// What a robot displays of one tick, published for the ticks that observers are shown ([`Clock::panels`](super::Clock)). It is
+/// shown with this tick and with no other one.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct TickPanel {
+    /// The epoch.
+    pub epoch: Epoch,
+    /// The tick that the robot has run last.
+    pub tick: Tick,
+    /// The widgets, from top to bottom.
+    pub widgets: Vec<Widget>,
+}
+
+impl TickPanel {
+    /// A robot's panel in a tick.
+    #[must_use]
+    pub fn new(epoch: Epoch, tick: Tick, panel: Panel) -> Self {
+        Self {
+            epoch,
+            tick,
+            widgets: panel.widgets,
+        }
+    }
+}
+
+impl Message for TickPanel {
+    as_json!();
+
+    fn check(&self) -> Result<(), FieldError> {
+        counted(self.tick, "tick")?;
+        check_widgets(&self.widgets)
+    }
+}
+
+fn check_widgets(widgets: &[Widget]) -> Result<(), FieldError> {
+    if widgets.len() > MAX_WIDGETS {
+        let reason = format!(
+            "{} widgets, more than the {MAX_WIDGETS} allowed",
+            widgets.len()
+        );
+        return Err(FieldError::new("widgets", reason));
+    }
+
+    for (i, widget) in widgets.iter().enumerate() {
+        widget.check().map_err(|error| {
+            FieldError::new(format!("widgets[{i}].{}", error.field), error.reason)
+        })?;
+    }
+    Ok(())
 }
 
 /// One element of a panel.

@@ -191,6 +191,10 @@ pub struct Clock {
     /// robot whose flag is not set has none. Robots may share a flag, and then all of them get news.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub news: u32,
+    /// Observers are shown this tick: a robot puts its panel of it ([`TickPanel`](super::TickPanel)) before its report. A clock
+    /// that was answered without may come again with it.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub panels: bool,
     /// The run is over; no report is awaited.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub end: Option<End>,

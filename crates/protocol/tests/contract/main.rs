@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use protocol::messages::{
     Clock, Command, Control, Correction, Delivery, End, Face, JoinRequest, LogRecord, MAX_ENTRIES,
     MAX_TEXT_BYTES, NEWS_FLAGS, Panel, Performative, Point, Report, SensedBody, SensedKind,
-    SensedRobot, TickUpdate, Tone, Variable, Widget,
+    SensedRobot, TickPanel, TickUpdate, Tone, Variable, Widget,
 };
 use protocol::{Message, RobotName, RunName, decode, encode};
 use serde::Serialize;
@@ -87,6 +87,7 @@ fn what_is_written_is_read_back_to_the_last_bit() {
         epoch: 2,
         tick: 7,
         news: 1 << 31,
+        panels: true,
         end: Some(End::Finished),
     });
     round_trip(&Command {
@@ -121,7 +122,9 @@ fn what_is_written_is_read_back_to_the_last_bit() {
             command: "refill".into(),
         },
     ];
-    round_trip(&Panel { widgets });
+    let panel = Panel { widgets };
+    round_trip(&panel);
+    round_trip(&TickPanel::new(2, 7, panel));
 }
 
 #[test]
@@ -142,7 +145,7 @@ fn full_clock(robots: usize) -> Clock {
         epoch: 1,
         tick: 123_456,
         news: flags.fold(0, |all, flag| all | flag),
-        end: None,
+        ..Clock::default()
     }
 }
 
@@ -158,6 +161,7 @@ fn the_size_of_a_clock_does_not_depend_on_the_number_of_robots() {
         epoch: u32::MAX,
         tick: (1 << 53) - 1,
         news: u32::MAX,
+        panels: true,
         end: Some(End::Finished),
     };
     assert!(encode(&largest).len() < 100);

@@ -4,7 +4,8 @@
 use protocol::Line;
 use protocol::messages::{
     Answer, Clock, Command, Control, ControlAnswer, FaultOrder, JoinAnswer, JoinRequest, LogRecord,
-    Panel, ParametersAnswer, ParametersOffer, PublicState, Report, TickUpdate, Waiting, WorldFrame,
+    ParametersAnswer, ParametersOffer, PublicState, Report, TickPanel, TickUpdate, Waiting,
+    WorldFrame,
 };
 use schemars::generate::SchemaGenerator;
 use schemars::{JsonSchema, Schema, schema_for};
@@ -41,7 +42,7 @@ pub(crate) const MESSAGES: [MessageSchema; 17] = [
     of::<JoinAnswer>("join_answer"),
     of::<JoinRequest>("join_request"),
     of::<LogRecord>("log_record"),
-    of::<Panel>("panel"),
+    of::<TickPanel>("panel"),
     of::<ParametersAnswer>("parameters_answer"),
     of::<ParametersOffer>("parameters_offer"),
     of::<TickUpdate>("news"),

@@ -9,8 +9,8 @@ use bus::{Inbox, WorkerThread};
 use lockstep::{
     NoState, Participant, ParticipantOutput, RobotTimer, StateQuery, TickAnswer, Timeouts,
 };
-use protocol::RobotName;
 use protocol::messages::{CommandText, PublicState, TickUpdate};
+use protocol::{Epoch, RobotName, Tick};
 
 /// A report as it is put, so that a repetition is the same to the byte.
 type Encoded = Arc<[u8]>;
@@ -102,6 +102,8 @@ struct Inner {
     /// How long a robot tries to join, and how often that was extended because the simulator is there.
     join_patience: Duration,
     extensions: BTreeMap<RobotName, u32>,
+    /// The newest tick whose panels are asked for.
+    shown: Option<(Epoch, Tick)>,
 }
 
 impl Participants {
@@ -114,6 +116,7 @@ impl Participants {
             has_simulator: false,
             join_patience: timeouts.join,
             extensions: BTreeMap::new(),
+            shown: None,
         };
         for name in names {
             let mut first = Vec::new();
@@ -131,6 +134,16 @@ impl Participants {
     fn lock(&self) -> MutexGuard<'_, Inner> {
         // Participants are changed by their own methods only, which do not panic half-way.
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The panels of a tick are asked for.
+    pub(super) fn show(&self, epoch: Epoch, tick: Tick) {
+        self.lock().shown = Some((epoch, tick));
+    }
+
+    /// Whether the panels of a tick are asked for.
+    pub(super) fn shows(&self, epoch: Epoch, tick: Tick) -> bool {
+        self.lock().shown == Some((epoch, tick))
     }
 
     /// Feeds something to one participant.

@@ -2,7 +2,7 @@
 
 use bus::{BusError, Query};
 use config::diagnostic::FileError;
-use protocol::messages::{Command, Control, End, Panel, Report, Waiting};
+use protocol::messages::{Command, Control, End, Report, TickPanel, Waiting};
 use protocol::{Malformed, RobotName, RunName};
 use record::difference::Difference;
 use recording::RecordingError;
@@ -21,7 +21,7 @@ pub(super) enum ServerEvent {
     /// A robot waits for another robot's answer.
     Waiting(String, Waiting),
     /// A robot shows a panel.
-    Panel(String, Panel),
+    Panel(String, TickPanel),
     /// A message that cannot be decoded.
     Malformed(Malformed),
     /// A robot asks to take part.

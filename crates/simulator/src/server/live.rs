@@ -7,7 +7,9 @@ use std::time::{Duration, Instant};
 use bus::{Bus, BusError, Declared, Publisher, Query};
 use lockstep::{Barrier, BarrierOutput, Timing};
 use protocol::keys::Keys;
-use protocol::messages::{CommandText, Control, End, MAX_ENTRIES, Report, RobotStatus, Status};
+use protocol::messages::{
+    Clock, CommandText, Control, End, MAX_ENTRIES, Report, RobotStatus, Status,
+};
 use protocol::{Epoch, RobotName, Tick, decode};
 use record::RunFolder;
 use record::summary::{Summary, WallSummary};
@@ -16,6 +18,7 @@ use scenario::Scenario;
 use super::departed::{Departed, Wait};
 use super::event::{EpochStop, ServerError, ServerEvent, StopReason};
 use super::frontend::{Frontend, refuse};
+use super::observers::View;
 use super::options::{KeepAlive, ServerOptions};
 use super::orders::{Orders, PendingOrders};
 use super::process::{Server, run_to_exit};
@@ -64,6 +67,12 @@ pub(super) struct LiveEpoch {
     pub(super) waits_for: WaitsFor,
     /// Since when the clock waits for robots.
     pub(super) waiting_since: Instant,
+    /// The clock that was put last.
+    pub(super) clock: Option<Clock>,
+    /// What observers see of its tick.
+    pub(super) view: View,
+    /// The last tick whose clock was put once more for its panels: robots repeat their answers.
+    pub(super) asked_again: Option<Tick>,
     /// Robots that hold the clock up: awaited when people were told, and not waiting for another robot.
     pub(super) stragglers: Vec<RobotName>,
     pub(super) wall: WallSummary,
@@ -109,6 +118,9 @@ impl LiveEpoch {
             record,
             waits_for: WaitsFor::Robots,
             waiting_since: Instant::now(),
+            clock: None,
+            view: View::Nothing,
+            asked_again: None,
             stragglers: Vec::new(),
             wall: WallSummary::default(),
             operator: Vec::new(),
@@ -357,7 +369,11 @@ impl TickSource for LiveRun {
     }
 
     fn show(&mut self, frontend: &mut Frontend) {
-        if frontend.observers.has_subscribers() {
+        // In the middle of a tick there are no panels of the one before: the next one is shown with its own. A clock that is held
+        // in a tick may have no next one, and people are to see why.
+        if self.barrier.is_open() && !self.barrier.is_announced() {
+            frontend.observers.show_next();
+        } else if frontend.observers.has_subscribers() {
             self.put_frame(frontend);
         }
     }

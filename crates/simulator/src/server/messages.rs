@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use lockstep::{Sent, Stamp};
 use protocol::RobotName;
-use protocol::messages::{Command, Panel, Report, Waiting};
+use protocol::messages::{Command, Panel, Report, TickPanel, Waiting};
 
-use super::live::LiveRun;
+use super::live::{LiveEpoch, LiveRun};
 
 /// Most commands of the operator that wait for the next tick.
 const MAX_OPERATOR_COMMANDS: usize = 1024;
@@ -38,6 +38,10 @@ impl LiveRun {
         let Some(name) = self.known(robot) else {
             return;
         };
+        let stamp = Stamp::from(&report);
+        if self.is_repeated(&name, stamp) {
+            return;
+        }
         // Observed first: the barrier may complete the tick with it.
         let epoch = &mut self.epoch;
         if let Some(observed) = epoch.record.observed() {
@@ -46,7 +50,6 @@ impl LiveRun {
 
         // An answer that does not count is noted as well: the robot's state depends on the ticks that
         // it has done.
-        let stamp = Stamp::from(&report);
         let is_of_epoch = stamp.epoch == epoch.simulation.epoch();
         if is_of_epoch && self.barrier.is_behind(&name, stamp.generation) {
             epoch.simulation.done_late(&name, stamp.tick);
@@ -57,11 +60,30 @@ impl LiveRun {
             .report(&name, stamp, commands, Arc::new(report), &mut self.outputs);
     }
 
-    pub(super) fn on_panel(&mut self, robot: &str, panel: Panel) {
+    /// Whether an answer is put again that has counted, because the clock was put again for its panels.
+    fn is_repeated(&self, robot: &RobotName, stamp: Stamp) -> bool {
+        let LiveEpoch {
+            simulation,
+            asked_again,
+            ..
+        } = &self.epoch;
+        stamp.epoch == simulation.epoch()
+            && Some(stamp.tick) == *asked_again
+            && simulation.report(robot).is_some_and(|report| {
+                (report.tick, report.generation) == (stamp.tick, stamp.generation)
+            })
+    }
+
+    pub(super) fn on_panel(&mut self, robot: &str, panel: TickPanel) {
+        // Of the tick in progress only: what comes after it is complete is seen by observers, and not recorded.
+        if !self.barrier.is_open_at(panel.epoch, panel.tick) {
+            return;
+        }
         if let Some(name) = self.known(robot)
             && let Some(observed) = self.epoch.record.observed()
         {
-            observed.panels.insert(name, panel);
+            let TickPanel { widgets, .. } = panel;
+            observed.panels.insert(name, Panel { widgets });
         }
     }
 
@@ -76,6 +98,9 @@ impl LiveRun {
         let Some(from) = self.known(from) else { return };
 
         let stamp = Stamp::from(&command);
+        if self.is_repeated(&from, stamp) {
+            return;
+        }
         let number = command.number;
         let sent = Sent::new(to, command);
         self.barrier

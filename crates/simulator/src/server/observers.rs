@@ -15,17 +15,32 @@ use protocol::{Event, Tick};
 
 /// Frames are put no more often than this: people look at them.
 pub(super) const FRAME_INTERVAL: Duration = Duration::from_millis(33);
+/// Where the clock has a pace, panels are asked for no more often than this, so that a recording has those of every tick. At full
+/// speed they are asked for with frames only: a tick takes less time than its panels.
+const PANEL_INTERVAL: Duration = Duration::from_millis(5);
 
 /// Most bytes of texts among the lines of the log that are kept: with escapes and the other fields, all of them fit into one
 /// message.
 const MAX_PAST_BYTES: usize = 128 << 10;
 
+/// What observers see of a tick. At full speed that is nothing of most ticks, which cost neither frame nor panels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum View {
+    /// Nothing.
+    Nothing,
+    /// The panels, which are recorded.
+    Panels,
+    /// The panels, and then a frame.
+    Frame,
+}
+
 pub(super) struct Observers {
     world: Publisher,
     log: Publisher,
-    last_frame: Instant,
-    /// Whether a tick is complete that no frame has shown.
-    is_frame_due: bool,
+    /// When the last tick began of which a frame is put; `None` puts one of the next tick.
+    frame_at: Option<Instant>,
+    /// When the last tick began whose panels were asked for.
+    panels_at: Option<Instant>,
     /// For observers that come later.
     past_lines: PastLines,
     /// What became of commands since the last frame.
@@ -37,8 +52,8 @@ impl Observers {
         Ok(Self {
             world: bus.observer_publisher(&keys.world())?,
             log: bus.observer_publisher(&keys.log())?,
-            last_frame: Instant::now(),
-            is_frame_due: false,
+            frame_at: None,
+            panels_at: None,
             past_lines: PastLines::default(),
             flights: VecDeque::new(),
         })
@@ -48,16 +63,25 @@ impl Observers {
         self.world.has_subscribers()
     }
 
-    /// A tick is complete: observers see it, unless another one is complete before it is time for a frame.
-    pub(super) fn request_frame(&mut self) {
-        // Only noted: at full speed most ticks are never shown, and cost no frame.
-        self.is_frame_due = self.world.has_subscribers();
+    /// A tick begins: what observers see of it. After a tick that `is_last` the clock stops.
+    pub(super) fn view_next(&mut self, is_last: bool, is_paced: bool) -> View {
+        let is_due =
+            |last: Option<Instant>, interval| last.is_none_or(|last| last.elapsed() >= interval);
+        if is_last || is_due(self.frame_at, FRAME_INTERVAL) {
+            self.frame_at = Some(Instant::now());
+            self.panels_at = self.frame_at;
+            View::Frame
+        } else if is_paced && is_due(self.panels_at, PANEL_INTERVAL) {
+            self.panels_at = Some(Instant::now());
+            View::Panels
+        } else {
+            View::Nothing
+        }
     }
 
-    /// After how long it is time for the frame that was requested; `None` if none was.
-    pub(super) fn frame_due_in(&self) -> Option<Duration> {
-        let rest = FRAME_INTERVAL.saturating_sub(self.last_frame.elapsed());
-        self.is_frame_due.then_some(rest)
+    /// A frame of the next tick is put, however soon it begins.
+    pub(super) fn show_next(&mut self) {
+        self.frame_at = None;
     }
 
     /// Forgets what the next frame would show of earlier ticks.
@@ -67,8 +91,6 @@ impl Observers {
 
     /// Puts a frame, with the flights since the one before.
     pub(super) fn put(&mut self, mut frame: WorldFrame) {
-        self.last_frame = Instant::now();
-        self.is_frame_due = false;
         // Also those of ticks that no frame has shown: what became of a command is seen once.
         frame.flights = std::mem::take(&mut self.flights).into();
         put_lossy(&self.world, encode(&frame));

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use lockstep::{NoState, RecentStates, StateQuery};
-use protocol::messages::{LogRecord, Panel, PublicState, RobotFrame, Status, WorldFrame};
+use protocol::messages::{LogRecord, PublicState, RobotFrame, Status, TickPanel, WorldFrame};
 use protocol::{Event, RobotName, Tick};
 use recording::{Header, LastReports, PlacedRobot, RecordedTick, Recording, RecordingError, Ticks};
 
@@ -22,8 +22,6 @@ struct ShownTick {
     robots: Vec<RobotFrame>,
     /// The last two states of each robot.
     states: BTreeMap<RobotName, RecentStates<PublicState>>,
-    /// The newest panel of each robot, with the tick in which it arrived.
-    panels: BTreeMap<RobotName, (Tick, Panel)>,
 }
 
 impl Player {
@@ -127,11 +125,14 @@ impl Player {
         states.answer(query)
     }
 
-    /// The panel of a robot that is shown in the tick, with the tick in which it arrived.
-    pub(super) fn panel(&self, robot: &RobotName) -> Option<&(Tick, Panel)> {
-        let first = self.header().first_of_panels(self.tick());
-        let newest = self.shown.panels.get(robot);
-        newest.filter(|(arrived, _)| *arrived >= first)
+    /// The panel of a robot in the tick, if it was recorded.
+    pub(super) fn panel(&self, robot: &RobotName) -> Option<TickPanel> {
+        let panel = self.shown.recorded.panels.get(robot)?;
+        Some(TickPanel::new(
+            self.header().epoch,
+            self.tick(),
+            panel.clone(),
+        ))
     }
 
     /// The frame of the tick, without flights.
@@ -162,8 +163,7 @@ impl ShownTick {
         last_reports: &mut LastReports,
     ) -> Result<Self, RecordingError> {
         let before = tick.saturating_sub(1);
-        let first = recording.header().first_of_panels(tick).min(before);
-        let read = recording.read(first, tick + 1);
+        let read = recording.read(before, tick + 1);
         // Damage before the tick costs no more than what is shown of the ticks before.
         let read = read.or_else(|_| recording.read(tick, tick + 1))?;
         let mut ticks = read.into_iter();
@@ -180,7 +180,6 @@ impl ShownTick {
         let mut shown = Self {
             robots: Vec::new(),
             states,
-            panels: arrived_panels(&first).collect(),
             recorded: first,
         };
         for recorded in ticks {
@@ -198,7 +197,6 @@ impl ShownTick {
                 add_state(&mut self.states, &robot.name, state);
             }
         }
-        self.panels.extend(arrived_panels(&recorded));
         self.recorded = recorded;
     }
 }
@@ -210,13 +208,6 @@ fn add_state(
 ) {
     let states = states.entry(robot.clone()).or_default();
     states.add(state.epoch, state.tick, state);
-}
-
-/// The panels that arrived in a tick, with the tick.
-fn arrived_panels(recorded: &RecordedTick) -> impl Iterator<Item = (RobotName, (Tick, Panel))> {
-    let tick = recorded.tick();
-    let panels = recorded.panels.iter();
-    panels.map(move |(robot, panel)| (robot.clone(), (tick, panel.clone())))
 }
 
 /// The state of a robot's last report up to a tick.

@@ -11,7 +11,7 @@ use bus::{Bus, BusError, Declared, Publisher, Query};
 use lockstep::StateQuery;
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{
-    Control, JoinAnswer, LogKind, OnLate, Panel, Phase, Presence, Refusal, RobotStatus, Status,
+    Control, JoinAnswer, LogKind, OnLate, Phase, Presence, Refusal, RobotStatus, Status,
 };
 use protocol::time::time_s;
 use protocol::{RobotName, Tick, encode};
@@ -43,10 +43,6 @@ struct ShownRobot {
     panel: Publisher,
     /// In ticks for which it reported.
     token: Option<Declared>,
-    /// The tick in which the panel that is shown arrived; `None` if no panel is shown.
-    panel_arrived: Option<Tick>,
-    /// Whether the panel has not been put since it, or the observers, changed.
-    is_panel_due: bool,
 }
 
 impl Server<RecordedRun> {
@@ -118,8 +114,6 @@ impl ShownRobot {
                 .bus
                 .observer_publisher(&frontend.keys.panel(name))?,
             token: None,
-            panel_arrived: None,
-            is_panel_due: true,
         })
     }
 }
@@ -262,9 +256,6 @@ impl TickSource for RecordedRun {
 
     /// Shows the tick to observers that may not have seen it.
     fn show(&mut self, frontend: &mut Frontend) {
-        for robot in self.robots.values_mut() {
-            robot.is_panel_due = true;
-        }
         self.put_frame(frontend);
     }
 }
@@ -286,17 +277,11 @@ impl RecordedRun {
         frontend.observers.note(player.tick(), player.events());
         frontend.observers.log(&player.log());
 
-        for (name, robot) in &mut self.robots {
+        for (name, robot) in &self.robots {
             if robot.state.has_subscribers()
                 && let Some(state) = player.new_state(name)
             {
                 put_lossy(&robot.state, encode(&state));
-            }
-            let arrived = player.panel(name).map(|(arrived, _)| *arrived);
-            // A panel is put when it changes, also after a seek to where another one was shown.
-            if arrived != robot.panel_arrived {
-                robot.panel_arrived = arrived;
-                robot.is_panel_due = true;
             }
         }
         if let Err(error) = self.declare_presence(frontend) {
@@ -323,25 +308,20 @@ impl RecordedRun {
         Ok(())
     }
 
-    /// Puts the frame of the tick, and the panels that have changed.
+    /// Puts the panels of the tick, as far as they were recorded, and then its frame.
     fn put_frame(&mut self, frontend: &mut Frontend) {
         self.shown_at = Instant::now();
+        for (name, robot) in &self.robots {
+            if robot.panel.has_subscribers()
+                && let Some(panel) = self.player.panel(name)
+            {
+                put_lossy(&robot.panel, encode(&panel));
+            }
+        }
+
         if frontend.observers.has_subscribers() {
             let frame = self.player.frame(&self.status(frontend));
             frontend.observers.put(frame);
-        }
-
-        for (name, robot) in &mut self.robots {
-            if !robot.is_panel_due || !robot.panel.has_subscribers() {
-                continue;
-            }
-            robot.is_panel_due = false;
-            // A panel without widgets takes the place of one that is too old.
-            let panel = match self.player.panel(name) {
-                Some((_, panel)) => encode(panel),
-                None => encode(&Panel::default()),
-            };
-            put_lossy(&robot.panel, panel);
         }
     }
 

@@ -1,7 +1,7 @@
 //! The ticks of a run whose robots are in lock-step: when one is opened, and what comes of it.
 
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use bus::BusError;
 use config::diagnostic::FileError;
@@ -15,6 +15,7 @@ use super::event::{EpochStop, StopReason};
 use super::frame::frame;
 use super::frontend::Frontend;
 use super::live::{LiveRun, WaitsFor};
+use super::observers::View;
 use super::source::{Next, TickSource};
 use super::watchdog::Activity;
 
@@ -36,7 +37,7 @@ impl LiveRun {
                 if !self.epoch.record.is_repeating()
                     && let Err(rest) = frontend.pace.take_grant(tick_s)
                 {
-                    return Ok(Next::Wait(self.put_due_frame(rest, frontend)));
+                    return Ok(Next::Wait(rest));
                 }
                 // Changes first: they may be about late robots, and about faults.
                 self.repeat_changes();
@@ -69,7 +70,7 @@ impl LiveRun {
             epoch.simulation.command(&to, &command);
         }
         let tick = epoch.simulation.begin_tick();
-        self.open_tick(tick);
+        self.open_tick(tick, frontend);
         // Interventions that waited while faults were carried out: this tick has begun, so they are for the one after it.
         for query in std::mem::take(&mut self.epoch.deferred) {
             on_control(query, self, frontend)?;
@@ -77,9 +78,14 @@ impl LiveRun {
         Ok(Next::GoOn)
     }
 
-    fn open_tick(&mut self, tick: Tick) {
+    fn open_tick(&mut self, tick: Tick, frontend: &mut Frontend) {
         self.epoch.waits_for = WaitsFor::Robots;
         self.epoch.waiting_since = Instant::now();
+        // Decided before the clock is put, which asks for the panels: then they are here before the tick is complete. The clock stops
+        // after the last of the steps that are pending, and after the last tick of the run.
+        let is_last = frontend.pace.is_held() || tick == self.epoch.simulation.scenario().ticks;
+        let is_paced = frontend.pace.speed.is_some();
+        self.epoch.view = frontend.observers.view_next(is_last, is_paced);
         // Before the barrier opens the tick, and by this decides for whom it waits.
         self.recall_attendance();
         let news = self.epoch.simulation.robots_with_news();
@@ -119,7 +125,7 @@ impl LiveRun {
                     // The faults of the epoch before are ended first, and then robots are gathered once more.
                     BarrierOutput::Gathered
                         if matches!(self.epoch.waits_for, WaitsFor::Faults(_)) => {}
-                    BarrierOutput::Gathered => self.open_tick_zero(),
+                    BarrierOutput::Gathered => self.open_tick_zero(frontend),
                     BarrierOutput::Grant { news, clock } => self.put(&news, clock)?,
                     BarrierOutput::Complete(outcome) => self.complete(outcome, frontend)?,
                     BarrierOutput::StandIn(robot) => self.stand_in(&robot, frontend)?,
@@ -149,9 +155,9 @@ impl LiveRun {
     }
 
     /// Every robot of the roster is connected.
-    fn open_tick_zero(&mut self) {
+    fn open_tick_zero(&mut self, frontend: &mut Frontend) {
         self.epoch.simulation.begin_init();
-        self.open_tick(0);
+        self.open_tick(0, frontend);
     }
 
     /// News first, then the clock: on one session they arrive in this order.
@@ -166,7 +172,25 @@ impl LiveRun {
             }
         }
 
+        let panels = self.epoch.view != View::Nothing;
+        let clock = Clock { panels, ..clock };
+        self.epoch.clock = Some(clock);
         self.clock.put(encode(&clock))
+    }
+
+    /// Asks for the panels of the tick that is complete, if they were not asked for: the clock stops after it.
+    fn ask_for_panels(&mut self) -> Result<(), BusError> {
+        // Robots that are in the next tick already have no panel of this one any more.
+        if self.barrier.is_open() {
+            return Ok(());
+        }
+        let Some(clock) = self.epoch.clock.as_mut().filter(|clock| !clock.panels) else {
+            return Ok(());
+        };
+
+        clock.panels = true;
+        self.epoch.asked_again = Some(clock.tick);
+        self.clock.put(encode(clock))
     }
 
     /// A tick is complete.
@@ -206,8 +230,9 @@ impl LiveRun {
         }
 
         self.answer_reached(record.tick, frontend);
-        frontend.observers.request_frame();
-        self.put_due_frame(None, frontend);
+        if self.epoch.view == View::Frame || frontend.pace.is_held() {
+            self.show(frontend);
+        }
         Ok(())
     }
 
@@ -220,27 +245,15 @@ impl LiveRun {
         recorder.write_noted()
     }
 
+    /// Shows observers how things stand.
     pub(super) fn put_frame(&mut self, frontend: &mut Frontend) {
+        if let Err(error) = self.ask_for_panels() {
+            tracing::debug!("{error}");
+        }
         let status = self.status(frontend);
         frontend
             .observers
             .put(frame(&self.epoch.simulation, &status));
-    }
-
-    /// Shows a tick that observers have not seen, if it is time for a frame. Returns how long to wait at most before looking
-    /// again, at most `rest`.
-    fn put_due_frame(
-        &mut self,
-        rest: Option<Duration>,
-        frontend: &mut Frontend,
-    ) -> Option<Duration> {
-        match frontend.observers.frame_due_in() {
-            Some(Duration::ZERO) => {
-                self.put_frame(frontend);
-                rest
-            }
-            due => rest.into_iter().chain(due).min(),
-        }
     }
 
     /// The clock is held: tells people for which robots, and answers a client that waits for a step.
