@@ -61,15 +61,16 @@ def test_initials_are_unique_and_the_name_is_shown_on_hover(launch, open_page):
     run = launch()
     page = open_page(run.address)
     expect(page.get_by_test_id("tick")).to_have_text("0")
-    expect(page.get_by_test_id("panel-Butler").locator(".initials")).to_have_text("B")
-    expect(page.get_by_test_id("panel-Leguin").locator(".initials")).to_have_text("L")
+    expect(page.get_by_test_id("panel-Butler").locator(".initials")).to_have_text("Bu")
+    expect(page.get_by_test_id("panel-Leguin").locator(".initials")).to_have_text("Le")
 
     def labels(*names):
         return page.evaluate(
             "(names) => import('./assets/roster.js').then(({labelsOf}) => Object.fromEntries(labelsOf(names)))", list(names)
         )
 
-    assert labels("Bea", "Butler", "Leguin") == {"Bea": "Be", "Butler": "Bu", "Leguin": "L"}
+    assert labels("Bea", "Butler", "Leguin") == {"Bea": "Be", "Butler": "Bu", "Leguin": "Le"}
+    assert labels("X", "Xenia", "Xe") == {"X": "X", "Xenia": "Xe", "Xe": "X1"}
     assert labels("Waiter1", "Waiter2", "Waiter12") == {"Waiter1": "W1", "Waiter2": "W2", "Waiter12": "W12"}
     many = [a + b + c for a in "ab" for b in "abcd" for c in "abcd"]
     found = labels(*many)
@@ -84,6 +85,21 @@ def test_initials_are_unique_and_the_name_is_shown_on_hover(launch, open_page):
     expect(page.get_by_test_id("hover")).to_contain_text("Butler")
     page.mouse.move(at["x"] + 200, at["y"] + 100)
     expect(page.get_by_test_id("hover")).to_be_hidden()
+
+
+def test_words_of_commands_avoid_each_other(launch, open_page):
+    page = open_page(launch().address)
+    place = (
+        "(commands) => import('./assets/draw.js').then(({freeLine}) => {"
+        " const taken = []; return commands.map(([words, x, y]) => freeLine(taken, words, x, y)); })"
+    )
+    # Six commands to one robot: each has a line of its own, as far as there are lines.
+    lines = page.evaluate(place, [["hurry", 100, 100]] * 6)
+    found = [line for line in lines if line is not None]
+    assert len(found) == 5 and lines[-1] is None
+    assert all(abs(a - b) >= 15 for i, a in enumerate(found) for b in found[:i])
+    # Far enough from each other they stand where they would alone.
+    assert page.evaluate(place, [["hurry", 100, 100], ["refill", 160, 100], ["hurry", 100, 160]]) == [84, 84, 144]
 
 
 def test_a_robot_has_the_color_of_its_place_in_the_roster(launch, open_page):

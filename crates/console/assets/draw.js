@@ -262,15 +262,39 @@ export function cut({ context, camera, theme }, from, to, label) {
   if (label) text(context, theme, label, x, y + 20, theme.bad);
 }
 
+/** Where the words of a command may stand, beside its envelope: the first of these that is free. Below the last one there are none. */
+const WORDS_PX = [-16, -31, 20, -46, 35];
+/** Height of a line of words, and about the width of a letter. */
+const LINE_PX = 15;
+const LETTER_PX = 7;
+
+/**
+ * Where words are to stand that overlap none that stand already; `null` if there is no such place.
+ * @param {{x: number, y: number, width: number}[]} taken
+ * @param {string} words
+ * @param {number} x
+ * @param {number} y of the envelope
+ * @returns {number | null}
+ */
+export function freeLine(taken, words, x, y) {
+  const width = words.slice(0, 60).length * LETTER_PX;
+  const isFree = (/** @type {number} */ line) =>
+    taken.every((other) => Math.abs(other.y - line) >= LINE_PX || Math.abs(other.x - x) >= (other.width + width) / 2);
+  const line = WORDS_PX.map((offset) => y + offset).find(isFree) ?? null;
+  if (line !== null) taken.push({ x, y: line, width });
+  return line;
+}
+
 /**
  * A command on its way.
  * @param {Pen} pen
  * @param {import("./flights.js").Airborne} flight
  * @param {Place} from
  * @param {Place} to
+ * @param {{x: number, y: number, width: number}[]} taken where words of other commands stand
  * @param {boolean} isCalm whether it neither falls nor spreads when it arrives
  */
-export function flight({ context, camera, theme }, flight, from, to, isCalm) {
+export function flight({ context, camera, theme }, flight, from, to, taken, isCalm) {
   const x1 = camera.x(from.x);
   const y1 = camera.y(from.y);
   const x2 = camera.x(to.x);
@@ -292,7 +316,8 @@ export function flight({ context, camera, theme }, flight, from, to, isCalm) {
   if (flight.landed > 0) ring(context, x2, y2, 14 + (isCalm ? 6 : 18 * flight.landed), color, 2);
   else envelope(context, x, y, color, theme.field);
   if (isLost && flight.fallen > 0) cross(context, x, y, 9, color);
-  if (flight.text) text(context, theme, flight.text, x, y - 16, color);
+  const line_px = flight.text ? freeLine(taken, flight.text, x, y) : null;
+  if (line_px !== null) text(context, theme, flight.text, x, line_px, color);
   context.globalAlpha = 1;
 }
 

@@ -204,11 +204,14 @@ export class Plan {
       drawRobot(pen, robot, look, motion.robotsNow.get(robot.name) ?? robot.location);
     }
 
-    for (const flight of this.flights.airborne.values()) {
+    // The newest first: where there is no place for all words, they are those that stay.
+    /** @type {{x: number, y: number, width: number}[]} */
+    const taken = [];
+    for (const flight of [...this.flights.airborne.values()].reverse()) {
       // A sender that is not on the field, such as the operator, is drawn above it.
       const outside = { x: frame.field_m[0] / 2, y: frame.field_m[1] };
       const to = motion.robotsNow.get(flight.to);
-      if (to) draw.flight(pen, flight, motion.robotsNow.get(flight.from) ?? outside, to, CALM.matches);
+      if (to) draw.flight(pen, flight, motion.robotsNow.get(flight.from) ?? outside, to, taken, CALM.matches);
     }
 
     this.paintScale(pen);

@@ -23,7 +23,7 @@ export function initials(name) {
 }
 
 /**
- * The first letter where it is enough, or else the first one with the number at the end of the name or with another letter.
+ * The first two letters, as in the paper, or else the first one with the number at the end of the name or with another letter.
  * @param {string[]} names
  * @returns {Map<string, string>}
  */
@@ -35,10 +35,9 @@ export function labelsOf(names) {
   const found = new Map();
 
   for (const name of names) {
-    const isAlone = names.every((other) => other === name || first(other) !== first(name));
     const letters = [...name].slice(1);
     const number = name.match(/\d{1,2}$/)?.[0];
-    const choices = [...(isAlone ? [""] : []), ...(number ? [number] : []), ...letters];
+    const choices = [...(number ? [number] : []), ...letters, ...(letters.length ? [] : [""])];
     const isFree = (/** @type {string} */ rest) => !taken.has((first(name) + rest).toLowerCase());
 
     let rest = choices.find(isFree);

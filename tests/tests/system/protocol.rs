@@ -255,9 +255,14 @@ fn limits_times_and_version_are_those_of_the_code() {
         ),
         ("protocol", "NEWS_FLAGS: usize = 32", "more than 32 robots"),
         (
-            "robot",
-            "PANEL_INTERVAL: Duration = Duration::from_millis(50)",
-            "at most 20 times a second",
+            "simulator",
+            "PANEL_INTERVAL: Duration = Duration::from_millis(5)",
+            "at most every 5 ms",
+        ),
+        (
+            "simulator",
+            "FRAME_INTERVAL: Duration = Duration::from_millis(33)",
+            "at full speed every 33 ms",
         ),
         (
             "lockstep",

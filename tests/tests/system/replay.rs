@@ -9,7 +9,7 @@ use std::time::Duration;
 use bus::{Bus, Declared, Role};
 use nix::sys::signal::Signal;
 use protocol::keys::Keys;
-use protocol::messages::{Control, ControlAnswer, Panel, Phase, PublicState, Status, WorldFrame};
+use protocol::messages::{Control, ControlAnswer, Phase, PublicState, Status, TickPanel, WorldFrame};
 use protocol::{RobotName, RunName, decode, encode};
 use serde_json::json;
 use system_tests::processes::Running;
@@ -72,7 +72,7 @@ struct Observer {
     bus: Bus,
     keys: Keys,
     frames: Receiver<WorldFrame>,
-    panels: Arc<Mutex<BTreeMap<String, Panel>>>,
+    panels: Arc<Mutex<BTreeMap<String, TickPanel>>>,
     states: Arc<Mutex<BTreeMap<(String, u64), PublicState>>>,
     tokens: Arc<Mutex<BTreeSet<String>>>,
     clocks: Arc<Mutex<u64>>,
@@ -357,7 +357,7 @@ fn a_replay_is_paused_stepped_and_sought_in_both_directions() {
         let report = &ticks[20].reports[&robot("Leguin")];
         let answer = observer.ask("Leguin", "behavior_state", "").unwrap();
         assert!(answer.contains(&report.behavior_state), "{answer}");
-        let panel = ticks[20].panels[&robot("Butler")].clone();
+        let panel = TickPanel::new(1, 20, ticks[20].panels[&robot("Butler")].clone());
         eventually("the panel of the tick", || {
             let panels = observer.panels.lock().unwrap();
             (panels.get("Butler") == Some(&panel)).then_some(())

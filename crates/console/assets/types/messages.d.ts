@@ -572,9 +572,18 @@ export interface FieldError {
   reason: string;
 }
 /**
- * What a robot chooses to display: data, not code.
+ * What a robot displays of one tick, published for the ticks that observers are shown ([`Clock::panels`](super::Clock)). It is
+ * shown with this tick and with no other one.
  */
-export interface Panel {
+export interface TickPanel {
+  /**
+   * The epoch.
+   */
+  epoch: number;
+  /**
+   * The tick that the robot has run last.
+   */
+  tick: number;
   /**
    * The widgets, from top to bottom.
    */

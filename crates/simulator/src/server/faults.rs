@@ -8,7 +8,6 @@ use protocol::messages::{FaultKind, FaultOrder, ProcessOrder};
 use protocol::{Epoch, RobotName, Tick, encode};
 
 use super::live::{LiveRun, WaitsFor};
-use super::options::REPEAT_AFTER;
 use super::orders::PendingOrders;
 
 /// Longest wait for a launcher to carry out an order, and for a robot to go or to come back; then the run goes on and logs
@@ -119,7 +118,7 @@ impl LiveRun {
             return Ok(None);
         }
 
-        if put.elapsed() > REPEAT_AFTER {
+        if put.elapsed() > self.repeat_after {
             pending_orders.put = Some(Instant::now());
             self.orders.publisher.put(encode(&pending_orders.order))?;
         }
