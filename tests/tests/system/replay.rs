@@ -9,7 +9,9 @@ use std::time::Duration;
 use bus::{Bus, Declared, Role};
 use nix::sys::signal::Signal;
 use protocol::keys::Keys;
-use protocol::messages::{Control, ControlAnswer, Phase, PublicState, Status, TickPanel, WorldFrame};
+use protocol::messages::{
+    Control, ControlAnswer, Phase, PublicState, Status, TickPanel, WorldFrame,
+};
 use protocol::{RobotName, RunName, decode, encode};
 use serde_json::json;
 use system_tests::processes::Running;

@@ -89,6 +89,8 @@ impl Witness {
                 .received
                 .recv_timeout(PATIENCE)
                 .unwrap_or_else(|_| panic!("not received: {wanted:#?}"));
+            // Which ticks observers are shown depends on the machine, and so do these flags of clocks.
+            let line = line.replace(r#","panels":true"#, "");
             // On a slow machine a clock is repeated.
             wanted.retain(|wanted| *wanted != line);
         }

@@ -377,15 +377,15 @@ fn cuts_panels_and_who_held_the_clock_up_are_shown() {
         assert_eq!(ticks[tick]["awaiting"], awaiting, "{tick}");
     }
 
-    // With the panels of the two simulated seconds before, which are four ticks.
+    // A panel is of its tick, and of none that follows.
     let shown =
         |tick: u64| json!({"tick": tick, "robot": "Butler", "panel": panel(&format!("at {tick}"))});
     for (from, expected) in [
         (0, json!([shown(1), shown(9)])),
-        (4, json!([shown(1), shown(9)])),
-        (5, json!([shown(9)])),
-        (12, json!([shown(9)])),
-        (13, json!([])),
+        (1, json!([shown(1), shown(9)])),
+        (2, json!([shown(9)])),
+        (9, json!([shown(9)])),
+        (10, json!([])),
     ] {
         assert_eq!(get_range(&console, from, 20)["panels"], expected, "{from}");
     }

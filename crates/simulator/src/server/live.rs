@@ -18,7 +18,7 @@ use scenario::Scenario;
 use super::departed::{Departed, Wait};
 use super::event::{EpochStop, ServerError, ServerEvent, StopReason};
 use super::frontend::{Frontend, refuse};
-use super::observers::View;
+use super::observers::TickVisibility;
 use super::options::{KeepAlive, ServerOptions};
 use super::orders::{Orders, PendingOrders};
 use super::process::{Server, run_to_exit};
@@ -70,7 +70,7 @@ pub(super) struct LiveEpoch {
     /// The clock that was put last.
     pub(super) clock: Option<Clock>,
     /// What observers see of its tick.
-    pub(super) view: View,
+    pub(super) visibility: TickVisibility,
     /// The last tick whose clock was put once more for its panels: robots repeat their answers.
     pub(super) asked_again: Option<Tick>,
     /// Robots that hold the clock up: awaited when people were told, and not waiting for another robot.
@@ -119,7 +119,7 @@ impl LiveEpoch {
             waits_for: WaitsFor::Robots,
             waiting_since: Instant::now(),
             clock: None,
-            view: View::Nothing,
+            visibility: TickVisibility::Hidden,
             asked_again: None,
             stragglers: Vec::new(),
             wall: WallSummary::default(),

@@ -25,9 +25,9 @@ const MAX_PAST_BYTES: usize = 128 << 10;
 
 /// What observers see of a tick. At full speed that is nothing of most ticks, which cost neither frame nor panels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum View {
+pub(super) enum TickVisibility {
     /// Nothing.
-    Nothing,
+    Hidden,
     /// The panels, which are recorded.
     Panels,
     /// The panels, and then a frame.
@@ -64,18 +64,18 @@ impl Observers {
     }
 
     /// A tick begins: what observers see of it. After a tick that `is_last` the clock stops.
-    pub(super) fn view_next(&mut self, is_last: bool, is_paced: bool) -> View {
+    pub(super) fn begin_tick(&mut self, is_last: bool, is_paced: bool) -> TickVisibility {
         let is_due =
             |last: Option<Instant>, interval| last.is_none_or(|last| last.elapsed() >= interval);
         if is_last || is_due(self.frame_at, FRAME_INTERVAL) {
             self.frame_at = Some(Instant::now());
             self.panels_at = self.frame_at;
-            View::Frame
+            TickVisibility::Frame
         } else if is_paced && is_due(self.panels_at, PANEL_INTERVAL) {
             self.panels_at = Some(Instant::now());
-            View::Panels
+            TickVisibility::Panels
         } else {
-            View::Nothing
+            TickVisibility::Hidden
         }
     }
 

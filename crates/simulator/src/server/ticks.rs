@@ -15,7 +15,7 @@ use super::event::{EpochStop, StopReason};
 use super::frame::frame;
 use super::frontend::Frontend;
 use super::live::{LiveRun, WaitsFor};
-use super::observers::View;
+use super::observers::TickVisibility;
 use super::source::{Next, TickSource};
 use super::watchdog::Activity;
 
@@ -85,7 +85,7 @@ impl LiveRun {
         // after the last of the steps that are pending, and after the last tick of the run.
         let is_last = frontend.pace.is_held() || tick == self.epoch.simulation.scenario().ticks;
         let is_paced = frontend.pace.speed.is_some();
-        self.epoch.view = frontend.observers.view_next(is_last, is_paced);
+        self.epoch.visibility = frontend.observers.begin_tick(is_last, is_paced);
         // Before the barrier opens the tick, and by this decides for whom it waits.
         self.recall_attendance();
         let news = self.epoch.simulation.robots_with_news();
@@ -172,7 +172,7 @@ impl LiveRun {
             }
         }
 
-        let panels = self.epoch.view != View::Nothing;
+        let panels = self.epoch.visibility != TickVisibility::Hidden;
         let clock = Clock { panels, ..clock };
         self.epoch.clock = Some(clock);
         self.clock.put(encode(&clock))
@@ -230,7 +230,7 @@ impl LiveRun {
         }
 
         self.answer_reached(record.tick, frontend);
-        if self.epoch.view == View::Frame || frontend.pace.is_held() {
+        if self.epoch.visibility == TickVisibility::Frame || frontend.pace.is_held() {
             self.show(frontend);
         }
         Ok(())
