@@ -101,6 +101,7 @@ fn a_held_clock_is_announced_once_and_released() {
     let mut barrier = gathered(lateness(OnLate::Wait, 1));
     open(&mut barrier, 0);
     report(&mut barrier, "A", 0);
+    assert_eq!(barrier.awaited(), [(name("B"), Reason::Silent)]);
     let mut first = Vec::new();
     let mut second = Vec::new();
 
