@@ -122,11 +122,23 @@ def test_a_state_has_one_color_in_bands_and_diagram(recorded, open_page):
 
 
 def test_names_without_a_color_of_their_own_have_the_colors_of_the_diagram(recorded, open_page):
-    """The hash of the page is that of the crate: its tests have the same values."""
+    """The rule of the page is that of the crate: its tests have the same values."""
     page = open_page(recorded[0])
+    page.wait_for_load_state("networkidle")
     classes = page.evaluate(
-        "import('./assets/palette.js').then(({stateClass}) => ["
-        "['emotion', 'CONFUSED'], ['emotion', ''], ['emotion', 'ärgerlich'], ['behavior', 'DANCE']]"
-        ".map(([kind, name]) => stateClass(kind, name)))"
+        "import('./assets/palette.js').then(({orderNames, stateClass}) => {"
+        "orderNames({emotion: ['LONELY', 'HAPPY', 'CONTENT', 'ärgerlich', 'RESTLESS'], behavior: []});"
+        "return ['LONELY', 'HAPPY', 'CONTENT', 'ärgerlich', 'RESTLESS', 'new'].map((name) => stateClass('emotion', name))"
+        ".concat(stateClass('behavior', 'DANCE'))})"
     )
-    assert classes == ["e13", "e12", "e13", "b8"]
+    assert classes == ["e7", "e0", "e8", "e9", "e10", "e11", "b8"]
+
+
+def test_names_have_the_order_of_the_recording(recorded, open_page):
+    """A guess of the page gives way to what was recorded."""
+    address, events = recorded
+    page = open_page(address)
+    names = page.evaluate("fetch('recording/names?epoch=1').then((answer) => answer.json())")
+    for kind in ("emotion", "behavior"):
+        in_order = list(dict.fromkeys(event["to"] for event in events if event["event"] == kind))
+        assert names[kind] == in_order

@@ -2,7 +2,7 @@
 // Emotion and behavior of each robot over simulated time, a color per state.
 
 import { GUTTER_PX, MARGIN_PX } from "./charts.js";
-import { stateClass } from "./palette.js";
+import { hatchingPath, stateLook } from "./palette.js";
 import { seconds } from "./units.js";
 import { steer } from "./window.js";
 import { html, nothing, render, svg } from "./vendor/lit-html.js";
@@ -111,11 +111,12 @@ function visible(spans, first_s, last_s, x) {
 function block({ state, from_s, to_s }, x, y, kind, robot, tick_s) {
   const left = x(from_s);
   const width = Math.max(1, x(to_s) - left - 0.5);
-  const color = stateClass(kind, state);
+  const { area: color, hatching } = stateLook(kind, state);
+  const over = hatchingPath(hatching, left, y, width, BAND_PX);
   const isRoomy = width > LETTER_PX * state.length + 8;
 
   return svg`
     <g class="band" data-state=${state}><title>${robot}, ${kind} ${state}, ${seconds(from_s, tick_s)} to ${seconds(to_s, tick_s)}</title>
-      <rect x=${left} y=${y} width=${width} height=${BAND_PX} rx="2" class=${color}></rect>
+      <rect x=${left} y=${y} width=${width} height=${BAND_PX} rx="2" class=${color}></rect>${hatching ? svg`<path class="over" d=${over}></path>` : nothing}
       ${isRoomy ? svg`<text class="on-${color}" x=${left + 5} y=${y + 12}>${state}</text>` : nothing}</g>`;
 }

@@ -1,8 +1,8 @@
 // @ts-check
 // The emotions of the legend, each with its color: those that robots have had in what is shown.
 
-import { stateClass } from "./palette.js";
-import { html, render } from "./vendor/lit-html.js";
+import { hatchingPath, stateLook } from "./palette.js";
+import { html, render, svg } from "./vendor/lit-html.js";
 
 /** Most emotions in the legend: a robot may have any. */
 const MOST_EMOTIONS = 15;
@@ -17,10 +17,13 @@ export function renderEmotions(place, store) {
   const more = names.length - MOST_EMOTIONS;
 
   render(
-    html`${names.slice(0, MOST_EMOTIONS).map(
-      (name) => html`<span class="emotion" data-testid="legend-emotion"><svg class="cars-diagram symbol" viewBox="0 0 16 16"
-          aria-hidden="true"><rect class=${stateClass("emotion", name)} width="16" height="16"></rect></svg>${name}</span>`,
-    )}${more > 0 ? html`<span>and ${more} more</span>` : ""}`,
+    html`${names.slice(0, MOST_EMOTIONS).map((name) => {
+      const { area, hatching } = stateLook("emotion", name);
+      return html`<span class="emotion" data-testid="legend-emotion"><svg class="cars-diagram symbol" viewBox="0 0 16 16"
+          aria-hidden="true"><rect class=${area} width="16" height="16"></rect>${
+            hatching ? svg`<path class="over" d=${hatchingPath(hatching, 0, 0, 16, 16)}></path>` : ""
+          }</svg>${name}</span>`;
+    })}${more > 0 ? html`<span>and ${more} more</span>` : ""}`,
     place,
   );
 }

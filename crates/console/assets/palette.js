@@ -1,6 +1,7 @@
 // @ts-check
 // Colors for names that the robots choose. A robot has that of its place in the roster. An emotion or a behavior has that of
-// the space-time diagrams, whose style sheet the server has from the crate `diagram`: `palette.rs` there has the same names.
+// the space-time diagrams, whose style sheet the server has from the crate `pictures`: `palette.rs` there has the same names,
+// and the same rule for others: each has the next free color, in the order in which they first occurred in the epoch.
 
 import { rank } from "./roster.js";
 import { onThemeChange } from "./theme.js";
@@ -17,6 +18,11 @@ const STATES = {
     prefix: "b",
   },
 };
+
+/** Ways in which an area is hatched where there are more names than colors; the first one is not at all. */
+const HATCHINGS = 4;
+/** Distance of the lines of a hatching. */
+const HATCH_PX = 5;
 
 /** Colors of the style sheet by class, of an area and of text on it. @type {Map<string, {fill: string, ink: string}>} */
 const known = new Map();
@@ -60,22 +66,80 @@ function fillOf(name) {
 }
 
 /**
+ * Names without a color of their own, in the order in which they first occurred, as far as it is known.
+ * @type {Record<"emotion" | "behavior", string[]>}
+ */
+let others = { emotion: [], behavior: [] };
+/** Whether the place of one of them is a guess: the page does not see every tick of a run in progress. */
+let isGuessed = false;
+
+/** Whether the recording has to be asked for the order of names. */
+export function hasGuessedNames() {
+  return isGuessed;
+}
+
+/**
+ * Takes the order of names from a recording.
+ * @param {Record<"emotion" | "behavior", string[]>} recorded all names of each kind
+ */
+export function orderNames({ emotion, behavior }) {
+  const without = (/** @type {"emotion" | "behavior"} */ kind, /** @type {string[]} */ names) =>
+    names.filter((name) => !STATES[kind].names.includes(name));
+  others = { emotion: without("emotion", emotion), behavior: without("behavior", behavior) };
+  isGuessed = false;
+}
+
+/**
+ * How an area of an emotion or a behavior looks: the class of its color, and its hatching, of which 0 is none.
+ * @param {"emotion" | "behavior"} kind
+ * @param {string} name
+ */
+export function stateLook(kind, name) {
+  const { names, colors, prefix } = STATES[kind];
+  const known = names.indexOf(name);
+  if (known >= 0) return { area: `${prefix}${known}`, hatching: 0 };
+
+  const further = colors - names.length;
+  const most = further * HATCHINGS;
+  let place = others[kind].indexOf(name);
+  if (place < 0) {
+    place = others[kind].length;
+    if (place < most) {
+      others[kind].push(name);
+      isGuessed = true;
+    }
+  }
+  place = Math.min(place, most - 1);
+
+  return { area: `${prefix}${names.length + (place % further)}`, hatching: Math.floor(place / further) };
+}
+
+/**
  * The class of an area in the color of an emotion or a behavior; text on it has this class after `on-`.
  * @param {"emotion" | "behavior"} kind
  * @param {string} name
  */
 export function stateClass(kind, name) {
-  const { names, colors, prefix } = STATES[kind];
-  const known = names.indexOf(name);
-  const index = known >= 0 ? known : names.length + (fnv1a(name) % (colors - names.length));
-
-  return `${prefix}${index}`;
+  return stateLook(kind, name).area;
 }
 
-/** FNV-1a, 32 bit, of the UTF-8 of a text. @param {string} text */
-function fnv1a(text) {
-  let hash = 0x811c9dc5;
-  for (const byte of new TextEncoder().encode(text)) hash = Math.imul(hash ^ byte, 0x01000193) >>> 0;
+/**
+ * The lines over an area that is hatched, as the data of a path: 1 is rising, 2 upright, 3 falling.
+ * @param {number} hatching
+ * @param {number} left
+ * @param {number} top
+ * @param {number} width
+ * @param {number} height
+ */
+export function hatchingPath(hatching, left, top, width, height) {
+  const slant = [0, height, 0, -height][hatching];
+  let path = "";
+  for (let x = Math.ceil((left - height) / HATCH_PX) * HATCH_PX; x <= left + width + height; x += HATCH_PX) {
+    const [one, other] = [left, left + width].map((edge) => Math.min(1, Math.max(0, (edge - x) / slant)));
+    const isWithin = x > left && x < left + width;
+    const [begin, end] = slant === 0 ? [0, isWithin ? 1 : 0] : [Math.min(one, other), Math.max(one, other)];
+    if (end - begin > 0.01) path += `M${x + slant * begin} ${top + height * (1 - begin)}L${x + slant * end} ${top + height * (1 - end)}`;
+  }
 
-  return hash;
+  return path;
 }

@@ -3,6 +3,7 @@
 // the same store as the newest one.
 
 import { History } from "./history.js";
+import { hasGuessedNames, orderNames } from "./palette.js";
 
 /** @typedef {import("./store.js").Store} Store */
 /** @typedef {import("./types/messages.js").Awaited} Awaited */
@@ -71,6 +72,8 @@ export class Player {
     this.readTo = -1;
     /** The recording of which the log has the epochs before. */
     this.earlierOf = 0;
+    /** The epoch whose names are in order. */
+    this.namesOf = "";
     /** Chunks of the epoch that is shown by number, in order of their last use. @type {Map<number, Promise<Chunk>>} */
     this.chunks = new Map();
     this.numbers = 0;
@@ -162,6 +165,7 @@ export class Player {
       if (!this.header) throw new Error(this.missing);
       await this.seek(Math.min(this.last, tick));
       await this.read(this.header, this.store.history);
+      await this.learnNames();
       await this.readEarlier(this.header);
     } catch (error) {
       this.client.failed(reasonOf(error));
@@ -187,6 +191,18 @@ export class Player {
     this.newest = answer;
     if (answer.epoch === this.wantedEpoch) this.header = answer;
     await this.complete(answer);
+  }
+
+  /** Learns in which order emotions and behaviors occurred, by which those without a color of their own have one. */
+  async learnNames() {
+    const { header } = this;
+    const of = header ? `${header.number} ${header.epoch}` : "";
+    if (!header || (!hasGuessedNames() && this.namesOf === of)) return;
+    const names = await get("recording/names", new URLSearchParams({ epoch: String(header.epoch) }));
+    if (this.header !== header) return;
+    this.namesOf = of;
+    orderNames(names);
+    this.store.emit("live");
   }
 
   /** Takes in the end of an epoch that was chosen before it was written. @param {Recorded} newest */
@@ -250,6 +266,7 @@ export class Player {
       this.forgetChunks();
     }
     await this.refill(newest);
+    await this.learnNames();
     if (this.earlierOf === newest.number) return;
     this.earlierOf = newest.number;
     await this.readEarlier(newest);
@@ -314,6 +331,7 @@ export class Player {
       await this.seek(0);
       if (this.choosing === epoch) this.choosing = null;
       await this.read(header, this.store.history, () => this.header?.epoch === epoch);
+      await this.learnNames();
     } catch (error) {
       if (this.choosing === epoch) this.choosing = null;
       this.client.failed(reasonOf(error));

@@ -8,7 +8,7 @@ use protocol::messages::{Flight, LogRecord, Point, Presence};
 use protocol::{Epoch, Event, RobotName, Tick};
 use recording::{Header, Json, PlacedRobot, RawTick, RecordingError};
 use serde::Serialize;
-use timeline::Timeline;
+use timeline::{StateKind, Timeline};
 
 use crate::diagrams::{DiagramError, Diagrams, WindowQuery};
 
@@ -66,6 +66,13 @@ struct RecordingHeader<'a> {
     number: u64,
     /// The epochs that have a recording.
     epochs: &'a [Epoch],
+}
+
+/// The emotions and behaviors of a recording.
+#[derive(Debug, Serialize)]
+struct RecordedNames<'a> {
+    emotion: &'a [String],
+    behavior: &'a [String],
 }
 
 /// What happened in a range of ticks, as a JSON object. Reports and panels are in it as they were recorded: to decode them and
@@ -228,6 +235,20 @@ impl RecordedEpoch {
             }
         }
         Ok(range.into_json())
+    }
+
+    /// The emotions and behaviors so far, as JSON, in the order in which they first occurred: by it they have their colors.
+    ///
+    /// # Errors
+    /// [`RecordingError`] if the file is damaged.
+    pub(crate) fn names(&self) -> Result<Vec<u8>, RecordingError> {
+        let file = self.file();
+        let timeline = self.diagrams.before(&file, file.len())?;
+        let names = timeline.names();
+        Ok(to_json(&RecordedNames {
+            emotion: names.of(StateKind::Emotion),
+            behavior: names.of(StateKind::Behavior),
+        }))
     }
 
     /// The space-time diagram of a window, as SVG without its style sheet.

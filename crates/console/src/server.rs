@@ -62,6 +62,7 @@ fn routes(app: Arc<App>) -> Router {
         .route(&format!("{page}ws"), get(socket))
         .route(&format!("{page}recording"), get(recording))
         .route(&format!("{page}recording/ticks"), get(ticks))
+        .route(&format!("{page}recording/names"), get(names))
         .route(&format!("{page}recording/diagram"), get(diagram))
         .fallback(async || not_found())
         .layer(from_fn_with_state(app.clone(), guard))
@@ -375,6 +376,24 @@ async fn ticks(
 fn read_ticks(recording: &RecordedEpoch, wanted: Wanted) -> Response {
     match recording.range(wanted) {
         Ok(range) => json_text(range),
+        Err(error) => internal_error(&error),
+    }
+}
+
+async fn names(
+    State(app): State<Arc<App>>,
+    query: Result<Query<WhichEpoch>, QueryRejection>,
+) -> Response {
+    let Ok(Query(WhichEpoch { epoch })) = query else {
+        return bad_range();
+    };
+    read(app, move |app| with_epoch(app, epoch, read_names)).await
+}
+
+/// Reads from the recording's files; blocks.
+fn read_names(recording: &RecordedEpoch) -> Response {
+    match recording.names() {
+        Ok(names) => json_text(names),
         Err(error) => internal_error(&error),
     }
 }

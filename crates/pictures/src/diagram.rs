@@ -16,7 +16,7 @@ mod time_axis;
 mod words;
 
 use protocol::messages::Awaited;
-use protocol::{Event, RobotName, Tick};
+use protocol::{Event, Tick};
 use timeline::{Span, Timeline};
 
 use self::draw::draw;
@@ -102,8 +102,7 @@ impl Diagram {
             return Err(TooMuch { items: count });
         }
 
-        let robots: Vec<RobotName> = self.timeline.robots().cloned().collect();
-        Ok(draw(robots, &items, self.window, &self.options))
+        Ok(draw(&self.timeline, &items, self.window, &self.options))
     }
 
     /// Adds what is shown.

@@ -26,7 +26,7 @@ pub use chart::trend::{Trend, TrendLine};
 pub use labels::width_px;
 pub use number::{decimals_for, fixed};
 pub use page::{ChartPanel, Figure, Page, Text};
-pub use palette::state_class;
+pub use palette::{StateLook, state_look};
 pub use scale::round_range;
 pub use style::style;
 pub use table::{Cell, Table};

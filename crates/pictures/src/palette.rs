@@ -1,9 +1,10 @@
-//! Colors. A name of an emotion or a behavior has the same color in every picture, whatever else is in it.
+//! Colors. An emotion or a behavior has the same color in every picture of a run: that of its name if the name is a known one,
+//! otherwise the next free one, in the order in which the names first occurred.
 //!
-//! The emotions of the documented robots have colors of Okabe and Ito (2008), which are told apart by most eyes; they differ in
-//! lightness, too, so that they are told apart in print without colors.
+//! The emotions of the documented robots have colors of Okabe and Ito (2008). They and the colors of other names are told apart
+//! with protanopia and deuteranopia, too.
 
-use timeline::StateKind;
+use timeline::{StateKind, StateNames};
 
 /// A color in light and in dark surroundings, as `#rrggbb`. Prints are light.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -54,23 +55,24 @@ pub(crate) const BEHAVIORS: [&str; 8] = [
     "GO_HOME",
 ];
 
-/// Colors of emotions: of [`EMOTIONS`], in their order, then those of other names, after Tol (2021).
+/// Colors of emotions: of [`EMOTIONS`], in their order, then those of other names. Any two have a distance of at least 0.07 in
+/// OKLab, also with protanopia and deuteranopia.
 pub(crate) const EMOTION_SHADES: [Shade; 15] = [
     shade("#009e73", "#1aa981"),
     shade("#56b4e9", "#56b4e9"),
     shade("#f0e442", "#dccf35"),
     shade("#d55e00", "#e0721f"),
-    shade("#cc79a7", "#d387b1"),
-    shade("#8a8a8a", "#979797"),
-    shade("#0072b2", "#3a93cc"),
-    shade("#aa4499", "#bd62ae"),
-    shade("#999933", "#a9a945"),
-    shade("#882255", "#b04a80"),
-    shade("#332288", "#8577d6"),
-    shade("#44aa99", "#58b8a8"),
-    shade("#ddcc77", "#cfbf6d"),
-    shade("#b07a4a", "#bd8a5c"),
-    shade("#7a8ca5", "#8c9db5"),
+    shade("#cc79a7", "#945888"),
+    shade("#526a68", "#4592b7"),
+    shade("#0072b2", "#5888f4"),
+    shade("#3630a9", "#894ac0"),
+    shade("#cfaa02", "#fff53a"),
+    shade("#5a0f08", "#cb3523"),
+    shade("#328cfe", "#20e1fe"),
+    shade("#c8b4a0", "#daf7e3"),
+    shade("#515503", "#f29600"),
+    shade("#46055e", "#37ec97"),
+    shade("#3e4869", "#19ccb1"),
 ];
 
 /// Colors of behaviors: of [`BEHAVIORS`], in their order, then those of other names.
@@ -126,31 +128,54 @@ const fn shade(light: &'static str, dark: &'static str) -> Shade {
     Shade { light, dark }
 }
 
-/// The class of areas in the color of an emotion or a behavior; text on them has this class after `on-`.
+/// Ways in which an area is hatched; the first one is not at all.
+const HATCHINGS: usize = 4;
+
+/// How areas of an emotion or a behavior look. Looks are ordered: those of known names as these are, which is the ladder of
+/// emotions, then others as they first occurred.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct StateLook {
+    prefix: &'static str,
+    /// Which hatching is over the color, of names beyond the number of colors; 0 is none.
+    pub(crate) hatching: usize,
+    /// Index of its color.
+    color: usize,
+}
+
+impl StateLook {
+    /// The class of its color; text on it has this class after `on-`.
+    #[must_use]
+    pub fn class(&self) -> String {
+        format!("{}{}", self.prefix, self.color)
+    }
+}
+
+/// How an emotion or a behavior looks in a run with these names. A name that is not among them looks like the next one.
 #[must_use]
-pub fn state_class(kind: StateKind, name: &str) -> String {
-    match kind {
-        StateKind::Emotion => format!("e{}", index(name, &EMOTIONS, EMOTION_SHADES.len())),
-        StateKind::Behavior => format!("b{}", index(name, &BEHAVIORS, BEHAVIOR_SHADES.len())),
+pub fn state_look(kind: StateKind, name: &str, names: &StateNames) -> StateLook {
+    let (prefix, known, shades): (_, &[&str], _) = match kind {
+        StateKind::Emotion => ("e", &EMOTIONS, EMOTION_SHADES.len()),
+        StateKind::Behavior => ("b", &BEHAVIORS, BEHAVIOR_SHADES.len()),
+    };
+    if let Some(color) = known.iter().position(|other| *other == name) {
+        return StateLook {
+            prefix,
+            color,
+            hatching: 0,
+        };
     }
-}
 
-/// A name without a color of its own has one of the others, by its hash (FNV-1a, 32 bit, of its UTF-8).
-fn index(name: &str, known: &[&str], shades: usize) -> usize {
-    if let Some(index) = known.iter().position(|other| *other == name) {
-        return index;
+    let others = names.of(kind).iter();
+    let others = others.filter(|other| !known.contains(&other.as_str()));
+    let place = others.take_while(|other| *other != name).count();
+    let colors = shades - known.len();
+    // Names after the last look have that one.
+    let place = place.min(colors * HATCHINGS - 1);
+    StateLook {
+        prefix,
+        color: known.len() + place % colors,
+        hatching: place / colors,
     }
-
-    let others = shades - known.len();
-    known.len() + fnv1a(name) as usize % others
-}
-
-fn fnv1a(text: &str) -> u32 {
-    let mut hash: u32 = 0x811c_9dc5;
-    for byte in text.bytes() {
-        hash = (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193);
-    }
-    hash
 }
 
 /// The color of text on a color, `#rrggbb`: black or white.
@@ -183,52 +208,71 @@ pub(crate) fn level(share: f64) -> usize {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
 
+    fn names(kind: StateKind, all: &[&str]) -> StateNames {
+        let mut names = StateNames::default();
+        for name in all {
+            names.add(kind, name);
+        }
+        names
+    }
+
     #[test]
-    fn the_color_of_a_name_is_fixed() {
-        assert_eq!(fnv1a("a"), 0xe40c_292c);
-        assert_eq!(state_class(StateKind::Emotion, "HAPPY"), "e0");
-        assert_eq!(state_class(StateKind::Emotion, "HOPEFUL"), "e6");
-        for name in ["CONFUSED", "", "BORED", "x"] {
-            assert!((7..15).contains(&index(name, &EMOTIONS, 15)), "{name}");
-            assert!((8..14).contains(&index(name, &BEHAVIORS, 14)), "{name}");
+    fn known_names_have_colors_of_their_own() {
+        let none = StateNames::default();
+        for (index, name) in EMOTIONS.iter().enumerate() {
+            let look = state_look(StateKind::Emotion, name, &none);
+            assert_eq!((look.class(), look.hatching), (format!("e{index}"), 0));
         }
     }
 
-    /// The page of the console has the same hash, and its test the same values.
+    /// The page of the console has the same rule, and its test the same values.
     #[test]
-    fn names_without_a_color_of_their_own_have_that_of_their_hash() {
-        for (name, class) in [("CONFUSED", "e13"), ("", "e12"), ("ärgerlich", "e13")] {
-            assert_eq!(state_class(StateKind::Emotion, name), class);
+    fn other_names_have_the_next_free_color_in_the_order_in_which_they_occur() {
+        let names = names(
+            StateKind::Emotion,
+            &["LONELY", "HAPPY", "CONTENT", "ärgerlich", "RESTLESS"],
+        );
+        let class = |name| state_look(StateKind::Emotion, name, &names).class();
+        let classes = ["LONELY", "HAPPY", "CONTENT", "ärgerlich", "RESTLESS", "new"].map(class);
+        assert_eq!(classes, ["e7", "e0", "e8", "e9", "e10", "e11"]);
+        let dance = state_look(StateKind::Behavior, "DANCE", &names);
+        assert_eq!(dance.class(), "b8");
+    }
+
+    #[test]
+    fn more_names_than_colors_are_hatched() {
+        let all: Vec<String> = (0..40).map(|index| format!("S{index}")).collect();
+        let all: Vec<&str> = all.iter().map(String::as_str).collect();
+        for (kind, looks) in [(StateKind::Emotion, 32), (StateKind::Behavior, 24)] {
+            let names = names(kind, &all);
+            let mut found = BTreeSet::new();
+            for name in &all {
+                found.insert(state_look(kind, name, &names));
+            }
+            assert_eq!(found.len(), looks);
         }
-        assert_eq!(state_class(StateKind::Behavior, "DANCE"), "b8");
     }
 
     /// WCAG 2.2, 1.4.3 (AA).
     #[test]
     fn text_is_legible_on_every_color() {
-        let luminance = |color: &str| {
-            let [red, green, blue] = linear(color);
-            0.2126 * red + 0.7152 * green + 0.0722 * blue
-        };
         let shades = EMOTION_SHADES.iter().chain(&BEHAVIOR_SHADES);
         for color in shades.flat_map(|shade| [shade.light, shade.dark]) {
-            let one = luminance(color);
-            let other = luminance(ink(color));
-            let contrast = (one.max(other) + 0.05) / (one.min(other) + 0.05);
+            let contrast = contrast(color, ink(color));
             assert!(contrast >= 4.5, "{color}: {contrast}");
         }
     }
 
-    #[test]
-    fn no_two_emotions_have_a_color() {
-        for (index, one) in EMOTION_SHADES.iter().enumerate() {
-            for other in &EMOTION_SHADES[index + 1..] {
-                assert_ne!(one.light, other.light);
-                assert_ne!(one.dark, other.dark);
-            }
-        }
+    fn contrast(one: &str, other: &str) -> f64 {
+        let [one, other] = [one, other].map(|color| {
+            let [red, green, blue] = linear(color);
+            0.2126 * red + 0.7152 * green + 0.0722 * blue
+        });
+        (one.max(other) + 0.05) / (one.min(other) + 0.05)
     }
 
     /// Linear RGB with protanopia and deuteranopia after Machado, Oliveira and Fernandes (2009).
@@ -288,16 +332,36 @@ mod tests {
         squares.sqrt()
     }
 
-    #[test]
-    fn arms_are_told_apart_by_most_eyes() {
-        for (index, one) in ARM_SHADES.iter().enumerate() {
-            for other in &ARM_SHADES[index + 1..] {
+    /// The least distance of two colors, in light and in dark, with the usual eyes.
+    fn least_distance(shades: &[Shade]) -> f64 {
+        let mut least = f64::INFINITY;
+        for (index, one) in shades.iter().enumerate() {
+            for other in &shades[index + 1..] {
                 for eyes in &EYES {
-                    let light = distance(one.light, other.light, eyes);
-                    let dark = distance(one.dark, other.dark, eyes);
-                    assert!(light > 0.1 && dark > 0.1, "{one:?} {other:?}");
+                    least = least.min(distance(one.light, other.light, eyes));
+                    least = least.min(distance(one.dark, other.dark, eyes));
                 }
             }
+        }
+        least
+    }
+
+    #[test]
+    fn emotions_and_arms_are_told_apart_by_most_eyes() {
+        let emotions = least_distance(&EMOTION_SHADES);
+        assert!(emotions > 0.07, "{emotions}");
+        let arms = least_distance(&ARM_SHADES);
+        assert!(arms > 0.1, "{arms}");
+    }
+
+    /// WCAG 2.2, 1.4.11 (AA): lines and markers on the page.
+    #[test]
+    fn lines_of_arms_are_seen_on_the_page() {
+        let (_, paper) = NAMED[0];
+        for arm in ARM_SHADES {
+            let light = contrast(arm.light, paper.light);
+            let dark = contrast(arm.dark, paper.dark);
+            assert!(light >= 3.0 && dark >= 3.0, "{arm:?}: {light}, {dark}");
         }
     }
 

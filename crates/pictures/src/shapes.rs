@@ -1,6 +1,7 @@
 //! Shapes of SVG.
 
 use crate::markup::{Markup, Tag, number};
+use crate::palette::StateLook;
 
 /// Font of labels, pixels.
 pub(crate) const LABEL_PX: f64 = 10.5;
@@ -63,6 +64,16 @@ impl Markup {
             .empty();
     }
 
+    /// A rectangle in the color of an emotion or a behavior. `class` is what else its class has.
+    pub(crate) fn state(&mut self, look: &StateLook, class: &str, place: Pixel, size: Pixel) {
+        let (width, height) = size;
+        let class = format!("{class} {}", look.class());
+        self.rect(class.trim_start(), place, width, height);
+        if look.hatching > 0 {
+            self.path("over", &hatching(look.hatching, place, size));
+        }
+    }
+
     /// A cross.
     pub(crate) fn cross(&mut self, class: &str, (x, y): Pixel) {
         let (left, top, bottom) = (number(x - 4.0), number(y - 4.0), number(y + 4.0));
@@ -95,6 +106,32 @@ impl Tag<'_> {
         }
         self.with("text-anchor", anchor)
     }
+}
+
+/// Lines over a rectangle, as the data of a path: 1 is rising, 2 upright, 3 falling.
+pub(crate) fn hatching(kind: usize, (left, top): Pixel, (width, height): Pixel) -> String {
+    const STEP_PX: f64 = 5.0;
+    let (right, bottom) = (left + width, top + height);
+    let mut data = String::new();
+    // How far a line goes to the right on its way from the lower to the upper edge.
+    let slant = [0.0, height, 0.0, -height][kind % 4];
+    // Lines of areas beside each other continue each other.
+    let mut x = ((left - height) / STEP_PX).ceil() * STEP_PX;
+    while x <= right + height {
+        let at = |way: f64| (x + slant * way, bottom - height * way);
+        let ways = [left, right].map(|edge| (edge - x) / slant);
+        let (begin, end) = if slant == 0.0 {
+            (0.0, if x > left && x < right { 1.0 } else { 0.0 })
+        } else {
+            let [one, other] = ways.map(|way| way.clamp(0.0, 1.0));
+            (one.min(other), one.max(other))
+        };
+        if end - begin > 0.01 {
+            data += &polyline(&[at(begin), at(end)]);
+        }
+        x += STEP_PX;
+    }
+    data
 }
 
 /// Straight lines through these points, as the data of a path.

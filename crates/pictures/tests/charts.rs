@@ -10,10 +10,10 @@ use std::collections::BTreeMap;
 use pictures::{
     Band, BandRow, Bands, Cell, ChartPanel, Curve, CurveStep, Figure, Floor, IntervalRow,
     Intervals, Matrix, MatrixCell, MatrixLabel, Page, PlottedEstimate, Steps, Table, Text, Trend,
-    TrendLine, state_class,
+    TrendLine, state_look,
 };
 use roxmltree::{Document, Node, ParsingOptions};
-use timeline::StateKind;
+use timeline::{StateKind, StateNames};
 
 /// A text that would leave its place if it were not escaped.
 const HOSTILE: &str = "</svg><script>alert(\"1\")</script>&amp;'\u{1b}[31m\u{202e}\u{0}]]>";
@@ -78,6 +78,7 @@ fn bands_are_as_many_as_the_states() {
             label: HOSTILE.to_owned(),
             bands,
         }],
+        names: StateNames::default(),
     };
     let svg = chart.draw();
     let document = parsed(&svg);
@@ -107,6 +108,7 @@ fn a_long_row_has_a_bounded_size() {
             label: "one".to_owned(),
             bands,
         }],
+        names: StateNames::default(),
     };
     let svg = chart.draw();
     parsed(&svg);
@@ -115,11 +117,12 @@ fn a_long_row_has_a_bounded_size() {
 
 #[test]
 fn a_matrix_has_a_cell_for_each_value() {
+    let names = StateNames::default();
     for size in [1, 3, 8, 24, 60] {
         let labels: Vec<MatrixLabel> = (0..size)
             .map(|index| MatrixLabel {
                 text: format!("{HOSTILE}{index}"),
-                color: Some(state_class(StateKind::Behavior, "WAIT")),
+                look: Some(state_look(StateKind::Behavior, "WAIT", &names)),
             })
             .collect();
         let mut cells = Vec::new();
@@ -300,7 +303,7 @@ fn a_matrix_is_as_wide_as_its_numbers_need() {
         let labels = |count: usize| {
             let label = |index: usize| MatrixLabel {
                 text: format!("{index}"),
-                color: None,
+                look: None,
             };
             (0..count).map(label).collect::<Vec<MatrixLabel>>()
         };
@@ -373,6 +376,7 @@ fn charts_of_nothing_are_drawn() {
         kind: StateKind::Emotion,
         end_s: 0.0,
         rows: Vec::new(),
+        names: StateNames::default(),
     };
     parsed(&bands.draw());
     let steps = Steps {

@@ -3,7 +3,7 @@
 use pictures::{BandRow, Bands, ChartPanel};
 use protocol::{RobotName, Tick};
 use record::EpochFiles;
-use timeline::StateKind;
+use timeline::{StateKind, StateNames};
 
 use super::facts::{RobotFacts, RunFacts};
 use crate::diagram::{DiagramOptions, Window, draw};
@@ -32,7 +32,7 @@ pub(super) fn run_panel(facts: &RunFacts, kind: StateKind) -> Option<ChartPanel>
     };
     let rows: Vec<BandRow> = facts.robots.iter().map(row).collect();
     let has_states = rows.iter().any(|row| !row.bands.is_empty());
-    has_states.then(|| state_panel(rows, kind, facts.time_s(), ""))
+    has_states.then(|| state_panel(rows, kind, facts.time_s(), "", &facts.names))
 }
 
 /// Rows of states over time.
@@ -41,12 +41,14 @@ pub(super) fn state_panel(
     kind: StateKind,
     end_s: f64,
     heading: &str,
+    names: &StateNames,
 ) -> ChartPanel {
     let chart = Bands {
         title: format!("{} over time {heading}", states_in_words(kind)),
         kind,
         end_s,
         rows,
+        names: names.clone(),
     };
     ChartPanel::wide(heading, chart.draw())
 }
@@ -91,6 +93,7 @@ pub(super) fn diagram_lines(
             is_whole: true,
             has_style: false,
             has_legend: false,
+            names: facts.names.clone(),
             tick_px: Some(LINE_PX / length as f64),
             ..DiagramOptions::default()
         };

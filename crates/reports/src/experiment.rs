@@ -6,7 +6,7 @@ use observe::{Measure, Measured};
 use pictures::{Cell, Figure, Page, Table, Text};
 use protocol::RunName;
 use record::{EpochFiles, RunFolder};
-use timeline::StateKind;
+use timeline::{StateKind, StateNames};
 
 use super::answer::{lead, sentences};
 use super::course::{READ_DIAGRAM, diagram_lines, run_panel};
@@ -250,6 +250,7 @@ fn write_examples(page: &mut Page, study: &Study<'_>, folder: &Path) {
              median of all runs of the arm {baseline}."
         ));
     }
+    let mut names = StateNames::default();
     for run in runs {
         let (name, outcome) = match run {
             Example::Typical => ("The typical run".to_owned(), found.map(|found| found.0)),
@@ -262,7 +263,7 @@ fn write_examples(page: &mut Page, study: &Study<'_>, folder: &Path) {
         };
         page.heading(&name);
         match outcome {
-            Some(outcome) => write_example(page, study, folder, (measure, outcome)),
+            Some(outcome) => write_example(page, study, folder, (measure, outcome), &mut names),
             None => page.remark("There are no results of it."),
         }
     }
@@ -316,6 +317,7 @@ fn write_example(
     study: &Study<'_>,
     folder: &Path,
     (measure, outcome): (&Measure, &UnitOutcome),
+    names: &mut StateNames,
 ) {
     let measured = outcome
         .measures
@@ -336,13 +338,19 @@ fn write_example(
         page.remark(
             "Its robots are processes, which a report does not start: record it by the command above and report the run.",
         );
-    } else if let Err(error) = write_course(page, study, outcome) {
+    } else if let Err(error) = write_course(page, study, outcome, names) {
         page.remark(format!("It cannot be shown: {error}."));
     }
 }
 
-/// Plays a unit again, recorded in a temporary folder, and shows its course.
-fn write_course(page: &mut Page, study: &Study<'_>, outcome: &UnitOutcome) -> Result<(), LabError> {
+/// Plays a unit again, recorded in a temporary folder, and shows its course. `names` are the emotions and behaviors of the runs
+/// before it on the page, which keep their colors.
+fn write_course(
+    page: &mut Page,
+    study: &Study<'_>,
+    outcome: &UnitOutcome,
+    names: &mut StateNames,
+) -> Result<(), LabError> {
     let plan = &study.results.plan;
     let unit = plan.unit(outcome.unit);
     let mut scenario =
@@ -361,7 +369,9 @@ fn write_course(page: &mut Page, study: &Study<'_>, outcome: &UnitOutcome) -> Re
     }
 
     let files = recorded_epoch(&recorded, None)?;
-    let facts = RunFacts::read(&files)?;
+    let mut facts = RunFacts::read(&files)?;
+    names.add_all(&facts.names);
+    facts.names = names.clone();
     let mut figures = Vec::new();
     if study.shows(Shown::Runs) {
         figures.push(course(outcome, &facts, &files)?);

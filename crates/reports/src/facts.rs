@@ -11,7 +11,9 @@ use protocol::{Event, RobotName, Tick};
 use record::EpochFiles;
 use record::Record;
 use recording::{Recording, RecordingError};
-use timeline::{Counts, LinkCounts, Period, RobotCounts, Span, StateKind, StateSpan, Timeline};
+use timeline::{
+    Counts, LinkCounts, Period, RobotCounts, Span, StateKind, StateNames, StateSpan, Timeline,
+};
 
 /// Parts of the floor along its longer side.
 const PARTS: f64 = 50.0;
@@ -43,6 +45,8 @@ pub(super) struct RunFacts {
     pub(super) disturbances: Vec<ScenarioEffect>,
     /// The verdicts about expectations, in the order in which they were decided.
     pub(super) judged: Vec<JudgedFacts>,
+    /// The emotions and behaviors of its robots.
+    pub(super) names: StateNames,
     /// Where the robots were, if it was recorded.
     pub(super) floors: BTreeMap<RobotName, Floor>,
     /// What is missing, a sentence each.
@@ -224,6 +228,7 @@ impl RunFacts {
             robot.counts = counts.robots.remove(name).unwrap_or_default();
         }
         self.links = counts.links;
+        self.names = timeline.names().clone();
     }
 
     /// Adds what only a recording has. Without one, or with a damaged one, a note says what is missing.

@@ -8,7 +8,7 @@ use protocol::messages::{End, Variable};
 use protocol::time::{self, tick_seconds, time_s};
 use protocol::{RobotName, Tick};
 use record::{EpochFiles, RunFolder, Summary};
-use timeline::{LinkCounts, StateKind};
+use timeline::{LinkCounts, StateKind, StateNames};
 
 use super::course::{READ_DIAGRAM, diagram_lines, run_panel, state_panel, states_in_words};
 use super::facts::RunFacts;
@@ -57,6 +57,7 @@ pub fn of_runs(folders: &[RunFolder]) -> Result<Page, LabError> {
     for folder in folders {
         runs.push(ReportedRun::read(folder)?);
     }
+    share_names(&mut runs);
     let Some(first) = runs.first() else {
         return Err(LabError::refused("there is no run to report"));
     };
@@ -88,6 +89,17 @@ pub fn of_runs(folders: &[RunFolder]) -> Result<Page, LabError> {
     write_expectations(&mut page, &runs);
     write_reproduction(&mut page, &runs);
     Ok(page)
+}
+
+/// Gives an emotion or a behavior the same color in the pictures of all runs.
+fn share_names(runs: &mut [ReportedRun]) {
+    let mut names = StateNames::default();
+    for run in runs.iter() {
+        names.add_all(&run.facts.names);
+    }
+    for run in runs {
+        run.facts.names = names.clone();
+    }
 }
 
 impl ReportedRun {
@@ -302,6 +314,9 @@ fn write_states(page: &mut Page, runs: &[ReportedRun]) {
 
 /// A panel for each robot of several runs, with a row for each run.
 fn state_panels(runs: &[ReportedRun], kind: StateKind) -> (Vec<ChartPanel>, String) {
+    let Some(names) = runs.first().map(|run| &run.facts.names) else {
+        return (Vec::new(), String::new());
+    };
     let times_s = runs.iter().map(|run| run.facts.time_s());
     let end_s = times_s.fold(0.0, f64::max);
     let mut robots = Vec::new();
@@ -320,7 +335,7 @@ fn state_panels(runs: &[ReportedRun], kind: StateKind) -> (Vec<ChartPanel>, Stri
         }
     }
     panels("robots", robots, |(name, rows)| {
-        state_panel(rows, kind, end_s, name.as_str())
+        state_panel(rows, kind, end_s, name.as_str(), names)
     })
 }
 

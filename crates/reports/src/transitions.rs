@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use pictures::{Cell, ChartPanel, Figure, Matrix, MatrixCell, MatrixLabel, Table, state_class};
+use pictures::{Cell, ChartPanel, Figure, Matrix, MatrixCell, MatrixLabel, Table, state_look};
 use protocol::RobotName;
-use timeline::StateKind;
+use timeline::{StateKind, StateNames};
 
 use super::facts::RunFacts;
 use super::limits::panels;
@@ -32,6 +32,7 @@ fn figure(runs: &[&RunFacts], kind: StateKind, what: &str) -> Option<Figure> {
             *of_robot.entry(transition.clone()).or_insert(0) += count;
         }
     }
+    let names = runs.first().map(|run| &run.names)?;
     if counts.is_empty() {
         return None;
     }
@@ -40,7 +41,7 @@ fn figure(runs: &[&RunFacts], kind: StateKind, what: &str) -> Option<Figure> {
     let counts = counts.into_iter().collect();
     let (panels, sentence) = panels("robots", counts, |(name, counts)| {
         let title = format!("Transitions between {what} of {name}");
-        matrix(name, title, kind, &counts, &mut table)
+        matrix(name, title, (kind, names), &counts, &mut table)
     });
     let caption = format!(
         "Transitions between {what}: how often the state of the row was followed by that of the column, and below it the share \
@@ -54,28 +55,26 @@ fn figure(runs: &[&RunFacts], kind: StateKind, what: &str) -> Option<Figure> {
 fn matrix(
     name: &RobotName,
     title: String,
-    kind: StateKind,
+    (kind, names): (StateKind, &StateNames),
     counts: &Counts,
     table: &mut Table,
 ) -> ChartPanel {
     let mut sums: BTreeMap<&str, u64> = BTreeMap::new();
-    let mut states = BTreeSet::new();
-    for ((from, to), count) in counts {
+    for ((from, _), count) in counts {
         *sums.entry(from).or_default() += count;
-        states.extend([from.as_str(), to]);
     }
+    let states = on_ladder(kind, names, counts);
 
     let label = |state: &&str| MatrixLabel {
         text: (*state).to_owned(),
-        color: Some(state_class(kind, state)),
+        look: Some(state_look(kind, state, names)),
     };
     let labels: Vec<MatrixLabel> = states.iter().map(label).collect();
     let mut cells = vec![vec![None; states.len()]; states.len()];
-    let states: Vec<&str> = states.into_iter().collect();
     for ((from, to), count) in counts {
         let share = *count as f64 / sums[from.as_str()] as f64;
-        let place = |state: &String| states.binary_search(&state.as_str());
-        if let (Ok(row), Ok(column)) = (place(from), place(to)) {
+        let place = |state: &String| states.iter().position(|other| other == state);
+        if let (Some(row), Some(column)) = (place(from), place(to)) {
             cells[row][column] = Some(MatrixCell {
                 share,
                 text: count.to_string(),
@@ -100,4 +99,39 @@ fn matrix(
         cells,
     };
     chart.panel(name.as_str())
+}
+
+/// The states of transitions: emotions of the paper from HAPPY up the ladder, others after them as they first occurred in the run.
+fn on_ladder<'a>(kind: StateKind, names: &StateNames, counts: &'a Counts) -> Vec<&'a str> {
+    let mut states = BTreeSet::new();
+    for (from, to) in counts.keys() {
+        for state in [from, to] {
+            states.insert((state_look(kind, state, names), state.as_str()));
+        }
+    }
+    states.into_iter().map(|(_, state)| state).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use affect::{EmotionLabel, StandardEmotion};
+
+    use super::*;
+
+    #[test]
+    fn emotions_are_in_the_order_of_the_ladder_and_others_as_they_occur() {
+        let mut names = StateNames::default();
+        for name in ["ZEN", "BORED", "HAPPY"] {
+            names.add(StateKind::Emotion, name);
+        }
+        let ladder = StandardEmotion::ALL.map(EmotionLabel::name);
+        let mut counts = Counts::new();
+        for name in ["BORED", "ZEN"].into_iter().chain(ladder) {
+            counts.insert((name.to_owned(), "HAPPY".to_owned()), 1);
+        }
+
+        let mut expected = ladder.to_vec();
+        expected.extend(["ZEN", "BORED"]);
+        assert_eq!(on_ladder(StateKind::Emotion, &names, &counts), expected);
+    }
 }

@@ -6,6 +6,7 @@ use protocol::event::Cause;
 use protocol::messages::FaultKind;
 use protocol::{Event, RobotName, Seq, Tick};
 
+use crate::names::StateNames;
 use crate::span::{
     Absence, ChangeSpan, CommandEnd, CommandSpan, CutSpan, FaultSpan, Joined, MissedTicks, Period,
     QueriesLost, Span, StateKind, StateSpan,
@@ -22,6 +23,7 @@ pub struct Timeline {
     queries: BTreeMap<(RobotName, RobotName), QueriesLost>,
     /// The last change of each part of the scenario, by its path.
     set: BTreeMap<String, String>,
+    names: StateNames,
 }
 
 /// What is in progress at a robot.
@@ -195,6 +197,12 @@ impl Timeline {
         state.map(|state| state.name.as_str())
     }
 
+    /// The emotions and behaviors that the robots have had so far.
+    #[must_use]
+    pub fn names(&self) -> &StateNames {
+        &self.names
+    }
+
     /// Since when a robot takes no part; `None` if it does.
     #[must_use]
     pub fn lost_since(&self, robot: &RobotName) -> Option<Tick> {
@@ -219,6 +227,7 @@ impl Timeline {
     }
 
     fn enter(&mut self, name: &RobotName, kind: StateKind, to: &str, tick: Tick) -> Vec<Span> {
+        self.names.add(kind, to);
         let robot = self.robot(name);
         let state = match kind {
             StateKind::Emotion => &mut robot.emotion,

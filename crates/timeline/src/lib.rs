@@ -11,10 +11,12 @@
 
 mod counts;
 mod fold;
+mod names;
 mod span;
 
 pub use counts::{Counts, LinkCounts, RobotCounts, StateCounts};
 pub use fold::Timeline;
+pub use names::StateNames;
 pub use span::{
     Absence, ChangeSpan, CommandEnd, CommandSpan, CutSpan, FaultSpan, Joined, MissedTicks, Period,
     QueriesLost, Span, StateKind, StateSpan,

@@ -2,16 +2,16 @@
 
 use std::collections::BTreeMap;
 
-use timeline::StateKind;
+use timeline::{StateKind, StateNames};
 
 use crate::axis::draw_below;
 use crate::chart::{WIDE_PX, begin, end};
 use crate::labels::{in_rows, shortened, widest_px, width_px};
 use crate::markup::{Markup, number};
 use crate::number::fixed;
-use crate::palette::state_class;
+use crate::palette::{StateLook, state_look};
 use crate::scale::Scale;
-use crate::shapes::LABEL_PX;
+use crate::shapes::{LABEL_PX, hatching};
 
 /// Height of a row of a few, pixels.
 const ROW_PX: f64 = 20.0;
@@ -61,6 +61,8 @@ pub struct Bands {
     pub end_s: f64,
     /// The rows, from top to bottom.
     pub rows: Vec<BandRow>,
+    /// The emotions and behaviors of all that is shown together, which have their colors by it.
+    pub names: StateNames,
 }
 
 impl Bands {
@@ -96,10 +98,14 @@ impl Bands {
         }
         for (((name, _), key), (x, row)) in names.iter().zip(keys).zip(places) {
             let y = key_top + 10.0 + row as f64 * KEY_ROW_PX;
-            svg.rect(&state_class(self.kind, name), (x, y - 9.0), 11.0, 11.0);
+            svg.state(&self.look(name), "", (x, y - 9.0), (11.0, 11.0));
             svg.text("", x + 16.0, y, "start", &key);
         }
         end(svg)
+    }
+
+    fn look(&self, name: &str) -> StateLook {
+        state_look(self.kind, name, &self.names)
     }
 
     /// Time in each state over all rows, seconds, the longest first.
@@ -131,6 +137,7 @@ impl Bands {
         let columns = (row.bands.len() > MAX_BANDS).then(|| columns(&row.bands, scale));
         let bands = columns.as_ref().unwrap_or(&row.bands);
         let mut names = Markup::default();
+        let mut over = String::new();
         let mut paths: BTreeMap<&str, (String, f64)> = BTreeMap::new();
         for band in bands {
             let (path, time_s) = paths.entry(&band.name).or_default();
@@ -140,8 +147,12 @@ impl Bands {
             let across = number(width);
             *path += &format!("M{} {top}h{across}v{inner}h-{across}z", number(x));
             *time_s += band.end_s - band.begin_s;
+            let kind = self.look(&band.name).hatching;
+            if kind > 0 {
+                over += &hatching(kind, (x, y + 1.0), (width, height - 2.0));
+            }
             if height >= NAMED_PX && width_px(&band.name, LABEL_PX) + 8.0 <= width {
-                let class = format!("on-{}", state_class(self.kind, &band.name));
+                let class = format!("on-{}", self.look(&band.name).class());
                 names.text(&class, x + 4.0, baseline, "start", &band.name);
             }
         }
@@ -149,8 +160,11 @@ impl Bands {
             let share = 100.0 * time_s / self.end_s.max(f64::MIN_POSITIVE);
             let title = format!("{}: {name}, {time_s:.1} s ({share:.0} %)", row.label);
             svg.group("state", &title);
-            svg.path(&state_class(self.kind, name), &path);
+            svg.path(&self.look(name).class(), &path);
             svg.close("g");
+        }
+        if !over.is_empty() {
+            svg.path("over", &over);
         }
         svg.add(&names.finish());
     }

@@ -4,7 +4,7 @@ use crate::chart::{PANEL_PX, WIDE_PX, begin, end};
 use crate::labels::{shortened, widest_px, width_px};
 use crate::markup::Markup;
 use crate::page::ChartPanel;
-use crate::palette::level;
+use crate::palette::{StateLook, level};
 use crate::shapes::{LABEL_PX, Pixel, SMALL_PX};
 
 /// Most rows and columns that are drawn.
@@ -21,15 +21,15 @@ const ROW_PX: f64 = 26.0;
 pub struct MatrixLabel {
     /// The name.
     pub text: String,
-    /// Class of the color beside it; none if it has no color.
-    pub color: Option<String>,
+    /// What the area beside it looks like; none if it has no color.
+    pub look: Option<StateLook>,
 }
 
 impl From<&str> for MatrixLabel {
     fn from(text: &str) -> Self {
         Self {
             text: text.to_owned(),
-            color: None,
+            look: None,
         }
     }
 }
@@ -100,7 +100,7 @@ impl Matrix {
         let left = self.left();
         let is_upward = labels_px(columns) > CELL_PX - 4.0;
         // Colors are between the names and the cells.
-        let has_colors = columns.iter().any(|label| label.color.is_some());
+        let has_colors = columns.iter().any(|label| label.look.is_some());
         let names_px = if has_colors { 18.0 } else { 6.0 };
         let top = if is_upward {
             labels_px(columns).clamp(30.0, 150.0) + names_px + 14.0
@@ -134,16 +134,16 @@ impl Matrix {
             } else {
                 svg.text("", middle, top - names_px, "middle", &text);
             }
-            if let Some(color) = &label.color {
-                svg.rect(color, (middle - 5.0, top - 12.0), 10.0, 8.0);
+            if let Some(look) = &label.look {
+                svg.state(look, "", (middle - 5.0, top - 12.0), (10.0, 8.0));
             }
         }
         for (index, label) in rows.iter().enumerate() {
             let middle = top + (index as f64 + 0.5) * ROW_PX;
-            if let Some(color) = &label.color {
-                svg.rect(color, (left - 14.0, middle - 5.0), 8.0, 10.0);
+            if let Some(look) = &label.look {
+                svg.state(look, "", (left - 14.0, middle - 5.0), (8.0, 10.0));
             }
-            let end_px = left - if label.color.is_some() { 20.0 } else { 8.0 };
+            let end_px = left - if label.look.is_some() { 20.0 } else { 8.0 };
             let text = shortened(&label.text, LABEL_LETTERS);
             svg.text("", end_px, middle + 4.0, "end", &text);
         }

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use protocol::{RobotName, Tick};
+use timeline::{StateNames, Timeline};
 
 use crate::diagram::commands::{draw_commands, draw_queries, place_labels};
 use crate::diagram::cuts::draw_cuts;
@@ -42,6 +43,8 @@ pub struct DiagramOptions {
     pub has_style: bool,
     /// Whether the picture has a legend of signs and colors. A legend on the page can be that of several pictures.
     pub has_legend: bool,
+    /// Emotions and behaviors whose colors are taken: those of other pictures on the same page.
+    pub names: StateNames,
     /// Width of a tick, pixels, so that several pictures have the same scale; without it the window decides.
     pub tick_px: Option<f64>,
 }
@@ -55,6 +58,7 @@ impl Default for DiagramOptions {
             max_width_px: 4800.0,
             has_style: true,
             has_legend: true,
+            names: StateNames::default(),
             tick_px: None,
         }
     }
@@ -62,13 +66,13 @@ impl Default for DiagramOptions {
 
 /// The picture of a window, as SVG.
 pub(crate) fn draw(
-    robots: Vec<RobotName>,
+    timeline: &Timeline,
     items: &Items,
     window: VisibleTicks,
     options: &DiagramOptions,
 ) -> String {
     let heading = heading(window, options);
-    let mut picture = begin(robots, items, window, &heading, options);
+    let mut picture = begin(timeline, items, window, &heading, options);
 
     draw_lanes(&mut picture);
     draw_cuts(&mut picture, items);
@@ -90,7 +94,7 @@ pub(crate) fn draw(
 }
 
 fn begin(
-    robots: Vec<RobotName>,
+    timeline: &Timeline,
     items: &Items,
     window: VisibleTicks,
     heading: &str,
@@ -101,7 +105,7 @@ fn begin(
     if commands.any(|command| command.from.is_operator()) {
         names.push(RobotName::operator());
     }
-    names.extend(robots);
+    names.extend(timeline.robots().cloned());
     let commands = items.commands.iter();
     let mut links: BTreeSet<_> = commands
         .map(|command| (&command.from, &command.to))
@@ -124,7 +128,9 @@ fn begin(
         lanes.left_px,
         width,
     );
-    Picture::new(lanes, scale, least_px, window)
+    let mut names = options.names.clone();
+    names.add_all(timeline.names());
+    Picture::new(lanes, scale, least_px, window, names)
 }
 
 /// The ticks in which something begins or ends.

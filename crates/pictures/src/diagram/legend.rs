@@ -7,7 +7,7 @@ use crate::diagram::items::Items;
 use crate::diagram::picture::{CAPTION_PX, Picture, VisibleTicks};
 use crate::labels::{in_rows, shortened, width_px};
 use crate::markup::Markup;
-use crate::palette::state_class;
+use crate::palette::state_look;
 use crate::shapes::LABEL_PX;
 
 /// Most letters of a name in the legend.
@@ -111,14 +111,13 @@ fn draw_colors(
     let mut found = BTreeSet::new();
     for band in &items.bands {
         if band.kind == kind && picture.window.clip(band.period).is_some() {
-            let color = state_class(kind, &band.name);
-            found.insert((color, shortened(&band.name, NAME_LETTERS)));
+            let look = state_look(kind, &band.name, &picture.names);
+            found.insert((look, shortened(&band.name, NAME_LETTERS)));
         }
     }
-    let (colors, names): (Vec<_>, Vec<_>) = found.into_iter().take(MAX_ENTRIES).unzip();
+    let (looks, names): (Vec<_>, Vec<_>) = found.into_iter().take(MAX_ENTRIES).unzip();
     draw_entries(picture, caption, &names, 16.0, y, |svg, index, x, y| {
-        let class = format!("band {}", colors[index]);
-        svg.rect(&class, (x, y - 9.0), 12.0, 11.0);
+        svg.state(&looks[index], "band", (x, y - 9.0), (12.0, 11.0));
     })
 }
 

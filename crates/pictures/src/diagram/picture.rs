@@ -1,7 +1,7 @@
 //! A picture that is being drawn: where ticks and robots are, and labels that are placed at the end.
 
 use protocol::{RobotName, Tick};
-use timeline::Period;
+use timeline::{Period, StateNames};
 
 use crate::diagram::lanes::{Lane, Lanes};
 use crate::diagram::words::Titles;
@@ -74,11 +74,19 @@ pub(crate) struct Picture {
     placed: Vec<Label>,
     pub(crate) window: VisibleTicks,
     pub(crate) titles: Titles,
+    /// The emotions and behaviors of the run up to the end of the window, which have their colors by it.
+    pub(crate) names: StateNames,
 }
 
 impl Picture {
     /// A picture in which nothing is drawn yet. What is above and below the lanes has at least `least_px`.
-    pub(crate) fn new(lanes: Lanes, scale: Scale, least_px: f64, window: VisibleTicks) -> Self {
+    pub(crate) fn new(
+        lanes: Lanes,
+        scale: Scale,
+        least_px: f64,
+        window: VisibleTicks,
+        names: StateNames,
+    ) -> Self {
         let (left, right) = (scale.begin_px(), scale.end_px());
         let right_px = right.max(left + least_px);
         let mut labels = Labels::between(left, right_px + OUTSIDE_PX);
@@ -97,6 +105,7 @@ impl Picture {
             titles: Titles {
                 tick_s: window.tick_s,
             },
+            names,
         }
     }
 

@@ -9,7 +9,7 @@ use crate::diagram::lanes::{BEHAVIOR_PX, EMOTION_PX, STRIP_PX};
 use crate::diagram::picture::{LabelPosition, Picture};
 use crate::diagram::words::fault_name;
 use crate::labels::{shortened, width_px};
-use crate::palette::state_class;
+use crate::palette::state_look;
 use crate::shapes::{LABEL_PX, SMALL_PX};
 
 /// Most letters of the name of an emotion or a behavior.
@@ -37,12 +37,12 @@ fn draw_band(picture: &mut Picture, band: &StateSpan) {
 
     let title = picture.titles.band(band);
     picture.open(class, band.period.begin, &title);
-    let color = state_class(band.kind, &band.name);
+    let look = state_look(band.kind, &band.name, &picture.names);
     let svg = &mut picture.svg;
-    svg.rect(&format!("band {color}"), (left, top), width, height);
+    svg.state(&look, "band", (left, top), (width, height));
     let name = shortened(&band.name, NAME_LETTERS);
     if width_px(&name, font_px) + 6.0 <= width {
-        let class = format!("{font}on-{color}");
+        let class = format!("{font}on-{}", look.class());
         let baseline = top + height / 2.0 + font_px * 0.36;
         svg.text(&class, left + 4.0, baseline, "start", &name);
     }
