@@ -8,6 +8,7 @@ use crate::scale::Scale;
 use crate::shapes::{Pixel, polyline};
 
 pub(crate) mod bands;
+pub(crate) mod course;
 pub(crate) mod floor;
 pub(crate) mod intervals;
 pub(crate) mod matrix;
@@ -91,6 +92,32 @@ fn draw_estimate(
         svg.line(&class, &[at(low), at(high)]);
     }
     draw_marker(svg, arm, at(estimate.value), estimate.is_filled);
+}
+
+/// Most runs that are drawn of an estimate.
+const MAX_DOTS: usize = 100;
+/// The part of 1 by which each dot is farther aside than the one before: the golden ratio, which spreads any number of them.
+const ASIDE: f64 = 0.618_033_988_749_895;
+
+/// Draws the numbers of the single runs that an estimate is of, spread aside so that they are seen beside each other. `at` is the place
+/// of a value, and of how far it is aside, from -0.5 to 0.5. Of more than 100 runs as many are drawn, spread over their order.
+fn draw_runs(svg: &mut Markup, arm: usize, runs: &[f64], at: impl Fn(f64, f64) -> Pixel) {
+    let shown = runs.len().min(MAX_DOTS);
+    if shown == 0 {
+        return;
+    }
+
+    let mut sorted = runs.to_vec();
+    if shown < runs.len() {
+        sorted.sort_by(f64::total_cmp);
+    }
+    let mut dots = String::new();
+    for index in 0..shown {
+        let aside = (index as f64 * ASIDE).fract() - 0.5;
+        let (x, y) = at(sorted[index * sorted.len() / shown], aside);
+        dots += &format!("M{} {}h0", number(x), number(y));
+    }
+    svg.path(&format!("dots {}", arm_class(arm)), &dots);
 }
 
 /// Draws the marker of an arm around a point: a shape of its own.

@@ -18,11 +18,12 @@ mod table;
 
 pub use chart::PlottedEstimate;
 pub use chart::bands::{Band, BandRow, Bands};
+pub use chart::course::{Course, CourseLine};
 pub use chart::floor::Floor;
 pub use chart::intervals::{IntervalRow, Intervals};
 pub use chart::matrix::{Matrix, MatrixCell, MatrixLabel};
 pub use chart::steps::{Curve, CurveStep, Steps};
-pub use chart::trend::{Trend, TrendLine};
+pub use chart::trend::{Trend, TrendLine, TrendPoint};
 pub use labels::width_px;
 pub use number::{decimals_for, fixed};
 pub use page::{ChartPanel, Figure, Page, Text};

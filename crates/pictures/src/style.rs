@@ -59,6 +59,7 @@ pub(crate) fn sheet() -> String {
     for index in 0..ARM_SHADES.len() {
         let color = format!("var(--a{index})");
         let _ = writeln!(charts, ".curve.a{index}{{fill:none;stroke:{color}}}");
+        let _ = writeln!(charts, ".dots.a{index}{{fill:none;stroke:{color}}}");
         let _ = writeln!(charts, ".mark.a{index}{{stroke:{color}}}");
         let _ = writeln!(charts, ".mark.hollow.a{index}{{fill:var(--paper)}}");
     }

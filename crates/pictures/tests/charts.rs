@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use pictures::{
     Band, BandRow, Bands, Cell, ChartPanel, Curve, CurveStep, Figure, Floor, IntervalRow,
     Intervals, Matrix, MatrixCell, MatrixLabel, Page, PlottedEstimate, Steps, Table, Text, Trend,
-    TrendLine, state_look,
+    TrendLine, TrendPoint, state_look,
 };
 use roxmltree::{Document, Node, ParsingOptions};
 use timeline::{StateKind, StateNames};
@@ -191,6 +191,7 @@ fn intervals_have_a_marker_for_each_estimate() {
                 is_filled: arm % 2 == 0,
                 ..estimate(arm as f64)
             }),
+            runs: vec![arm as f64; 10 * arm],
         });
     }
     let chart = Intervals {
@@ -204,6 +205,13 @@ fn intervals_have_a_marker_for_each_estimate() {
     let document = parsed(&svg);
     assert_eq!(of_class(&document, "mark").len(), 19);
     assert_eq!(of_class(&document, "hollow").len(), 10 - 1);
+
+    // A point for each run behind them, of at most 100.
+    let dots = of_class(&document, "dots");
+    let dots = dots.iter().map(|path| path.attribute("d").unwrap());
+    let dots: Vec<usize> = dots.map(|path| path.matches('M').count()).collect();
+    let runs = (1..20).map(|arm| (10 * arm).min(100));
+    assert_eq!(dots, Vec::from_iter(runs));
 }
 
 #[test]
@@ -211,7 +219,11 @@ fn a_trend_has_a_marker_for_each_estimate_and_each_name() {
     let levels = [0.0, 0.1, 0.25, 0.5, 1.0];
     let mut lines = Vec::new();
     for arm in 0..5 {
-        let point = |x: &f64| (*x, estimate(100.0 * x + arm as f64));
+        let point = |x: &f64| TrendPoint {
+            x: *x,
+            estimate: estimate(100.0 * x + arm as f64),
+            runs: vec![100.0 * x; 3],
+        };
         lines.push(TrendLine {
             label: format!("arm {arm}"),
             arm,
@@ -230,6 +242,7 @@ fn a_trend_has_a_marker_for_each_estimate_and_each_name() {
     let svg = chart.draw();
     let document = parsed(&svg);
     assert_eq!(of_class(&document, "mark").len(), 5 * levels.len() + 5);
+    assert_eq!(of_class(&document, "dots").len(), 5 * levels.len());
 }
 
 #[test]
@@ -237,7 +250,11 @@ fn the_arms_at_a_value_are_nearer_to_it_than_to_the_next_one() {
     let levels = [0.0, 0.1, 1.0];
     let mut lines = Vec::new();
     for _ in 0..8 {
-        let point = |x: &f64| (*x, estimate(*x));
+        let point = |x: &f64| TrendPoint {
+            x: *x,
+            estimate: estimate(*x),
+            runs: Vec::new(),
+        };
         lines.push(TrendLine {
             label: String::new(),
             arm: 0,
@@ -286,6 +303,7 @@ fn intervals_with_one_range_have_one_axis() {
             label: "arm".to_owned(),
             arm: 0,
             estimate: Some(estimate(value)),
+            runs: Vec::new(),
         }],
     };
     let axis = |value: f64| {

@@ -12,8 +12,129 @@ use experiments::{ArmDifference, Contrast, SHOWN_P, least_p_holm};
 /// Most comparisons that a sentence names.
 const MAX_NAMED: usize = 8;
 
+/// The answer in one sentence: what the comparisons in a measure show, the first one of those that have comparisons.
+pub(super) fn answer(study: &Study<'_>, measure: &Measure) -> Text {
+    let mut contrasts = study.contrasts_of(measure);
+    contrasts.retain(|contrast| contrast.p_holm.is_some());
+    let Some(first) = contrasts.first() else {
+        return "No arms are compared.".into();
+    };
+    let (label, baseline) = (label(measure), &first.baseline);
+
+    // Arms that differ under the same conditions and in the same direction are named together.
+    let mut shown: Vec<(bool, Vec<&str>, Vec<&str>)> = Vec::new();
+    let mut others = Vec::new();
+    for arm in study.arms {
+        let of_arm = contrasts.iter().filter(|contrast| contrast.arm == arm.name);
+        if of_arm.clone().next().is_none() {
+            continue;
+        }
+        let mut is_shown_at_all = false;
+        for is_more in [false, true] {
+            let same = of_arm.clone().filter(|contrast| is_shown(contrast));
+            let same = same.filter(|contrast| is_higher(contrast) == is_more);
+            let conditions: Vec<&str> = same.map(|contrast| contrast.condition.as_str()).collect();
+            if conditions.is_empty() {
+                continue;
+            }
+            is_shown_at_all = true;
+            let found = shown
+                .iter_mut()
+                .find(|(direction, under, _)| *direction == is_more && *under == conditions);
+            match found {
+                Some((_, _, arms)) => arms.push(&arm.name),
+                None => shown.push((is_more, conditions, vec![&arm.name])),
+            }
+        }
+        if !is_shown_at_all {
+            others.push(arm.name.as_str());
+        }
+    }
+
+    let pairs = contrasts.iter().map(|contrast| contrast.n);
+    let n = match (pairs.clone().min(), pairs.max()) {
+        (Some(least), Some(most)) if least < most => format!("n = {least} to {most} pairs"),
+        (_, most) => format!("n = {} pairs each", most.unwrap_or(0)),
+    };
+    if shown.is_empty() {
+        let text = Text::from(format!("No difference in {label} to "));
+        let text = text.strong(baseline).text(" is shown for ");
+        let text = listed(text, &others, "or");
+        let too_few = match least_p_holm(&contrasts) >= SHOWN_P {
+            true => ", which are too few to show one",
+            false => "",
+        };
+        return text.text(format!(" ({n}{too_few})."));
+    }
+
+    let mut text = Text::default();
+    for (index, (is_more, conditions, arms)) in shown.iter().enumerate() {
+        text = listed(
+            text.text(if index == 0 { "With " } else { "; with " }),
+            arms,
+            "and",
+        );
+        let under = under(study, conditions);
+        text = text.text(format!(", {label} {}", how(measure, *is_more)));
+        text = text.text(" ").strong(baseline).text(under);
+    }
+    if !others.is_empty() {
+        text = listed(text.text("; no difference is shown for "), &others, "and");
+    }
+    text.text(format!(" ({n})."))
+}
+
+/// Names, of which the last one follows a word.
+fn listed(mut text: Text, names: &[&str], word: &str) -> Text {
+    for (index, name) in names.iter().enumerate() {
+        if index > 0 {
+            let is_last = index + 1 == names.len();
+            text = text.text(if is_last {
+                format!(" {word} ")
+            } else {
+                ", ".to_owned()
+            });
+        }
+        text = text.strong(*name);
+    }
+    text
+}
+
+/// Under which conditions, as the end of a clause.
+fn under(study: &Study<'_>, conditions: &[&str]) -> String {
+    const MAX_CONDITIONS: usize = 3;
+    let all = study.conditions.len();
+    if all == 1 {
+        return String::new();
+    }
+    if conditions.len() == all {
+        return " under every condition".to_owned();
+    }
+    if conditions.len() > MAX_CONDITIONS {
+        return format!(" under {} of {all} conditions", conditions.len());
+    }
+    let headings = conditions.iter().map(|name| study.heading_of(name));
+    let headings: Vec<String> = headings.map(|heading| unbroken(&heading)).collect();
+    format!(" under {}", headings.join(" and "))
+}
+
+/// Whether the numbers of an arm are larger, or its event comes later or in fewer runs.
+fn is_higher(contrast: &Contrast) -> bool {
+    mean(contrast).is_some_and(|mean| mean.value > 0.0)
+}
+
+/// What a difference is, before the name of the baseline.
+fn how(measure: &Measure, is_more: bool) -> &'static str {
+    match (measure.is_time(), is_more) {
+        (false, true) => "is higher than with",
+        (false, false) => "is lower than with",
+        (true, true) => "comes later or in fewer runs than with",
+        (true, false) => "comes earlier or in more runs than with",
+    }
+}
+
 /// What all comparisons show, in one or two sentences.
-pub(super) fn lead(study: &Study<'_>) -> Text {
+pub(super) fn counts(study: &Study<'_>) -> Text {
     let tested = study.contrasts.iter().filter(|one| one.p_holm.is_some());
     let all = tested.count();
     let Some(first) = study.contrasts.first() else {
@@ -63,9 +184,10 @@ pub(super) fn sentences(study: &Study<'_>, measure: &Measure) -> Vec<Text> {
         let Some(arm) = arm else {
             continue;
         };
-        // Its numbers are larger, or its event comes later or in fewer runs.
-        let is_more = mean(contrast).is_some_and(|mean| mean.value > 0.0);
-        shown.entry((arm, is_more)).or_default().push(contrast);
+        shown
+            .entry((arm, is_higher(contrast)))
+            .or_default()
+            .push(contrast);
     }
 
     let mut sentences = Vec::new();
@@ -94,14 +216,8 @@ fn sentence(study: &Study<'_>, measure: &Measure, contrasts: &[&Contrast], is_mo
         return Text::default();
     };
 
-    let how = match (measure.is_time(), is_more) {
-        (false, true) => "is higher than with",
-        (false, false) => "is lower than with",
-        (true, true) => "comes later or in fewer runs than with",
-        (true, false) => "comes earlier or in more runs than with",
-    };
     let with_arm = Text::from("With ").strong(&first.arm);
-    let compared = with_arm.text(format!(", {} {how} ", label(measure)));
+    let compared = with_arm.text(format!(", {} {} ", label(measure), how(measure, is_more)));
 
     let mut named = Vec::new();
     for contrast in contrasts.iter().take(MAX_NAMED) {

@@ -1,11 +1,12 @@
 //! The course of a run: its states over time and its space-time diagram.
 
-use pictures::{BandRow, Bands, ChartPanel};
+use pictures::{BandRow, Bands, ChartPanel, Course, CourseLine, Figure, round_range};
 use protocol::{RobotName, Tick};
 use record::EpochFiles;
 use timeline::{StateKind, StateNames};
 
-use super::facts::{RobotFacts, RunFacts};
+use super::facts::{COURSES, RobotFacts, RunFacts};
+use super::words::capitalized;
 use crate::diagram::{DiagramOptions, Window, draw};
 use lab::LabError;
 use lab::moment::Moment;
@@ -19,10 +20,77 @@ const LINE_TICKS: Tick = 150;
 const MAX_LINE_TICKS: Tick = 600;
 /// Most lines of a diagram.
 const MAX_LINES: Tick = 12;
+/// Most robots whose lines are told apart.
+const MAX_LINES_OF_COURSE: usize = 24;
 /// No further line is drawn after this many bytes.
 const MAX_DIAGRAM_BYTES: usize = 400_000;
 /// Width of a line without the names at its left, pixels.
 const LINE_PX: f64 = 620.0;
+
+/// The course of a run: its emotions, and how strongly they are felt and what the robots have over time; `None` if it has nothing of it.
+pub(super) fn course_figure(facts: &RunFacts) -> Option<Figure> {
+    let mut panels = Vec::from_iter(run_panel(facts, StateKind::Emotion));
+    let mut shown = Vec::new();
+    if !panels.is_empty() {
+        shown.push("emotions, a row for each robot, with the share of the time in each");
+    }
+    for name in COURSES {
+        if let Some(panel) = variable_panel(facts, name) {
+            panels.push(panel);
+            shown.push(match name {
+                "intensity" => "their intensity, from 0 to 1",
+                _ => "the treats that a robot has",
+            });
+        }
+    }
+    if panels.is_empty() {
+        return None;
+    }
+
+    let what = capitalized(&shown.join("; "));
+    let caption = format!(
+        "The course of the run. {what}. Time in which a robot took no part is empty. n = 1 run."
+    );
+    Some(Figure::new(panels, caption, None))
+}
+
+/// A state variable of the robots over time; `None` if no robot publishes it.
+fn variable_panel(facts: &RunFacts, name: &str) -> Option<ChartPanel> {
+    let mut lines = Vec::new();
+    let mut most: f64 = 0.0;
+    let mut least: f64 = 0.0;
+    for (arm, (robot, of_robot)) in facts.robots.iter().enumerate() {
+        let Some(values) = of_robot
+            .courses
+            .get(name)
+            .filter(|values| !values.is_empty())
+        else {
+            continue;
+        };
+        for value in values.iter().filter_map(|(_, value)| *value) {
+            most = most.max(value);
+            least = least.min(value);
+        }
+        lines.push(CourseLine {
+            label: robot.to_string(),
+            arm,
+            values: values.clone(),
+        });
+    }
+    if lines.is_empty() || lines.len() > MAX_LINES_OF_COURSE {
+        return None;
+    }
+
+    let chart = Course {
+        title: format!("{} over time", capitalized(name)),
+        axis: name.to_owned(),
+        end_s: facts.time_s(),
+        rows: facts.robots.keys().map(RobotName::to_string).collect(),
+        range: round_range(least, most, 3),
+        lines,
+    };
+    Some(ChartPanel::wide("", chart.draw()))
+}
 
 /// The states of the robots of one run over time; `None` if they have none.
 pub(super) fn run_panel(facts: &RunFacts, kind: StateKind) -> Option<ChartPanel> {

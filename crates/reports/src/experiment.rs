@@ -6,15 +6,15 @@ use observe::{Measure, Measured};
 use pictures::{Cell, Figure, Page, Table, Text};
 use protocol::RunName;
 use record::{EpochFiles, RunFolder};
-use timeline::{StateKind, StateNames};
+use timeline::StateNames;
 
-use super::answer::{lead, sentences};
-use super::course::{READ_DIAGRAM, diagram_lines, run_panel};
+use super::answer::{answer, counts, sentences};
+use super::course::{READ_DIAGRAM, course_figure, diagram_lines};
 use super::facts::RunFacts;
 use super::figures::{differences, distributions, estimates, heat_maps, survival, verdicts};
 use super::floor::occupancy;
 use super::quantity::Of;
-use super::study::{Study, label};
+use super::study::{Study, label, lines};
 use super::transitions::transitions;
 use super::words::{capitalized, counted, utc};
 use experiments::shell;
@@ -59,10 +59,13 @@ pub fn of_experiment(folder: &Path) -> Result<Page, LabError> {
     let study = Study::of(&results);
 
     let mut page = Page::new("Experiment report", &results.plan.experiment.question);
-    page.lead(lead(&study));
-    write_answer(&mut page, &study);
+    let first = first_measure(&study);
+    if let Some(measure) = first {
+        page.lead(answer(&study, measure));
+    }
+    write_answer(&mut page, &study, first);
     write_design(&mut page, &study);
-    write_measures(&mut page, &study);
+    write_measures(&mut page, &study, first);
     if study.shows(Shown::Expectations)
         && let Some(figure) = verdicts(&study)
     {
@@ -74,7 +77,35 @@ pub fn of_experiment(folder: &Path) -> Result<Page, LabError> {
     Ok(page)
 }
 
-fn write_answer(page: &mut Page, study: &Study<'_>) {
+/// The measure of which the answer is: the first one that is shown and compared; without comparisons the first one that is shown.
+fn first_measure<'a>(study: &Study<'a>) -> Option<&'a Measure> {
+    let mut shown = study.shown_measures();
+    shown.retain(|measure| !study.is_zero(measure));
+    let mut compared = shown.iter().copied();
+    let compared = compared.find(|measure| !study.contrasts_of(measure).is_empty());
+    compared.or(shown.first().copied())
+}
+
+/// The figure of the answer: differences to the baseline, and the estimates beside them where there are lines over a factor.
+fn answer_figure(study: &Study<'_>, measure: &Measure) -> (AnswerFigure, Figure) {
+    let first = Of::all(measure)[0];
+    let differences = lines(study)
+        .is_empty()
+        .then(|| differences(study, measure, first));
+    match differences.flatten() {
+        Some(figure) => (AnswerFigure::Differences, figure),
+        None => (AnswerFigure::Estimates, estimates(study, measure)),
+    }
+}
+
+/// Which figure of a measure is that of the answer.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum AnswerFigure {
+    Estimates,
+    Differences,
+}
+
+fn write_answer(page: &mut Page, study: &Study<'_>, first: Option<&Measure>) {
     page.section("Answer");
     let results = study.results;
     let all = results.plan.units();
@@ -102,6 +133,10 @@ fn write_answer(page: &mut Page, study: &Study<'_>) {
         ));
     }
 
+    if let Some(measure) = first {
+        page.figure(&answer_figure(study, measure).1);
+    }
+    page.paragraph(counts(study));
     for measure in study.measures() {
         let sentences = sentences(study, measure);
         if !sentences.is_empty() {
@@ -157,15 +192,28 @@ fn write_design(page: &mut Page, study: &Study<'_>) {
     }
 }
 
-fn write_measures(page: &mut Page, study: &Study<'_>) {
+fn write_measures(page: &mut Page, study: &Study<'_>, first: Option<&Measure>) {
     let shown = study.shown_measures();
     let mut large = Vec::new();
+    let mut zero = Vec::new();
     for measure in &shown {
+        if study.is_zero(measure) {
+            zero.push(label(measure));
+            continue;
+        }
         if page.size() > MAX_BYTES_OF_MEASURES {
             large.push(label(measure));
             continue;
         }
-        write_measure(page, study, measure);
+        let is_first = first.is_some_and(|first| first.name == measure.name);
+        let before = is_first.then(|| answer_figure(study, measure).0);
+        write_measure(page, study, measure, before);
+    }
+    if !zero.is_empty() {
+        page.remark(format!(
+            "Zero in every run, and therefore not shown: {}.",
+            zero.join(", ")
+        ));
     }
 
     if !large.is_empty() {
@@ -190,9 +238,15 @@ fn write_measures(page: &mut Page, study: &Study<'_>) {
     }
 }
 
-fn write_measure(page: &mut Page, study: &Study<'_>, measure: &Measure) {
+/// Writes the section of a measure. `before` is the figure of it that the answer has.
+fn write_measure(
+    page: &mut Page,
+    study: &Study<'_>,
+    measure: &Measure,
+    before: Option<AnswerFigure>,
+) {
     let mut figures = Vec::new();
-    if study.shows(Shown::Estimates) {
+    if study.shows(Shown::Estimates) && before != Some(AnswerFigure::Estimates) {
         figures.push(estimates(study, measure));
     }
     if study.shows(Shown::HeatMaps) {
@@ -203,17 +257,22 @@ fn write_measure(page: &mut Page, study: &Study<'_>, measure: &Measure) {
         figures.push(survival(study, measure));
     }
     if study.shows(Shown::Differences) {
-        let all = Of::all(measure).iter();
+        // That of the answer is the first one.
+        let skipped = usize::from(before == Some(AnswerFigure::Differences));
+        let all = Of::all(measure).iter().skip(skipped);
         figures.extend(all.filter_map(|of| differences(study, measure, *of)));
     }
     let has_distributions = !is_time && study.shows(Shown::Distributions);
-    if figures.is_empty() && !has_distributions {
+    if figures.is_empty() && !has_distributions && before.is_none() {
         return;
     }
 
     page.section(&capitalized(label(measure)));
     if let Some(what) = &measure.what {
         page.paragraph(format!("{}.", capitalized(what)));
+    }
+    if before.is_some() {
+        page.remark("Figure 1 is of this measure, too.");
     }
     for figure in &figures {
         page.figure(figure);
@@ -355,7 +414,7 @@ fn write_course(
     let unit = plan.unit(outcome.unit);
     let mut scenario =
         plan.scenario_of(&unit, &|| unreachable!("its robots run in this process"))?;
-    scenario.record.frames = study.shows(Shown::Floor);
+    scenario.record.frames = study.shows(Shown::Floor) || study.shows(Shown::Runs);
     let place = tempfile::tempdir().map_err(LabError::failed)?;
     let run = RunName::unknown();
     let recorded = RunFolder::new(place.path(), &run);
@@ -374,7 +433,8 @@ fn write_course(
     facts.names = names.clone();
     let mut figures = Vec::new();
     if study.shows(Shown::Runs) {
-        figures.push(course(outcome, &facts, &files)?);
+        figures.extend(course_figure(&facts));
+        figures.push(diagram_figure(outcome, &facts, &files)?);
     }
     if study.shows(Shown::Transitions) {
         figures.extend(transitions(&[&facts]));
@@ -397,19 +457,20 @@ fn write_course(
     Ok(())
 }
 
-/// Emotions over time and the space-time diagram of a unit.
-fn course(outcome: &UnitOutcome, facts: &RunFacts, files: &EpochFiles) -> Result<Figure, LabError> {
-    let mut panels = Vec::from_iter(run_panel(facts, StateKind::Emotion));
+/// The space-time diagram of a unit.
+fn diagram_figure(
+    outcome: &UnitOutcome,
+    facts: &RunFacts,
+    files: &EpochFiles,
+) -> Result<Figure, LabError> {
     let diagram = diagram_lines(&format!("unit {}", outcome.unit), facts, files)?;
-    panels.extend(diagram.lines);
-
-    let mut caption = format!("Emotions over time, and the space-time diagram, {READ_DIAGRAM}");
+    let mut caption = format!("Space-time diagram, {READ_DIAGRAM}");
     let (last, of) = (diagram.last, facts.last_tick);
     if last < of {
         caption += &format!(" The diagram ends at tick {last} of {of}.");
     }
 
-    Ok(Figure::new(panels, caption, None))
+    Ok(Figure::new(diagram.lines, caption, None))
 }
 
 fn write_reproduction(

@@ -5,18 +5,20 @@ use std::path::Path;
 
 use lab::LabError;
 use pictures::{Band, Floor};
-use protocol::messages::{End, Verdict};
+use protocol::messages::{End, Variable, Verdict};
 use protocol::time::time_s;
 use protocol::{Event, RobotName, Tick};
 use record::EpochFiles;
 use record::Record;
-use recording::{Recording, RecordingError};
+use recording::{RecordedTick, Recording, RecordingError};
 use timeline::{
     Counts, LinkCounts, Period, RobotCounts, Span, StateKind, StateNames, StateSpan, Timeline,
 };
 
 /// Parts of the floor along its longer side.
 const PARTS: f64 = 50.0;
+/// State variables that are shown over time.
+pub(super) const COURSES: [&str; 2] = ["intensity", "treats"];
 /// Ticks that are read from a recording in one go.
 const AT_ONCE: Tick = 64;
 
@@ -60,6 +62,8 @@ pub(super) struct RobotFacts {
     emotions: Vec<Band>,
     /// Its behaviors over time.
     behaviors: Vec<Band>,
+    /// Its state variables over time that are shown, those of [`COURSES`] that it publishes. Each value holds from its time on.
+    pub(super) courses: BTreeMap<&'static str, Vec<(f64, Option<f64>)>>,
     pub(super) counts: RobotCounts,
 }
 
@@ -235,13 +239,13 @@ impl RunFacts {
     fn add_recording(&mut self, path: &Path) {
         if !path.exists() {
             self.notes.push(
-                "There is no recording (`record.frames = false`?), so the occupancy of the floor is not known.".to_owned(),
+                "There is no recording (`record.frames = false`?), so neither the course of state variables nor the occupancy of the floor is known.".to_owned(),
             );
             return;
         }
         if let Err(error) = self.read_recording(path) {
             self.notes.push(format!(
-                "The occupancy of the floor is incomplete: {error}."
+                "The course of state variables and the occupancy of the floor are incomplete: {error}."
             ));
         }
     }
@@ -265,8 +269,9 @@ impl RunFacts {
         // Where a robot is after a tick it is until the next one: of the last tick there is no time.
         let last = recording.len().saturating_sub(1);
         while next < last {
-            let ticks = recording.read_raw(next, last.min(next + AT_ONCE))?;
+            let ticks = recording.read(next, last.min(next + AT_ONCE))?;
             for tick in &ticks {
+                self.add_courses(tick);
                 for robot in &tick.frame.robots {
                     let column = (robot.location.x / part_m).clamp(0.0, PARTS - 1.0);
                     let row = (robot.location.y / part_m).clamp(0.0, PARTS - 1.0);
@@ -279,6 +284,28 @@ impl RunFacts {
             next += AT_ONCE;
         }
         Ok(())
+    }
+}
+
+impl RunFacts {
+    /// Adds the values of a tick that differ from those before.
+    fn add_courses(&mut self, tick: &RecordedTick) {
+        let time_s = time_s(tick.frame.tick, self.tick_s);
+        for placed in &tick.frame.robots {
+            let report = tick.reports.get(&placed.name);
+            let robot = self.robots.entry(placed.name.clone()).or_default();
+            for name in COURSES {
+                let value = report.and_then(|report| report.state_variables.get(name));
+                let value = match value {
+                    Some(Variable::Number(number)) => Some(*number),
+                    _ => None,
+                };
+                let values = robot.courses.entry(name).or_default();
+                if values.last().and_then(|(_, last)| *last) != value {
+                    values.push((time_s, value));
+                }
+            }
+        }
     }
 }
 

@@ -29,7 +29,8 @@ pub(super) fn estimates(study: &Study<'_>, measure: &Measure) -> Figure {
         )
     } else {
         format!(
-            "{}: means over the seeds with 95 % intervals (Student's t, and Hall's transformation where runs are skewed);",
+            "{}: means over the seeds with 95 % intervals (Student's t, and Hall's transformation where runs are skewed); small points \
+             are runs;",
             capitalized(&axis(measure))
         )
     };
@@ -37,7 +38,7 @@ pub(super) fn estimates(study: &Study<'_>, measure: &Measure) -> Figure {
 
     let lines = lines(study);
     let (panels, sentence) = if lines.is_empty() {
-        estimates.intervals(study)
+        estimates.intervals(study, measure)
     } else {
         let of = Of::all(measure)[0];
         let differences = Quantity::differences(study, measure, of);
@@ -174,7 +175,7 @@ fn estimate_cells(estimate: &statistics::Estimate) -> [Cell; 3] {
 pub(super) fn differences(study: &Study<'_>, measure: &Measure, of: Of) -> Option<Figure> {
     let contrasts = study.contrasts_of(measure);
     let first = contrasts.first()?;
-    let (panels, sentence) = Quantity::differences(study, measure, of)?.intervals(study);
+    let (panels, sentence) = Quantity::differences(study, measure, of)?.intervals(study, measure);
 
     let what = match of {
         Of::Mean => axis(measure),
@@ -193,8 +194,12 @@ pub(super) fn differences(study: &Study<'_>, measure: &Measure, of: Of) -> Optio
         (Some(least), Some(most)) if least < most => format!("{least} to {most} pairs"),
         (_, most) => format!("{} pairs each", most.unwrap_or(&0)),
     };
+    let points = match of {
+        Of::Mean => " Small points are pairs of runs.",
+        Of::Share | Of::Time => "",
+    };
     let caption = format!(
-        "Differences to {} in {what}, paired by seed, with 95 % intervals ({}). Filled markers: p < 0.05 after {}. n = {n}.{sentence}",
+        "Differences to {} in {what}, paired by seed, with 95 % intervals ({}).{points} Filled markers: p < 0.05 after {}. n = {n}.{sentence}",
         first.baseline,
         of.interval(),
         correction(&contrasts)
@@ -304,7 +309,7 @@ pub(super) fn survival(study: &Study<'_>, measure: &Measure) -> Figure {
          variance). Ticks on a curve are runs that ended without it. Below, the number of runs at risk. {}.",
         sample_sizes(study, measure)
     );
-    curves(study, caption, curve, |heading, curves| Steps {
+    curves(study, measure, caption, curve, |heading, curves| Steps {
         title: format!("Runs without {label} {heading}"),
         x_axis: format!("time to {label}, s"),
         y_axis: format!("share of runs without {label}"),
@@ -345,7 +350,7 @@ pub(super) fn distributions(study: &Study<'_>, measure: &Measure) -> Figure {
         "Empirical distribution functions of {label}. {}.",
         sample_sizes(study, measure)
     );
-    curves(study, caption, curve, |heading, curves| Steps {
+    curves(study, measure, caption, curve, |heading, curves| Steps {
         title: format!("Distribution of {label} {heading}"),
         x_axis: axis(measure),
         y_axis: "share of runs with at most this".to_owned(),
@@ -358,11 +363,14 @@ pub(super) fn distributions(study: &Study<'_>, measure: &Measure) -> Figure {
 /// A chart of curves for each condition.
 fn curves(
     study: &Study<'_>,
+    measure: &Measure,
     caption: String,
     curve: impl Fn(CellPlace) -> Option<Curve>,
     chart: impl Fn(&str, Vec<Curve>) -> Steps,
 ) -> Figure {
-    let (panels, sentence) = study.panels(curve, |heading, curves| chart(heading, curves).draw());
+    let (panels, sentence) = study.panels(measure, curve, |heading, curves| {
+        chart(heading, curves).draw()
+    });
     Figure::new(panels, caption + &sentence, None)
 }
 

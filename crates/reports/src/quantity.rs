@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use observe::Measure;
 use pictures::{
-    ChartPanel, IntervalRow, Intervals, PlottedEstimate, Trend, TrendLine, round_range,
+    ChartPanel, IntervalRow, Intervals, PlottedEstimate, Trend, TrendLine, TrendPoint, round_range,
 };
 
 use super::study::{CellPlace, FactorLine, Study, axis, drawn, is_shown, label};
@@ -50,12 +50,21 @@ pub(super) struct Quantity {
     axis: String,
     /// What differences are called; estimates have no name.
     name: Option<String>,
-    /// Ends of the axis: of all intervals.
+    /// Ends of the axis: of all intervals and runs.
     pub(super) range: (f64, f64),
     /// A value that is marked.
     reference: Option<f64>,
     /// The number of each arm that is shown; `None` if there is no finite one.
-    cells: BTreeMap<CellPlace, Option<PlottedEstimate>>,
+    cells: BTreeMap<CellPlace, QuantityCell>,
+}
+
+/// The number of an arm under a condition.
+#[derive(Default)]
+struct QuantityCell {
+    /// `None` if there is no finite one.
+    estimate: Option<PlottedEstimate>,
+    /// Numbers of the single runs or pairs that it is of.
+    runs: Vec<f64>,
 }
 
 impl Quantity {
@@ -63,7 +72,14 @@ impl Quantity {
     pub(super) fn estimates(study: &Study<'_>, measure: &Measure) -> Self {
         let mut cells = BTreeMap::new();
         for place in study.places() {
-            cells.insert(place, study.estimate(measure, place));
+            let mut runs = Vec::new();
+            if !measure.is_time() {
+                runs = study.numbers(measure, place);
+                runs.retain(|number| number.is_finite());
+            }
+            let estimate = study.estimate(measure, place);
+            let cell = QuantityCell { estimate, runs };
+            cells.insert(place, cell);
         }
         let range = match measure.is_time() {
             true => (0.0, 100.0),
@@ -88,7 +104,11 @@ impl Quantity {
                     is_filled: is_shown(contrast),
                     ..drawn(&estimate)
                 });
-                cells.insert(place, estimate);
+                let runs = match of {
+                    Of::Mean => study.paired_numbers(measure, place),
+                    Of::Share | Of::Time => Vec::new(),
+                };
+                cells.insert(place, QuantityCell { estimate, runs });
             }
         }
         let baseline = &study.contrasts_of(measure).first()?.baseline;
@@ -109,21 +129,26 @@ impl Quantity {
 
     /// The number of an arm under a condition.
     pub(super) fn estimate(&self, place: CellPlace) -> Option<PlottedEstimate> {
-        *self.cells.get(&place)?
+        self.cells.get(&place)?.estimate
     }
 
     /// A chart for each condition, with a row for each arm.
-    pub(super) fn intervals(&self, study: &Study<'_>) -> (Vec<ChartPanel>, String) {
+    pub(super) fn intervals(
+        &self,
+        study: &Study<'_>,
+        measure: &Measure,
+    ) -> (Vec<ChartPanel>, String) {
         let row = |place: CellPlace| {
-            let estimate = *self.cells.get(&place)?;
+            let cell = self.cells.get(&place)?;
             let (label, arm) = study.arm(place);
             Some(IntervalRow {
                 label,
                 arm,
-                estimate,
+                estimate: cell.estimate,
+                runs: cell.runs.clone(),
             })
         };
-        study.panels(row, |heading, rows| {
+        study.panels(measure, row, |heading, rows| {
             let chart = Intervals {
                 title: format!("{} {heading}", self.title),
                 axis: self.axis.clone(),
@@ -145,8 +170,16 @@ impl Quantity {
         for arm in 0..study.arms.len() {
             let mut points = Vec::new();
             for level in &line.levels {
-                let estimate = self.estimate((level.condition, arm));
-                points.extend(estimate.map(|estimate| (level.x, estimate)));
+                let cell = self.cells.get(&(level.condition, arm));
+                if let Some(cell) = cell
+                    && let Some(estimate) = cell.estimate
+                {
+                    points.push(TrendPoint {
+                        x: level.x,
+                        estimate,
+                        runs: cell.runs.clone(),
+                    });
+                }
             }
             if !points.is_empty() || self.name.is_none() {
                 let (label, arm) = study.arm((0, arm));
@@ -192,10 +225,12 @@ pub(super) fn difference(contrast: &Contrast, of: Of) -> Option<statistics::Esti
     }
 }
 
-/// The ends of all intervals.
-fn ends(cells: &BTreeMap<CellPlace, Option<PlottedEstimate>>) -> Vec<f64> {
-    let estimates = cells.values().flatten();
-    estimates.flat_map(PlottedEstimate::ends).collect()
+/// The ends of all intervals, and all runs.
+fn ends(cells: &BTreeMap<CellPlace, QuantityCell>) -> Vec<f64> {
+    let estimates = cells.values().filter_map(|cell| cell.estimate);
+    let mut ends: Vec<f64> = estimates.flat_map(|estimate| estimate.ends()).collect();
+    ends.extend(cells.values().flat_map(|cell| &cell.runs));
+    ends
 }
 
 /// A range with round ends around values. If it would begin not far above zero it begins there; one that is not of amounts has

@@ -10,7 +10,9 @@ use protocol::{RobotName, Tick};
 use record::{EpochFiles, RunFolder, Summary};
 use timeline::{LinkCounts, StateKind, StateNames};
 
-use super::course::{READ_DIAGRAM, diagram_lines, run_panel, state_panel, states_in_words};
+use super::course::{
+    READ_DIAGRAM, course_figure, diagram_lines, run_panel, state_panel, states_in_words,
+};
 use super::facts::RunFacts;
 use super::floor::occupancy;
 use super::limits::panels;
@@ -73,8 +75,13 @@ pub fn of_runs(folders: &[RunFolder]) -> Result<Page, LabError> {
     };
     let mut page = Page::new(kind, &title);
     write_lead(&mut page, &runs);
-    write_summary(&mut page, &runs);
-    write_states(&mut page, &runs);
+    if runs.len() == 1 {
+        write_states(&mut page, &runs);
+        write_summary(&mut page, &runs);
+    } else {
+        write_summary(&mut page, &runs);
+        write_states(&mut page, &runs);
+    }
     write_diagrams(&mut page, &runs);
     let facts: Vec<&RunFacts> = runs.iter().map(|run| &run.facts).collect();
     page.section("Transitions");
@@ -284,10 +291,20 @@ fn variables_table(runs: &[ReportedRun]) -> Table {
 }
 
 fn write_states(page: &mut Page, runs: &[ReportedRun]) {
-    page.section("Emotions and behaviors");
+    page.section(match runs {
+        [_] => "Course",
+        _ => "Emotions and behaviors",
+    });
 
     for kind in [StateKind::Emotion, StateKind::Behavior] {
         let (row, (panels, sentence)) = match runs {
+            [run] if kind == StateKind::Emotion => {
+                if let Some(mut figure) = course_figure(&run.facts) {
+                    figure.table = Some(states_table(runs, kind));
+                    page.figure(&figure);
+                }
+                continue;
+            }
             [run] => {
                 let panel = run_panel(&run.facts, kind);
                 ("robot", (Vec::from_iter(panel), String::new()))

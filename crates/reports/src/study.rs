@@ -113,23 +113,93 @@ impl<'a> Study<'a> {
 
     /// A panel for each condition under which an arm has something to show, as many as are allowed, and a sentence about those
     /// that are left out. `of` is what an arm shows, and `draw` draws what those of a condition show.
+    /// Conditions under which the measure is zero in all arms are left out, too.
     pub(super) fn panels<T>(
         &self,
+        measure: &Measure,
         of: impl Fn(CellPlace) -> Option<T>,
         draw: impl Fn(&str, Vec<T>) -> String,
     ) -> (Vec<ChartPanel>, String) {
         let mut shown = Vec::new();
+        let mut zero = Vec::new();
         for (condition, name) in self.conditions.iter().enumerate() {
+            if self.is_zero_under(measure, condition) {
+                zero.push(self.heading(name));
+                continue;
+            }
             let arms = 0..self.arms.len();
             let of_arms: Vec<T> = arms.filter_map(|arm| of((condition, arm))).collect();
             if !of_arms.is_empty() {
                 shown.push((self.heading(name), of_arms));
             }
         }
-        panels("conditions", shown, |(heading, of_arms)| {
+        let (panels, mut sentence) = panels("conditions", shown, |(heading, of_arms)| {
             let svg = draw(&heading, of_arms);
             ChartPanel::new(heading, svg)
-        })
+        });
+        if !zero.is_empty() {
+            let what = match measure.is_time() {
+                true => format!("no run has {}", label(measure)),
+                false => format!("{} is zero in every run", label(measure)),
+            };
+            sentence += &format!(" Where {what}, nothing is drawn: {}.", zero.join("; "));
+        }
+        (panels, sentence)
+    }
+
+    /// Whether a measure is zero in every run that has it, or no run has its event.
+    pub(super) fn is_zero(&self, measure: &Measure) -> bool {
+        let mut conditions = 0..self.conditions.len();
+        conditions.all(|condition| self.is_zero_under(measure, condition))
+    }
+
+    /// Whether a measure is zero in every run under a condition that has it, in all arms.
+    fn is_zero_under(&self, measure: &Measure, condition: usize) -> bool {
+        let mut has_runs = false;
+        for arm in 0..self.arms.len() {
+            let place = (condition, arm);
+            let (count, is_zero) = if measure.is_time() {
+                let times = self.times(measure, place);
+                (times.len(), times.iter().all(|time| !time.is_event))
+            } else {
+                let numbers = self.numbers(measure, place);
+                (numbers.len(), numbers.iter().all(|value| *value == 0.0))
+            };
+            has_runs |= count > 0;
+            if !is_zero {
+                return false;
+            }
+        }
+        has_runs
+    }
+
+    /// The differences of the runs of a cell to those of the baseline with the same seeds, in the order of the seeds.
+    pub(super) fn paired_numbers(
+        &self,
+        measure: &Measure,
+        (condition, arm): CellPlace,
+    ) -> Vec<f64> {
+        let baseline = self.results.plan.experiment.baseline.as_ref();
+        let Some(baseline) = self.arms.iter().position(|arm| Some(&arm.name) == baseline) else {
+            return Vec::new();
+        };
+        let by_seed = |arm| {
+            let mut numbers = BTreeMap::new();
+            for run in self.runs((condition, arm)) {
+                let measured = run.measures.get(&measure.name);
+                if let Some(value) = measured.and_then(Measured::value) {
+                    numbers.insert(run.seed, value);
+                }
+            }
+            numbers
+        };
+
+        let of_baseline = by_seed(baseline);
+        let pairs = by_seed(arm).into_iter();
+        pairs
+            .filter_map(|(seed, value)| Some(value - of_baseline.get(&seed)?))
+            .filter(|difference| difference.is_finite())
+            .collect()
     }
 
     /// The name of the arm of a cell, and the index by which it has its color and marker: that of the baseline is the first one.

@@ -278,7 +278,7 @@ fn what_is_missing_is_named() {
     let args = ["--duration", "60 s", "--set", "record.frames=false"];
     play(&lab, "bare", &args);
     let html = lab.ok(&["report", "bare"]);
-    assert!(html.contains("the occupancy of the floor is not known"));
+    assert!(html.contains("nor the occupancy of the floor is known"));
     assert!(!html.contains("Occupancy of the floor"));
 
     let events = lab.file("bare", "events.jsonl");
@@ -454,6 +454,52 @@ fn headings(html: &str, tag: &str) -> Vec<String> {
     let document = parsed(html);
     let found = document.descendants().filter(|node| node.has_tag_name(tag));
     found.map(text_of).collect()
+}
+
+#[test]
+fn the_answer_is_a_sentence_and_its_figure_and_zeros_are_left_out() {
+    let lab = Lab::new();
+    let mut file = small_experiment("");
+    for (name, key) in [("never", "Leguin.missed"), ("lost", "Leguin.dropped")] {
+        file += &format!("[[measure]]\nname = \"{name}\"\nsummary = \"robots.{key}\"\n");
+    }
+    let file = lab.write("zeros.toml", &file);
+    let folder = play_experiment(&lab, file.to_str().unwrap(), &[]);
+    let html = lab.ok(&["report", &folder]);
+    let document = parsed(&html);
+
+    let lead = document
+        .descendants()
+        .filter(|node| node.attribute("class") == Some("lead"));
+    let lead: Vec<String> = lead.map(text_of).collect();
+    assert_eq!(lead.len(), 1);
+    assert_eq!(lead[0].matches(". ").count(), 0, "{lead:?}");
+    assert!(
+        lead[0].ends_with("pairs each, which are too few to show one)."),
+        "{lead:?}"
+    );
+    let answer = document
+        .descendants()
+        .find(|node| node.attribute("id") == Some("section-1"));
+    let mut parts = answer.unwrap().children().filter(Node::is_element);
+    assert_eq!(text_of(parts.next().unwrap()), "Answer");
+    assert_eq!(parts.next().unwrap().attribute("id"), Some("figure-1"));
+    let points = document.descendants();
+    assert!(
+        points
+            .filter(|node| node
+                .attribute("class")
+                .is_some_and(|class| class.starts_with("dots")))
+            .count()
+            > 0
+    );
+
+    // A measure that is zero everywhere has no section, and a condition in which it is zero has no panel.
+    assert!(!headings(&html, "h2").contains(&"Never".to_owned()));
+    assert!(html.contains("Zero in every run, and therefore not shown: never."));
+    assert!(headings(&html, "h2").contains(&"Lost".to_owned()));
+    let zero = "Where lost is zero in every run, nothing is drawn: guests 5, loss 0; ";
+    assert!(html.contains(zero));
 }
 
 #[test]

@@ -71,8 +71,7 @@ impl Bands {
     pub fn draw(&self) -> String {
         let count = self.rows.len().max(1) as f64;
         let row_px = (ROWS_PX / count).clamp(MIN_ROW_PX, ROW_PX);
-        let labels = self.rows.iter().map(|row| &row.label);
-        let left = widest_px(labels, NAME_LETTERS).clamp(40.0, 150.0) + 10.0;
+        let left = labels_px(self.rows.iter().map(|row| &row.label));
         let top = 4.0;
         let bottom = top + row_px * count;
 
@@ -168,6 +167,11 @@ impl Bands {
         }
         svg.add(&names.finish());
     }
+}
+
+/// Where rows with these names begin, pixels.
+pub(crate) fn labels_px<'a>(labels: impl IntoIterator<Item = &'a String>) -> f64 {
+    widest_px(labels, NAME_LETTERS).clamp(40.0, 150.0) + 10.0
 }
 
 /// The name of a color with the share of the time.

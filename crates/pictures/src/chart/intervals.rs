@@ -1,7 +1,7 @@
 //! Estimates with their intervals, a row for each arm: means of arms, or differences to a baseline (a forest plot).
 
 use crate::axis::draw_below;
-use crate::chart::{PANEL_PX, PlottedEstimate, begin, draw_estimate, end};
+use crate::chart::{PANEL_PX, PlottedEstimate, begin, draw_estimate, draw_runs, end};
 use crate::labels::{shortened, widest_px, width_px};
 use crate::markup::Markup;
 use crate::number::{decimals_for, typeset};
@@ -22,6 +22,8 @@ pub struct IntervalRow {
     pub arm: usize,
     /// Its estimate; `None` if there is none.
     pub estimate: Option<PlottedEstimate>,
+    /// The numbers of the runs that it is of, or of the pairs; they may be left out.
+    pub runs: Vec<f64>,
 }
 
 /// A chart of estimates.
@@ -71,6 +73,8 @@ impl Intervals {
     fn draw_row(&self, svg: &mut Markup, scale: &Scale, row: &IntervalRow, middle: f64) {
         let label = shortened(&row.label, LABEL_LETTERS);
         svg.text("", scale.begin_px() - 12.0, middle + 4.0, "end", &label);
+        let run = |value, aside| (scale.at(value), middle + aside * (ROW_PX - 8.0));
+        draw_runs(svg, row.arm, &row.runs, run);
         if let Some(estimate) = &row.estimate {
             let at = |value| (scale.at(value), middle);
             draw_estimate(svg, row.arm, estimate, at);

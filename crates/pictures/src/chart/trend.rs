@@ -2,8 +2,8 @@
 
 use crate::axis::draw_left;
 use crate::chart::{
-    ArmName, NAME_LETTERS, PANEL_PX, PlottedEstimate, begin, draw_estimate, draw_names, end,
-    line_class,
+    ArmName, NAME_LETTERS, PANEL_PX, PlottedEstimate, begin, draw_estimate, draw_names, draw_runs,
+    end, line_class,
 };
 use crate::labels::{widest_px, width_px};
 use crate::markup::Markup;
@@ -18,6 +18,17 @@ const DODGE_PX: f64 = 5.0;
 /// Space between the ends of the plot and what is in it, pixels.
 const MARGIN_PX: f64 = 16.0;
 
+/// An estimate at a value of the factor.
+#[derive(Debug, Clone)]
+pub struct TrendPoint {
+    /// The value of the factor.
+    pub x: f64,
+    /// The estimate.
+    pub estimate: PlottedEstimate,
+    /// The numbers of the runs that it is of, or of the pairs; they may be left out.
+    pub runs: Vec<f64>,
+}
+
 /// An arm.
 #[derive(Debug, Clone)]
 pub struct TrendLine {
@@ -25,8 +36,8 @@ pub struct TrendLine {
     pub label: String,
     /// Its index, which has its color, marker and dashes.
     pub arm: usize,
-    /// Its estimates, each after the value of the factor, which grows.
-    pub points: Vec<(f64, PlottedEstimate)>,
+    /// Its estimates, with growing values of the factor.
+    pub points: Vec<TrendPoint>,
 }
 
 /// A chart of a measure over a factor.
@@ -74,8 +85,16 @@ impl Trend {
 
         let count = self.lines.len() as f64;
         let dodge_px = self.dodge_px(&x);
+        let aside_of = |index: usize| (index as f64 - (count - 1.0) / 2.0) * dodge_px;
         for (index, line) in self.lines.iter().enumerate() {
-            let aside = (index as f64 - (count - 1.0) / 2.0) * dodge_px;
+            for point in &line.points {
+                let at = x.at(point.x) + aside_of(index);
+                let run = |value, aside: f64| (at + aside * dodge_px, y.at(value));
+                draw_runs(&mut svg, line.arm, &point.runs, run);
+            }
+        }
+        for (index, line) in self.lines.iter().enumerate() {
+            let aside = aside_of(index);
             self.draw_line(&mut svg, line, &x, &y, aside);
         }
         let name = |line| self.name(line);
@@ -117,11 +136,14 @@ impl Trend {
     fn draw_line(&self, svg: &mut Markup, line: &TrendLine, x: &Scale, y: &Scale, aside: f64) {
         let x_of = |level: f64| x.at(level) + aside;
         let points = line.points.iter();
-        let points = points.map(|(level, estimate)| (x_of(*level), y.at(estimate.value)));
+        let points = points.map(|point| (x_of(point.x), y.at(point.estimate.value)));
         let points: Vec<Pixel> = points.collect();
         svg.line(&format!("{} thin", line_class(line.arm)), &points);
 
-        for (level, estimate) in &line.points {
+        for point in &line.points {
+            let TrendPoint {
+                x: level, estimate, ..
+            } = point;
             svg.group("row", &self.point_title(line, *level, estimate));
             let at = |value| (x_of(*level), y.at(value));
             draw_estimate(svg, line.arm, estimate, at);
@@ -134,7 +156,7 @@ impl Trend {
         ArmName {
             label: &line.label,
             arm: line.arm,
-            last: last.map_or(self.range.0, |(_, estimate)| estimate.value),
+            last: last.map_or(self.range.0, |point| point.estimate.value),
             has_marker: true,
         }
     }
@@ -150,8 +172,8 @@ impl Trend {
     fn description(&self) -> String {
         let mut parts = Vec::new();
         for line in &self.lines {
-            for (level, estimate) in &line.points {
-                parts.push(self.point_title(line, *level, estimate));
+            for point in &line.points {
+                parts.push(self.point_title(line, point.x, &point.estimate));
             }
         }
         format!("{} over {}. {}", self.y_axis, self.x_axis, parts.join("; "))
