@@ -40,6 +40,25 @@ def until(page, expression):
         raise AssertionError(f"{error}; the page says: {page.locator('#notice').inner_text()!r}") from None
 
 
+def reaches(page, tick):
+    """Waits until a tick can be shown: a page has what it saw until it has found the recording."""
+    run = """document.querySelector('[data-testid="timeline-run"]')?.dataset"""
+    until(page, f"Number({run}?.first ?? Infinity) <= {tick} && {tick} <= Number({run}?.last ?? -1)")
+
+
+def scrub(page, tick):
+    """Moves the time line to a tick."""
+    reaches(page, tick)
+    page.get_by_test_id("scrub").evaluate(
+        "(bar, tick) => { bar.value = tick; bar.dispatchEvent(new Event('input', {bubbles: true})); }", tick
+    )
+
+
+def newest(page):
+    """The last tick that the time line can show."""
+    return int(page.get_by_test_id("timeline-run").get_attribute("data-last"))
+
+
 # The plan is drawn anew in the frame after the page was laid out; until then its places are where they were.
 FITS = """(() => {
     const plan = document.getElementById("plan"), ratio = Math.min(2, devicePixelRatio);

@@ -5,7 +5,7 @@ import os
 import pytest
 from playwright.sync_api import expect
 
-from lab import PATIENCE_S, ROOT, Crowd, start_console
+from lab import PATIENCE_S, ROOT, Crowd, scrub, start_console
 
 pytestmark = pytest.mark.thorough
 

@@ -5,7 +5,7 @@ import random
 import pytest
 from playwright.sync_api import expect
 
-from lab import eventually, start_console
+from lab import eventually, scrub, start_console
 
 # What the page shows of a tick: of each robot the emotion and the behavior in its panel, whether the panel is its own, those of the
 # plan, and the last emotion and behavior that the log has up to the tick.
@@ -72,12 +72,6 @@ def agree(page, run, tick, needs_own, record=None):
         eventually("agreement", look, patience_s=5.0)
     except AssertionError:
         pytest.fail("\n".join(last))
-
-
-def scrub(page, to):
-    page.get_by_test_id("scrub").evaluate(
-        "(bar, tick) => { bar.value = tick; bar.dispatchEvent(new Event('input', {bubbles: true})); }", to
-    )
 
 
 def compare(launch, open_page, processes, seed, speed, duration_s, stops, seeks):

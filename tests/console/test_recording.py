@@ -6,7 +6,7 @@ import signal
 import pytest
 from playwright.sync_api import expect
 
-from lab import PATIENCE_S, Processes, eventually, start_console, until
+from lab import PATIENCE_S, eventually, newest, scrub, start_console, until
 
 pytestmark = pytest.mark.thorough
 
@@ -20,24 +20,16 @@ def recorded(launch, tmp_path):
     return start_console(run.processes, "--recording", run.run_folder)
 
 
-def move(page, tick):
-    """Moves the scrub bar and fires its events."""
-    page.get_by_test_id("scrub").evaluate(
-        "(bar, tick) => { bar.value = tick; bar.dispatchEvent(new Event('input', {bubbles: true}));"
-        " bar.dispatchEvent(new Event('change', {bubbles: true})); }",
-        tick,
-    )
-
-
 def test_a_recording_is_scrubbed_and_played(recorded, open_page, screenshots):
     page = open_page(recorded)
     expect(page.get_by_test_id("scrub")).to_be_visible()
     expect(page.get_by_test_id("tick")).to_have_text("0")
     assert page.get_by_test_id("scrub").get_attribute("max") == "200"
+    assert newest(page) == 200
     assert page.get_by_test_id("btn-start").count() == 0, "there is nothing to control"
     expect(page.get_by_test_id("tab-setup")).to_be_hidden()
 
-    move(page, 150)
+    scrub(page, 150)
     expect(page.get_by_test_id("tick")).to_have_text("150")
     expect(page.get_by_test_id("time")).to_contain_text("75.0")
     at_150 = page.evaluate("window.carsConsole.frame()")
@@ -46,10 +38,10 @@ def test_a_recording_is_scrubbed_and_played(recorded, open_page, screenshots):
     expect(page.get_by_test_id("panel-Butler")).to_contain_text(at_150["robots"][0]["emotion_state"])
     page.screenshot(path=screenshots / "recording-1440x900-light.png")
 
-    move(page, 20)
+    scrub(page, 20)
     expect(page.get_by_test_id("tick")).to_have_text("20")
     assert page.evaluate("window.carsConsole.frame().guests") != at_150["guests"]
-    move(page, 150)
+    scrub(page, 150)
     expect(page.get_by_test_id("tick")).to_have_text("150")
     assert page.evaluate("window.carsConsole.frame().guests") == at_150["guests"]
 
@@ -76,10 +68,10 @@ def test_a_recording_is_scrubbed_and_played(recorded, open_page, screenshots):
 
 
 # What is hidden before pages are compared, because the other one does not have it: commands of an operator and the answers,
-# and what a recording is played with: the bar with its tick, and the marks of that tick in the charts. The bar at the top,
+# and what a recording is played with: the time line with its tick, and the marks of that tick in the charts. The bar at the top,
 # which controls a run, is not compared.
-NOT_RECORDED = ".panel .buttons, #notice, #scrub-bar"
-NOT_LIVE = "#scrub-bar, #bands .cursor, #chart .u-cursor-x"
+NOT_RECORDED = ".panel .buttons, #notice, #timeline"
+NOT_LIVE = "#timeline, #bands .cursor, #chart .cursor"
 
 # By tab, what is compared while it is shown.
 SAME = {"log": ["#plan", "#panels", "[data-testid=log]"], "charts": ["#chart", "#bands"]}
@@ -151,11 +143,11 @@ def test_a_tick_has_the_same_pixels_live_and_recorded(launch, open_page, screens
         address = start_console(run.processes, "--recording", run.run_folder)
         page = open_page(address, height=1500)
         expect(page.get_by_test_id("scrub")).to_be_visible()
-        return page if page.get_by_test_id("scrub").get_attribute("max") == str(tick) else None
+        return page if newest(page) == tick else None
 
     def record_of(tick):
         page = eventually(f"tick {tick} in the recording", lambda: recording_to(tick))
-        move(page, tick)
+        scrub(page, tick)
         expect(page.get_by_test_id("tick")).to_have_text(str(tick))
         return page
 
@@ -172,6 +164,6 @@ def test_a_tick_has_the_same_pixels_live_and_recorded(launch, open_page, screens
     recorded.screenshot(path=screenshots / "tick-40-recorded.png")
 
     # They are the pixels of this tick.
-    move(recorded, tick - 1)
+    scrub(recorded, tick - 1)
     expect(recorded.get_by_test_id("tick")).to_have_text(str(tick - 1))
     eventually("other pixels", lambda: {"#plan", "#panels"} <= set(differing(live, recorded, screenshots)))

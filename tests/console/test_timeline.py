@@ -8,7 +8,7 @@ from collections import Counter
 import pytest
 from playwright.sync_api import expect
 
-from lab import PATIENCE_S, eventually, start_console, until
+from lab import PATIENCE_S, eventually, newest, scrub, start_console, until
 
 pytestmark = pytest.mark.thorough
 
@@ -17,21 +17,6 @@ TICK = "window.carsConsole.frame()?.tick"
 
 def tick(page):
     return page.evaluate(TICK)
-
-
-def newest(page):
-    """The last tick of the time line."""
-    return int(page.get_by_test_id("scrub").get_attribute("max"))
-
-
-def scrub(page, to):
-    # A bar takes no value outside of it. It begins with the first tick that the page saw until the page has found the recording,
-    # and ends with the last one of the epoch before until the chosen one is drawn.
-    bar = """document.querySelector('[data-testid="scrub"]')"""
-    until(page, f"Number({bar}?.min ?? Infinity) <= {to} && {to} <= Number({bar}?.max ?? 0)")
-    page.get_by_test_id("scrub").evaluate(
-        "(bar, tick) => { bar.value = tick; bar.dispatchEvent(new Event('input', {bubbles: true})); }", to
-    )
 
 
 def step_to(page, last):
@@ -75,12 +60,12 @@ def test_a_run_in_progress_is_scrubbed_while_it_goes_on(launch, open_page, scree
     expect(page.get_by_test_id("tick")).to_have_text("0")
     page.get_by_test_id("btn-start").click()
     until(page, f"{TICK} > 60")
-    expect(page.get_by_test_id("live")).to_have_attribute("aria-pressed", "true")
+    expect(page.get_by_test_id("live")).to_be_disabled()
     expect(page.get_by_test_id("past-note")).to_have_count(0)
 
     scrub(page, 20)
     expect(page.get_by_test_id("tick")).to_have_text("20")
-    expect(page.get_by_test_id("live")).to_have_attribute("aria-pressed", "false")
+    expect(page.get_by_test_id("live")).to_be_enabled()
     # The run goes on, and the page stays at its tick.
     before = newest(page)
     eventually("the run goes on", lambda: newest(page) > before + 20)
@@ -113,7 +98,7 @@ def test_a_run_in_progress_is_scrubbed_while_it_goes_on(launch, open_page, scree
     scrub(page, last - 20)
     expect(page.get_by_test_id("tick")).to_have_text(str(last - 20))
     page.get_by_test_id("play").click()
-    expect(page.get_by_test_id("live")).to_have_attribute("aria-pressed", "true")
+    expect(page.get_by_test_id("live")).to_be_disabled()
     expect(page.get_by_test_id("tick")).to_have_text(str(last))
     assert newest(page) == last
 
@@ -398,7 +383,10 @@ def test_without_the_folder_the_page_has_what_it_saw_and_says_so(launch, open_pa
         step_to(late, step)
         expect(first.get_by_test_id("tick")).to_have_text(str(step))
 
-    expect(late.get_by_test_id("scrub")).to_have_attribute("min", "20")
+    # What it did not see is marked, and leads to what it saw first.
+    expect(late.get_by_test_id("timeline-run")).to_have_attribute("data-first", "20")
+    late.get_by_test_id("timeline").click(position={"x": 2, "y": 10})
+    expect(late.get_by_test_id("tick")).to_have_text("20")
     at_24 = None
     for page in (first, late):
         scrub(page, 24)
@@ -523,7 +511,7 @@ def test_an_epoch_that_comes_late_is_still_the_one_that_was_chosen(launch, open_
     page.unroute(whole_ticks)
 
     until(page, "window.carsConsole.frame()?.epoch === 1")
-    expect(page.get_by_test_id("scrub")).to_have_attribute("max", "12")
+    expect(page.get_by_test_id("timeline-run")).to_have_attribute("data-last", "12")
     scrub(page, 12)
     expect(page.get_by_test_id("tick")).to_have_text("12")
     assert page.evaluate("window.carsConsole.frame().epoch") == 1

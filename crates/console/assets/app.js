@@ -5,6 +5,7 @@ import { Bands } from "./bands.js";
 import { Charts } from "./charts.js";
 import { Connection } from "./connection.js";
 import { Controls, renderAwaiting } from "./controls.js";
+import { Crosshair } from "./crosshair.js";
 import { DiagramView } from "./diagram.js";
 import { Editor } from "./editor.js";
 import { renderFailed } from "./failed.js";
@@ -18,7 +19,6 @@ import { Panels } from "./panels.js";
 import { picture } from "./picture.js";
 import { Plan } from "./plan.js";
 import { Player } from "./recording.js";
-import { renderScrub } from "./scrub.js";
 import { setRoster } from "./roster.js";
 import { SetupView } from "./setup.js";
 import { download, readLink, share } from "./share.js";
@@ -26,7 +26,8 @@ import { Store } from "./store.js";
 import { renderStranger } from "./stranger.js";
 import { tabs } from "./tabs.js";
 import { onThemeChange } from "./theme.js";
-import { Units } from "./units.js";
+import { TimelineView } from "./timeline.js";
+import { seconds, Units } from "./units.js";
 import { renderVerdicts } from "./verdicts.js";
 import { Voice } from "./voice.js";
 import { TimeWindow } from "./window.js";
@@ -181,14 +182,23 @@ store.on("epoch", async () => {
   markStale("panels");
 });
 const log = new LogView(box("panel-log"), store, ({ epoch, tick }) => player.seekIn(epoch, tick));
-const shownTime = new TimeWindow(() => store.history.range_s());
+const shownTime = new TimeWindow(() => player.range_s());
+const crosshair = new Crosshair(player);
 const seekTime = (/** @type {number} */ time_s) => player.seekTime(time_s);
-const charts = new Charts({ select: box("chart-select"), chart: box("chart") }, store, shownTime, {
+const charts = new Charts({ select: box("chart-select"), chart: box("chart") }, store, shownTime, crosshair, {
   seek: seekTime,
-  onChoose: () => bands.render(),
+  onChoose: () => {
+    bands.render();
+    markStale("strips");
+  },
 });
-const bands = new Bands(box("bands"), store, shownTime, { seek: seekTime, isShown: (robot) => charts.isShown(robot) });
-const diagram = new DiagramView(box("panel-diagram"), player);
+const bands = new Bands(box("bands"), store, shownTime, crosshair, { seek: seekTime, isShown: (robot) => charts.isShown(robot) });
+const diagram = new DiagramView(box("panel-diagram"), player, crosshair);
+const timeline = new TimelineView(box("timeline"), player, shownTime, crosshair, {
+  chosen: () => plan.chosen,
+  isShown: (robot) => charts.isShown(robot),
+});
+crosshair.listeners.push(drawPlanTime);
 const voice = new Voice(store);
 
 /** Marks a robot on the plan and among the panels, or removes its mark. @param {string | null} robot */
@@ -198,6 +208,7 @@ function choose(robot) {
   panels.chosen = chosen;
   plan.touch();
   panels.render();
+  markStale("strips");
 
   if (!chosen) return;
   for (const part of ["line", "panel"]) {
@@ -226,6 +237,7 @@ const views = new Map([
   ["panels", { every_ms: SELDOM_MS / 2, last_ms: 0, draw: () => panels.render() }],
   ["log", { every_ms: OFTEN_MS, last_ms: 0, draw: drawLog }],
   ["charts", { every_ms: SELDOM_MS, last_ms: 0, draw: drawCharts }],
+  ["strips", { every_ms: SELDOM_MS, last_ms: 0, draw: () => timeline.renderStrips() }],
   ["diagram", { every_ms: OFTEN_MS, last_ms: 0, draw: () => openTab === "diagram" && diagram.render() }],
 ]);
 
@@ -240,9 +252,10 @@ function drawBar() {
   renderFailed(box("failed"), store, resume);
   renderVerdicts(box("verdicts"), store);
 
-  renderScrub(box("scrub-bar"), player, shownTime);
+  timeline.render();
+  crosshair.render();
   renderEmotions(box("emotions"), store);
-  document.body.dataset.time = player.isLive ? "live" : "past";
+  document.body.dataset.time = isRecording() ? "recording" : player.isLive ? "live" : "past";
   const isPast = isRecording() || store.replayOf !== null;
   box("tab-setup").hidden = isPast;
   if (isPast && openTab === "setup") tabList.select("log");
@@ -260,6 +273,17 @@ function drawBar() {
     : "The console is not reachable. This is the last frame.";
 
   document.title = store.run ? `${store.run} · CARS` : "CARS";
+}
+
+/** The time that the plan shows, and the time that is pointed at. */
+function drawPlanTime() {
+  const { frame } = store;
+  const label = box("plan-time");
+  label.hidden = frame === null || editor.draft !== null;
+  if (!frame) return;
+  const past = store.isBack ? "past: " : "";
+  const pointed = crosshair.tick === null ? "" : ` · pointer ${crosshair.words}`;
+  label.textContent = `${past}${seconds(frame.time_s, frame.tick_s)}${pointed}`;
 }
 
 function drawLog() {
@@ -293,8 +317,8 @@ function markStale(...names) {
 }
 
 store.on("frame", () => setup.phase());
-store.on("frame", () => markStale("bar", "panels", "log", "charts", "diagram"));
-store.on("live", () => markStale("bar", "charts", "diagram"));
+store.on("frame", () => markStale("bar", "panels", "log", "charts", "strips", "diagram"));
+store.on("live", () => markStale("bar", "charts", "strips", "diagram"));
 shownTime.listeners.push(() => markStale("bar", "charts"));
 store.on("epoch", () => shownTime.reset());
 store.on("panel", () => markStale("panels"));
@@ -302,6 +326,7 @@ store.on("log", () => markStale("log"));
 store.on("connection", () => markStale("bar", "panels", "log"));
 units.listeners.push(() => markStale("panels"));
 onThemeChange(() => markStale("panels", "charts"));
+new ResizeObserver(() => markStale("bar", "strips")).observe(box("timeline"));
 
 // The time that the clock has been waiting for a robot grows without any message.
 window.setInterval(() => {

@@ -4,7 +4,7 @@
 import { GUTTER_PX, MARGIN_PX } from "./charts.js";
 import { hatchingPath, stateLook } from "./palette.js";
 import { seconds } from "./units.js";
-import { steer } from "./window.js";
+import { steer, timeView } from "./window.js";
 import { html, nothing, render, svg } from "./vendor/lit-html.js";
 
 /** @typedef {import("./store.js").Store} Store */
@@ -23,15 +23,18 @@ export class Bands {
    * @param {HTMLElement} place
    * @param {Store} store
    * @param {import("./window.js").TimeWindow} shown
+   * @param {import("./crosshair.js").Crosshair} crosshair
    * @param {{seek: (time_s: number) => void, isShown: (robot: string) => boolean}} ways to seek, and the robots that are chosen
    */
-  constructor(place, store, shown, { seek, isShown }) {
+  constructor(place, store, shown, crosshair, { seek, isShown }) {
     this.place = place;
     this.store = store;
     this.shown = shown;
     this.isShown = isShown;
     this.drawing = place.appendChild(document.createElement("div"));
-    steer(place, shown, { left_px: GUTTER_PX, right_px: MARGIN_PX, seek });
+    const sides = { left_px: GUTTER_PX, right_px: MARGIN_PX };
+    steer(place, shown, { ...sides, seek });
+    crosshair.join(timeView(place, shown, sides, () => store.frame?.tick_s ?? 0));
   }
 
   render() {
@@ -43,7 +46,7 @@ export class Bands {
     if (inner <= 0) return;
 
     const x = (/** @type {number} */ time_s) => GUTTER_PX + (inner * (Math.min(last_s, Math.max(first_s, time_s)) - first_s)) / (last_s - first_s);
-    const seen = (/** @type {Span[]} */ spans) => visible(spans, first_s, last_s, x);
+    const seen = (/** @type {Span[]} */ spans) => visible(spans, first_s, last_s, x, LEAST_PX);
     const rows = [...states].flatMap(([robot, { emotion, behavior }], i) => {
       const y = i * (2 * BAND_PX + GAP_PX + ROBOT_GAP_PX);
       return [
@@ -57,23 +60,10 @@ export class Bands {
 
     render(
       states.size
-        ? html`<svg class="cars-diagram" width=${width} height=${height} role="img" aria-label=${this.words()}>${rows}${this.now(x, height)}</svg>`
+        ? html`<svg class="cars-diagram" width=${width} height=${height} role="img" aria-label=${this.words()}>${rows}</svg>`
         : nothing,
       this.drawing,
     );
-  }
-
-  /**
-   * In the past, marks the time that the plan shows.
-   * @param {(time_s: number) => number} x
-   * @param {number} height
-   */
-  now(x, height) {
-    const { frame, isChosenTick } = this.store;
-    const [first_s, last_s] = this.shown.range_s();
-    if (!isChosenTick || !frame || frame.time_s < first_s || frame.time_s > last_s) return nothing;
-    const at = x(frame.time_s);
-    return svg`<line class="cursor" x1=${at} x2=${at} y1="0" y2=${height}></line>`;
   }
 
   words() {
@@ -85,16 +75,17 @@ export class Bands {
 }
 
 /**
- * The states of a window, without those that others of the same pixel would cover.
+ * The states of a window, without those that others at the same place would cover.
  * @param {Span[]} spans
  * @param {number} first_s
  * @param {number} last_s
  * @param {(time_s: number) => number} x
+ * @param {number} least_px spans that end closer to one another are one
  */
-function visible(spans, first_s, last_s, x) {
+export function visible(spans, first_s, last_s, x, least_px) {
   let end = -Infinity;
   return spans.filter(({ state, from_s, to_s }) => {
-    if (state === "" || to_s < first_s || from_s > last_s || x(to_s) - end < LEAST_PX) return false;
+    if (state === "" || to_s < first_s || from_s > last_s || x(to_s) - end < least_px) return false;
     end = x(to_s);
     return true;
   });

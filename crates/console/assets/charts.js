@@ -5,7 +5,7 @@ import { robotColor } from "./palette.js";
 import { rank } from "./roster.js";
 import { onThemeChange, readTheme } from "./theme.js";
 import { short } from "./units.js";
-import { steer } from "./window.js";
+import { steer, timeView } from "./window.js";
 import { html, nothing, render } from "./vendor/lit-html.js";
 import uPlot from "./vendor/uPlot.esm.js";
 
@@ -26,13 +26,15 @@ export class Charts {
    * @param {{select: HTMLElement, chart: HTMLElement}} places
    * @param {Store} store
    * @param {import("./window.js").TimeWindow} shown
+   * @param {import("./crosshair.js").Crosshair} crosshair
    * @param {{seek: (time_s: number) => void, onChoose: () => void}} ways to seek, and what is done at another choice of robots
    */
-  constructor({ select, chart }, store, shown, { seek, onChoose }) {
+  constructor({ select, chart }, store, shown, crosshair, { seek, onChoose }) {
     this.select = select;
     this.chart = chart;
     this.store = store;
     this.shown = shown;
+    this.crosshair = crosshair;
     this.onChoose = onChoose;
     /** The robots that a person has chosen. @type {Set<string> | null} */
     this.chosen = null;
@@ -45,19 +47,12 @@ export class Charts {
     this.plot = null;
     /** Variable and robots of the current plot. */
     this.made = "";
-    /** Index of the sample under the pointer. @type {number | null} */
-    this.pointed = null;
-    steer(chart, shown, { left_px: GUTTER_PX, right_px: MARGIN_PX, seek });
-    chart.addEventListener("pointermove", () => this.point(this.plot?.cursor.idx ?? null));
-    chart.addEventListener("pointerleave", () => this.point(null));
+    const sides = { left_px: GUTTER_PX, right_px: MARGIN_PX };
+    steer(chart, shown, { ...sides, seek });
+    crosshair.join(timeView(chart, shown, sides, () => store.frame?.tick_s ?? 0));
+    crosshair.listeners.push(() => chart.clientWidth > 0 && this.renderSelect([...store.history.variables.keys()].sort()));
     new ResizeObserver(() => this.resize()).observe(chart);
     onThemeChange(() => this.forget());
-  }
-
-  /** @param {number | null} index */
-  point(index) {
-    this.pointed = index;
-    this.renderSelect([...this.store.history.variables.keys()].sort());
   }
 
   forget() {
@@ -102,10 +97,8 @@ export class Charts {
     const robots = this.series();
     if (robots.size === 0) return this.forget();
 
-    const { frame, isChosenTick } = this.store;
-    const cursor_s = isChosenTick ? frame?.time_s : undefined;
     const [first_s, last_s] = this.shown.range_s();
-    const drawn = [this.variable, ...robots.keys(), history.changes, first_s, last_s, cursor_s].join("\n");
+    const drawn = [this.variable, ...robots.keys(), history.changes, first_s, last_s].join("\n");
     if (drawn === this.drawn && history === this.drawnOf) return;
 
     const { clientWidth: width, clientHeight: height } = this.chart;
@@ -120,10 +113,7 @@ export class Charts {
     }
 
     this.plot?.setData([history.times_s, ...robots.values()], false);
-    this.plot?.batch(() => {
-      this.plot?.setScale("x", { min: first_s, max: last_s });
-      this.cursor();
-    });
+    this.plot?.setScale("x", { min: first_s, max: last_s });
 
     this.drawn = drawn;
     this.drawnOf = history;
@@ -131,23 +121,12 @@ export class Charts {
     this.chart.setAttribute("aria-label", `${this.variable} over time; last: ${now.join(", ")}`);
   }
 
-  /** In the past, marks the time that the plan shows. */
-  cursor() {
-    const { frame, isChosenTick } = this.store;
-    if (!this.plot) return;
-    if (!isChosenTick || !frame) {
-      // The mark of a tick that is shown no more.
-      if (this.pointed === null) this.plot.setCursor({ left: -10, top: -10 }, false);
-      return;
-    }
-    this.plot.setCursor({ left: this.plot.valToPos(frame.time_s, "x"), top: 10 }, false);
-  }
-
   /** The color of each robot, with its value at the pointer or else the last one. */
   key() {
     const { history, frame, isChosenTick } = this.store;
-    const shown = isChosenTick && frame ? history.indexAt(frame.time_s) : history.times_s.length - 1;
-    const index = this.pointed ?? shown;
+    const { tick } = this.crosshair;
+    const time_s = tick !== null && frame ? tick * frame.tick_s : isChosenTick && frame ? frame.time_s : Infinity;
+    const index = history.indexAt(time_s);
 
     return [...this.series()].map(
       ([robot, values]) => html`<li>${dot(robotColor(robot))}${robot} <b>${short(values[index] ?? NaN, 3)}</b></li>`,
@@ -249,7 +228,7 @@ function options(variable, robots, width, height) {
     height,
     padding: [10, MARGIN_PX, 0, 0],
     legend: { show: false },
-    cursor: { y: false, drag: { x: false, y: false }, points: { show: false } },
+    cursor: { show: false },
     scales: { x: { time: false, auto: false } },
     axes: [
       { ...axis, size: 26, values: (_, ticks) => ticks.map((tick) => `${short(tick)} s`) },

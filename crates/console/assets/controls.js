@@ -113,6 +113,7 @@ export class Controls {
     const phase = store.phase ?? "–";
     const word = store.mode === "recording" ? (PLAYING[phase] ?? phase) : phase;
     const frame = store.frame;
+    const letters = frame ? 2 * seconds(frame.duration_s, frame.tick_s).length + 4 : 0;
 
     render(
       html`
@@ -120,7 +121,7 @@ export class Controls {
         <div class="now">
           <span class="pill ${store.isPast ? "" : `phase-${phase}`}" data-testid="phase">${word}</span>
           <span class="count">tick <b data-testid="tick">${frame?.tick ?? this.store.status?.tick ?? "–"}</b></span>
-          <span class="count"><b data-testid="time">${frame ? seconds(frame.time_s, frame.tick_s) : "–"}</b>${
+          <span class="count" .style=${`--letters:${letters}`}><b data-testid="time">${frame ? seconds(frame.time_s, frame.tick_s) : "–"}</b>${
             frame ? html` of ${seconds(frame.duration_s, frame.tick_s)}` : nothing
           }</span>
         </div>

@@ -10,15 +10,16 @@ const LEAST_TICKS = 15;
 const MOST_TICKS = 4096;
 const LEAST_WIDTH_PX = 300;
 const MOST_WIDTH_PX = 4800;
-const SVG = "http://www.w3.org/2000/svg";
 
 export class DiagramView {
   /**
    * @param {HTMLElement} place
    * @param {import("./recording.js").Player} player
+   * @param {import("./crosshair.js").Crosshair} crosshair
    */
-  constructor(place, player) {
+  constructor(place, player, crosshair) {
     this.player = player;
+    this.crosshair = crosshair;
     this.from = 0;
     this.ticks = FIRST_TICKS;
     this.hasQueries = false;
@@ -39,6 +40,17 @@ export class DiagramView {
     this.picture.tabIndex = 0;
     this.picture.addEventListener("click", (event) => this.seek(event));
     new ResizeObserver(() => this.render()).observe(this.picture);
+    crosshair.join({
+      place: this.picture,
+      hasCursor: true,
+      tickAt: (event) => (this.svg ? this.tickAt(event) : null),
+      xOf: (tick) => this.xOf(tick),
+    });
+  }
+
+  /** What is drawn. @returns {SVGSVGElement | null} */
+  get svg() {
+    return this.picture.querySelector("svg");
   }
 
   /** The last tick that is recorded. */
@@ -59,7 +71,6 @@ export class DiagramView {
     this.followed = tick;
     this.renderBar();
     this.request(Math.min(MOST_WIDTH_PX, Math.max(LEAST_WIDTH_PX, clientWidth - 16)));
-    this.mark();
   }
 
   /** Says why there is no diagram. */
@@ -147,32 +158,36 @@ export class DiagramView {
       return [x, tick];
     });
 
-    this.cursor = svg.appendChild(document.createElementNS(SVG, "line"));
-    this.cursor.setAttribute("class", "cursor");
-    this.cursor.setAttribute("y1", "24");
-    this.cursor.setAttribute("y2", String(svg.height.baseVal.value));
-    this.mark();
+    this.crosshair.render();
   }
 
-  /** Marks the tick of playback. */
-  mark() {
-    const x = String(along(this.knots, 1, 0, Math.min(this.last, this.player.tick)));
-    this.cursor?.setAttribute("x1", x);
-    this.cursor?.setAttribute("x2", x);
+  /** The tick at the place of a pointer. @param {MouseEvent} event */
+  tickAt({ clientX }) {
+    const { svg } = this;
+    const box = svg?.getBoundingClientRect();
+    if (!svg || !box) return 0;
+    return Math.floor(along(this.knots, 0, 1, ((clientX - box.left) * svg.viewBox.baseVal.width) / box.width));
+  }
+
+  /** Where a tick is, in pixels of what is scrolled; null if it is not drawn. @param {number} tick */
+  xOf(tick) {
+    const { svg, picture } = this;
+    const [from, to] = [Number(svg?.dataset.from), Number(svg?.dataset.to)];
+    if (!svg || !(from <= tick && tick <= to)) return null;
+    const box = svg.getBoundingClientRect();
+    const left = box.left - picture.getBoundingClientRect().left + picture.scrollLeft;
+    return left + (along(this.knots, 1, 0, tick) * box.width) / svg.viewBox.baseVal.width;
   }
 
   /** Seeks the tick of what is clicked, or the tick at that place. @param {MouseEvent} event */
   seek(event) {
-    const svg = this.picture.querySelector("svg");
     const target = /** @type {Element} */ (event.target);
-    if (!svg?.contains(target)) return;
+    if (!this.svg?.contains(target)) return;
 
     const thing = target.closest("[data-tick]");
     // Bands are long: the place in them counts.
     const isBand = thing?.matches(".emotion, .behavior, .partition, .fault, .absence, .gap") ?? true;
-    const box = svg.getBoundingClientRect();
-    const x = ((event.clientX - box.left) * svg.viewBox.baseVal.width) / box.width;
-    const tick = isBand ? Math.floor(along(this.knots, 0, 1, x)) : Number(thing?.getAttribute("data-tick"));
+    const tick = isBand ? this.tickAt(event) : Number(thing?.getAttribute("data-tick"));
 
     this.player.isPlaying = false;
     this.player.seek(Math.min(this.last, Math.max(0, tick)));

@@ -153,6 +153,18 @@ export class Player {
     return Math.max(this.recorded, this.isOfLive ? (this.store.live?.tick ?? 0) : 0);
   }
 
+  /** The planned last tick of the epoch. */
+  get end() {
+    const { duration_s = 0 } = this.header ?? this.store.frame ?? {};
+    return Math.max(1, this.last, Math.round(duration_s / (this.tick_s || 1)));
+  }
+
+  /** First and last second of the epoch so far, at least a second apart. @returns {[number, number]} */
+  range_s() {
+    const first_s = this.first * this.tick_s;
+    return [first_s, Math.max(first_s + 1, this.last * this.tick_s)];
+  }
+
   /** The last tick of the epoch that is recorded. */
   get recorded() {
     return this.header?.ticks ?? (this.isRecording ? 0 : -1);
@@ -163,7 +175,7 @@ export class Player {
     try {
       await this.learn();
       if (!this.header) throw new Error(this.missing);
-      await this.seek(Math.min(this.last, tick));
+      await this.seek(tick);
       await this.read(this.header, this.store.history);
       await this.learnNames();
       await this.readEarlier(this.header);
@@ -402,10 +414,12 @@ export class Player {
   }
 
   /**
-   * Shows a tick, unless another one is requested while its chunk is fetched. Where the run goes on, its newest tick is live.
-   * @param {number} tick
+   * Shows a tick, or the nearest one that there is, unless another one is requested while its chunk is fetched. Where the run
+   * goes on, its newest tick is live.
+   * @param {number} wanted
    */
-  async seek(tick) {
+  async seek(wanted) {
+    const tick = Math.min(this.last, Math.max(this.first, wanted));
     if (this.isOfLive && tick >= this.last) return this.live();
     this.position = tick;
     try {
@@ -419,14 +433,14 @@ export class Player {
   /** Stops playback and shows the tick of a simulated time, as far as there is one. @param {number} time_s */
   seekTime(time_s) {
     this.isPlaying = false;
-    return this.seek(Math.min(this.last, Math.max(this.first, Math.round(time_s / (this.tick_s || 1)))));
+    return this.seek(Math.round(time_s / (this.tick_s || 1)));
   }
 
   /** Shows a moment that a line of the log names. @param {number} epoch @param {number} tick */
   async seekIn(epoch, tick) {
     this.isPlaying = false;
     if (epoch !== this.epoch) await this.choose(epoch);
-    if (epoch === this.epoch) await this.seek(Math.min(this.last, Math.max(this.first, tick)));
+    if (epoch === this.epoch) await this.seek(tick);
   }
 
   /**
@@ -523,7 +537,7 @@ export class Player {
   /** @param {number} ticks forward, or back if negative */
   step(ticks) {
     this.isPlaying = false;
-    this.seek(Math.min(this.last, Math.max(this.first, this.tick + ticks)));
+    this.seek(this.tick + ticks);
   }
 
   /** How fast it is played: a run in progress as fast as it goes, one that is over so that it can be seen. */

@@ -81,15 +81,7 @@ export class TimeWindow {
  * @param {{left_px: number, right_px: number, seek: (time_s: number) => void}} place how much of the element at the left and
  *   at the right is not time
  */
-export function steer(element, shown, { left_px, right_px, seek }) {
-  /** @param {number} x_px @returns {number} */
-  const timeAt = (x_px) => {
-    const box = element.getBoundingClientRect();
-    const [from_s, to_s] = shown.range_s();
-    const share = (x_px - box.left - left_px) / Math.max(1, box.width - left_px - right_px);
-    return from_s + Math.min(1, Math.max(0, share)) * (to_s - from_s);
-  };
-
+export function steer(element, shown, { seek, ...sides }) {
   element.classList.add("steered");
   element.addEventListener(
     "wheel",
@@ -102,7 +94,7 @@ export function steer(element, shown, { left_px, right_px, seek }) {
       if (isScrolled && !isAlong) return;
       event.preventDefault();
       if (isAlong) shown.move(((to_s - from_s) * along) / 600);
-      else shown.zoom(Math.exp(Math.min(1, Math.max(-1, event.deltaY / 300))), timeAt(event.clientX));
+      else shown.zoom(Math.exp(Math.min(1, Math.max(-1, event.deltaY / 300))), timeAt(element, shown, sides, event.clientX));
     },
     { passive: false },
   );
@@ -115,7 +107,7 @@ export function steer(element, shown, { left_px, right_px, seek }) {
 
   element.addEventListener("pointerdown", (event) => {
     if (event.button !== 0) return;
-    press = { id: event.pointerId, x_px: event.clientX, time_s: timeAt(event.clientX) };
+    press = { id: event.pointerId, x_px: event.clientX, time_s: timeAt(element, shown, sides, event.clientX) };
   });
   element.addEventListener("pointermove", (event) => {
     if (press?.id !== event.pointerId || Math.abs(event.clientX - press.x_px) < CLICK_PX) return;
@@ -132,7 +124,7 @@ export function steer(element, shown, { left_px, right_px, seek }) {
     if (press?.id !== event.pointerId) return;
     const { time_s } = press;
     const isDrag = box.isConnected;
-    const end_s = timeAt(event.clientX);
+    const end_s = timeAt(element, shown, sides, event.clientX);
     leave();
     if (isDrag) shown.show(Math.min(time_s, end_s), Math.max(time_s, end_s));
     else click(end_s);
@@ -152,4 +144,40 @@ export function steer(element, shown, { left_px, right_px, seek }) {
     if (shown.isWhole) seek(time_s);
     else waiting = window.setTimeout(() => seek(time_s), DOUBLE_MS);
   };
+}
+
+/**
+ * An element whose width is a window of time, as a view of the cross-hair.
+ * @param {HTMLElement} place
+ * @param {TimeWindow} shown
+ * @param {{left_px: number, right_px: number}} sides how much of it is not time
+ * @param {() => number} tick_s length of a tick
+ * @returns {import("./crosshair.js").TimeView}
+ */
+export function timeView(place, shown, sides, tick_s) {
+  return {
+    place,
+    hasCursor: true,
+    tickAt: ({ clientX }) => (tick_s() > 0 ? Math.round(timeAt(place, shown, sides, clientX) / tick_s()) : null),
+    xOf: (tick) => {
+      const [from_s, to_s] = shown.range_s();
+      const share = (tick * tick_s() - from_s) / (to_s - from_s);
+      if (share < 0 || share > 1) return null;
+      return sides.left_px + share * (place.clientWidth - sides.left_px - sides.right_px);
+    },
+  };
+}
+
+/**
+ * The time at a place in an element.
+ * @param {HTMLElement} element
+ * @param {TimeWindow} shown
+ * @param {{left_px: number, right_px: number}} sides
+ * @param {number} x_px
+ */
+function timeAt(element, shown, { left_px, right_px }, x_px) {
+  const box = element.getBoundingClientRect();
+  const [from_s, to_s] = shown.range_s();
+  const share = (x_px - box.left - left_px) / Math.max(1, element.clientWidth - left_px - right_px);
+  return from_s + Math.min(1, Math.max(0, share)) * (to_s - from_s);
 }
