@@ -733,8 +733,7 @@ def test_samples_of_the_record_replace_what_was_seen(page):
         const history = new History();
         history.add(0, robot('A', 0));
         history.add(10, robot('C', 10));
-        history.break();
-        history.add(20, robot('C', 20));
+        history.add(20, robot('C', 20), true);
         const gap = [history.times_s.slice(), history.variables.get('v').get('B').slice(), structuredClone(history.states.get('B').emotion)];
         history.cutFrom(5);
         for (const [time, emotion] of [[5, 'A'], [7, 'B'], [10, 'C'], [15, 'C'], [20, 'C']]) history.add(time, robot(emotion, time));
@@ -746,7 +745,7 @@ def test_samples_of_the_record_replace_what_was_seen(page):
         """,
     )
     gap, exact, empty, most_samples, most_spans = found
-    assert gap[0] == [0, 10, 15, 20] and gap[1] == [0, 10, None, 20]
+    assert gap[0] == [0, 10, 10.01, 20] and gap[1] == [0, 10, None, 20]
     assert [[span["state"], span["from_s"], span["to_s"]] for span in gap[2]] == [["A", 0, 10], ["C", 10, 10], ["C", 20, 20]]
     assert exact[0] == [0, 5, 7, 10, 15, 20] and exact[1] == exact[0]
     assert [[span["state"], span["from_s"], span["to_s"]] for span in exact[2]] == [["A", 0, 7], ["B", 7, 10], ["C", 10, 20]]
@@ -761,7 +760,7 @@ def test_the_newest_tick_is_a_sample_also_of_a_long_run(page):
         const robots = [{name: 'B', location: {x: 0, y: 0}, emotion_state: 'A', behavior_state: 'S', state_variables: {}}];
         const store = new Store();
         store.live = {tick: 7, time_s: 3.5, robots};
-        store.refill(0, [0, 2, 4, 6].map((tick) => ({time_s: tick / 2, robots})), 7);
+        store.refill(0, 3.5, [0, 2, 4, 6].map((tick) => ({time_s: tick / 2, robots})), 7);
         return store.liveHistory.times_s;
         """,
     )
@@ -793,3 +792,35 @@ def test_the_window_stays_within_the_run(page):
         # It was at the end, and goes on with the run.
         "190 200", "199 200", "0 200true", "30 31", "0 200",
     ]
+
+
+def test_gaps_stay_gaps(page):
+    """Between what was read and what was seen, between frames that are far apart, and after old samples were dropped."""
+    found = run_module(
+        page,
+        """
+        const robots = [{name: 'B', location: {x: 0, y: 0}, emotion_state: 'A', behavior_state: 'S', state_variables: {v: 1}}];
+        const store = new Store();
+        store.live = {tick: 100, time_s: 50, tick_s: 0.5, robots};
+        store.refill(0, 20, [0, 20, 40].map((tick) => ({time_s: tick / 2, robots})), 40);
+        const read = [store.history.times_s.slice(), store.history.states.get('B').emotion.map(({from_s, to_s}) => [from_s, to_s])];
+
+        const history = new History();
+        for (const tick of [0, 1, 11, 22, 23]) history.see(tick, 1, robots);
+        const seen = history.variables.get('v').get('B').slice();
+
+        const long = new History();
+        for (let i = 0; i < 20000; i += 1) long.add(i, robots, i === 3000);
+        const at = long.gaps.indexOf(1);
+        const unlimited = new History();
+        for (let i = 0; i < 20000; i += 1) unlimited.add(i, robots, true);
+        const twice = unlimited.gaps.some((gap, i) => gap && unlimited.gaps[i + 1]);
+        return [...read, seen, [long.times_s[at - 1], long.times_s[at + 1]], long.gaps.filter(Boolean).length, unlimited.times_s.length, twice];
+        """,
+    )
+    times_s, spans, seen, around, count, most, twice = found
+    assert times_s == [0, 10, 20, 20.03, 50]
+    assert spans == [[0, 20], [50, 50]]
+    assert seen == [1, 1, 1, None, 1, 1], "eleven ticks are too many, ten are not"
+    assert around[0] < 3000 <= around[1] and around[1] - around[0] < 40 and count == 1
+    assert most <= 6000 and not twice

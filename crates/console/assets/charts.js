@@ -191,6 +191,16 @@ function dot(color) {
 }
 
 /**
+ * Indices of the values beside which there is no other one.
+ * @param {ArrayLike<number | null | undefined>} values
+ * @returns {number[]}
+ */
+function isolated(values) {
+  const is = (/** @type {number} */ i) => values[i] !== null && values[i] !== undefined;
+  return [...Array(values.length).keys()].filter((i) => is(i) && !is(i - 1) && !is(i + 1));
+}
+
+/**
  * The variable that changes most often, which is shown first.
  * @param {import("./history.js").History} history
  */
@@ -240,7 +250,8 @@ function options(variable, robots, width, height) {
         label: `${robot} ${variable}`,
         stroke: robotColor(robot),
         width: 1.75,
-        points: { show: false },
+        // A sample between gaps is no line.
+        points: { show: true, size: 4, fill: robotColor(robot), filter: (/** @type {uPlot} */ plot, /** @type {number} */ i) => isolated(plot.data[i]) },
       })),
     ],
   };

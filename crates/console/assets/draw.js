@@ -164,10 +164,14 @@ export function trail({ context, camera }, name, track, from, to, end) {
     context.globalAlpha = 0.1 + (0.7 * (piece + 1)) / pieces;
     context.beginPath();
 
+    let isJoined = true;
     for (let i = first; i <= last && i < to; i += 1) {
       const x = track.x_m[i];
       const y = track.y_m[i];
-      if (x !== null && y !== null) context.lineTo(camera.x(x), camera.y(y));
+      const isKnown = x !== null && y !== null;
+      if (isKnown && isJoined) context.lineTo(camera.x(x), camera.y(y));
+      else if (isKnown) context.moveTo(camera.x(x), camera.y(y));
+      isJoined = isKnown;
     }
     if (piece === pieces - 1) context.lineTo(camera.x(end.x), camera.y(end.y));
     context.stroke();

@@ -12,6 +12,8 @@ const MOST_SAMPLES = 6000;
 /** Most numbers of all series together: with many robots there are fewer samples of each, and no robot is left out. */
 const MOST_NUMBERS = 3_000_000;
 const MOST_SPANS = 4000;
+/** Samples that are further apart than this many ticks have a gap between them: what was in between was not seen. */
+const SEEN_TICKS = 10;
 /** Most variables of all robots: a robot can publish any number of names. */
 const MOST_VARIABLES = 16_384;
 /** Most names of emotions that are listed: a robot can have any. */
@@ -37,35 +39,44 @@ export class History {
     this.emotions = new Set();
     /** @type {number} */
     this.variableCount = 0;
-    /** Whether nothing is known of the time before the next sample. @type {boolean} */
-    this.isBroken = false;
+    /** Whether a sample is none, but stands for a time of which nothing is known: 1 or 0. @type {(number | null)[]} */
+    this.gaps = [];
+    /** Until when all is known of which there are samples. @type {number} */
+    this.known_s = -Infinity;
     /** How many variables of the last sample are not kept, because there are too many. @type {number} */
     this.dropped = 0;
     this.changes += 1;
   }
 
-  /** What comes next does not follow what was added last: the page was not connected in between. */
-  break() {
-    this.isBroken = this.times_s.length > 0;
+  /**
+   * Adds a sample that was seen. There is a gap before it if the ticks before were not.
+   * @param {number} time_s
+   * @param {number} tick_s length of a tick
+   * @param {Parameters<History["add"]>[1]} robots
+   */
+  see(time_s, tick_s, robots) {
+    const last_s = Math.max(this.known_s, this.times_s.at(-1) ?? Infinity);
+    this.add(time_s, robots, time_s - last_s > (SEEN_TICKS + 0.5) * tick_s);
   }
 
   /**
    * Adds a sample; one that is not later than the last is ignored.
    * @param {number} time_s
    * @param {Pick<RobotFrame, "name" | "location" | "presence" | "emotion_state" | "behavior_state" | "state_variables">[]} robots
+   * @param {boolean} isBroken whether nothing is known of the time before
    */
-  add(time_s, robots) {
+  add(time_s, robots, isBroken = false) {
     const last_s = this.times_s.at(-1) ?? -Infinity;
     if (time_s <= last_s) return;
     this.changes += 1;
 
-    const isBroken = this.isBroken;
-    this.isBroken = false;
     if (isBroken) {
-      this.times_s.push((last_s + time_s) / 2);
+      this.times_s.push(last_s + (time_s - last_s) / 1000);
+      this.gaps.push(1);
       this.align();
     }
     this.times_s.push(time_s);
+    this.gaps.push(0);
 
     this.dropped = 0;
     for (const robot of robots) {
@@ -133,6 +144,7 @@ export class History {
    */
   cutFrom(time_s) {
     this.changes += 1;
+    this.known_s = Math.min(this.known_s, time_s);
     const kept = this.indexAt(time_s, false) + 1;
     for (const values of [this.times_s, ...this.all()]) values.length = Math.min(values.length, kept);
     for (const { emotion, behavior } of this.states.values()) {
@@ -153,7 +165,10 @@ export class History {
   }
 
   thin() {
-    const kept = spread(this.times_s);
+    // A gap stays: without it the samples around it would be joined.
+    const samples = [...this.times_s.keys()].filter((i) => !this.gaps[i]);
+    const spared = new Set(spread(samples.map((i) => this.times_s[i])).map((i) => samples[i]));
+    const kept = [...this.times_s.keys()].filter((i) => this.gaps[i] || spared.has(i)).filter((i, at, all) => !this.gaps[i] || !this.gaps[all[at + 1]]);
     for (const values of [this.times_s, ...this.all()]) {
       kept.forEach((from, to) => (values[to] = values[from]));
       values.length = kept.length;
@@ -164,13 +179,7 @@ export class History {
   all() {
     const series = [...this.variables.values()].flatMap((robots) => [...robots.values()]);
     const tracks = [...this.tracks.values()].flatMap((track) => [track.x_m, track.y_m]);
-    return [...series, ...tracks];
-  }
-
-  /** First and last time, at least a second apart. @returns {[number, number]} */
-  range_s() {
-    const first_s = this.times_s[0] ?? 0;
-    return [first_s, Math.max(first_s + 1, this.times_s.at(-1) ?? 0)];
+    return [this.gaps, ...series, ...tracks];
   }
 
   /**

@@ -295,7 +295,7 @@ export class Player {
 
       const times = range.ticks.map(({ tick, robots }) => ({ time_s: tick * epoch.tick_s, robots }));
       this.readTo = range.end - 1;
-      this.store.refill(from * epoch.tick_s, times, this.readTo);
+      this.store.refill(from * epoch.tick_s, this.readTo * epoch.tick_s, times, this.readTo);
       this.store.addRecorded(range.log);
       this.store.memory.forget(this.readTo);
       this.store.emit("live");

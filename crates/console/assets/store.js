@@ -150,7 +150,6 @@ export class Store {
     this.logCount = 0;
     this.logMissed = 0;
     this.recordedLine = null;
-    this.liveHistory.break();
     this.emit("connection");
     this.emit("log");
   }
@@ -172,7 +171,7 @@ export class Store {
 
     this.livePanels = new Map([...this.earlyPanels].filter(([, panel]) => isOfTick(panel, frame)));
     if (!this.isBack) this.panels = this.livePanels;
-    this.liveHistory.add(frame.time_s, frame.robots);
+    this.liveHistory.see(frame.time_s, frame.tick_s, frame.robots);
     this.memory.add(frame, this.livePanels);
     if (!this.isBack) this.emit("panel");
     if (!this.isBack) this.show(frame);
@@ -238,15 +237,17 @@ export class Store {
   /**
    * Takes in ticks of the epoch in progress that have been recorded, in place of what was seen of them.
    * @param {number} from_s when they begin
+   * @param {number} to_s when they end
    * @param {{time_s: number, robots: import("./types/messages.js").RobotFrame[]}[]} samples
    * @param {number} last tick of the samples
    */
-  refill(from_s, samples, last) {
+  refill(from_s, to_s, samples, last) {
     this.liveHistory.cutFrom(from_s);
     for (const { time_s, robots } of samples) this.liveHistory.add(time_s, robots);
-    for (const { time_s, robots } of this.memory.after(last)) this.liveHistory.add(time_s, robots);
-    // Of a long run not every tick is a sample, and the newest one is to be seen.
-    if (this.live) this.liveHistory.add(this.live.time_s, this.live.robots);
+    // What is recorded is known to its last tick, which of a long run need not be a sample.
+    this.liveHistory.known_s = to_s;
+    for (const { time_s, tick_s, robots } of this.memory.after(last)) this.liveHistory.see(time_s, tick_s, robots);
+    if (this.live) this.liveHistory.see(this.live.time_s, this.live.tick_s, this.live.robots);
   }
 
   /**
