@@ -56,6 +56,15 @@ def test_axe_finds_nothing_in_a_run(launch, open_page, axe, many, width, height)
         page.get_by_test_id(f"tab-{tab}").click()
         expect(page.locator(f"#panel-{tab}")).to_be_visible()
         found += violations(page, axe, tab)
+
+    page.get_by_test_id("btn-init").click()
+    found += violations(page, axe, "a question")
+    page.get_by_test_id("end-run-cancel").click()
+    scrub(page, 0)
+    expect(page.get_by_test_id("when")).to_contain_text("past: 0.0 s")
+    for tab in ("log", "charts"):
+        page.get_by_test_id(f"tab-{tab}").click()
+        found += violations(page, axe, f"{tab} in the past")
     assert found == []
 
 

@@ -49,6 +49,7 @@ def test_step_start_pause_speed_and_init(launch, open_page):
     assert run.status()["tick"] == held["tick"] == tick(page)
 
     page.get_by_test_id("btn-init").click()
+    page.get_by_test_id("end-run").click()
     shows(page, "ready", 0)
     again = run.status()
     assert again["epoch"] == 2
@@ -102,6 +103,7 @@ def test_two_browsers_see_the_same_run(launch, open_page):
     shows(other, "paused", 1)
 
     other.get_by_test_id("btn-init").click()
+    other.get_by_test_id("end-run").click()
     shows(one, "ready", 0)
 
 

@@ -189,6 +189,7 @@ def test_init_that_waits_for_a_dead_robot_says_so(launch, open_page):
     step(page, 1)
     run.kill("Leguin")
     page.get_by_test_id("btn-init").click()
+    page.get_by_test_id("end-run").click()
     expect(page.get_by_test_id("awaiting")).to_contain_text("Leguin")
     expect(page.get_by_test_id("phase")).to_have_text("gathering", ignore_case=True)
     page.get_by_test_id("btn-init").click()

@@ -103,6 +103,7 @@ def test_epochs_are_divided_in_the_log(launch, open_page, screenshots):
     expect(page.get_by_test_id("log-epoch")).to_have_count(0)
 
     page.get_by_test_id("btn-init").click()
+    page.get_by_test_id("end-run").click()
     expect(page.get_by_test_id("log-epoch")).to_have_text(["epoch 2"])
     page.get_by_test_id("btn-init").click()
     expect(page.get_by_test_id("log-epoch")).to_have_text(["epoch 2", "epoch 3"])

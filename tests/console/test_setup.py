@@ -24,8 +24,10 @@ def at(page, x_m, y_m):
     return place["x"], place["y"]
 
 
-def apply(page, run, epoch=2):
+def apply(page, run, epoch=2, ends_a_run=False):
     page.get_by_test_id("setup-apply").click()
+    if ends_a_run:
+        page.get_by_test_id("end-run").click()
     eventually("the epoch", lambda: run.status()["epoch"] == epoch and run.status()["phase"] == "ready")
     until(page, f"window.carsConsole.frame()?.epoch === {epoch}")
 
@@ -42,7 +44,7 @@ def test_obstacles_that_are_clicked_block_a_robot(launch, open_page):
     walls = [(1, 0), (1, 1), (0, 1), (1, -1), (-1, 1)]
     for right, up in walls:
         page.mouse.click(*at(page, corner + right * BODY_M, corner + up * BODY_M))
-    apply(page, run)
+    apply(page, run, ends_a_run=True)
     assert len(page.evaluate("window.carsConsole.frame().obstacles")) == 1 + len(walls)
 
     page.get_by_test_id("btn-step").click()

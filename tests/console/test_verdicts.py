@@ -26,5 +26,6 @@ def test_a_verdict_shows_with_the_tick_that_decides_it(launch, open_page, screen
     page.screenshot(path=screenshots / "verdicts-live-1440x900-light.png")
 
     page.get_by_test_id("btn-init").click()
+    page.get_by_test_id("end-run").click()
     expect(page.get_by_test_id("tick")).to_have_text("0")
     expect(verdicts).to_have_text(["… open Butler does not serve", "… open nobody overlaps"])

@@ -61,9 +61,13 @@ const player = new Player(store, {
   sought: () => plan.flights.clear(),
 });
 
+/** What moves the clock of the run is seen. @type {Control["do"][]} */
+const GO_LIVE = ["init", "load", "start", "step"];
+
 /** Sends a request and applies the status in its answer. @param {Control} control */
 async function request(control) {
   const answer = await connection.control(control);
+  if (answer.answer === "done" && GO_LIVE.includes(control.do)) player.live();
   if (answer.answer === "done") store.applyStatus(answer);
   return answer;
 }
@@ -121,7 +125,14 @@ const editor = new Editor({
   body_m: () => setup.body_m,
   hasFault: (field) => setup.faults().has(field),
 });
-const setup = new SetupView(box("panel-setup"), { store, units, editor, notices, request });
+const setup = new SetupView(box("panel-setup"), {
+  store,
+  units,
+  editor,
+  notices,
+  request,
+  askToEnd: (...what) => controls.askToEnd(...what),
+});
 const plan = new Plan(element("plan", HTMLCanvasElement), store, units, editor, choose);
 setup.onChange = () => {
   plan.touch();

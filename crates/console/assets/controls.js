@@ -82,10 +82,48 @@ export class Controls {
     if (next) /** @type {HTMLElement | null} */ (this.place.querySelector(`[data-testid="${next}"]`))?.focus();
   }
 
-  /** Starts the clock or begins the next epoch; changes of the set-up that are not applied are asked about. @param {"start" | "init"} what */
+  /** Whether the next epoch would end one that has begun and is not over. A replay can be seen again. */
+  get isInProgress() {
+    const { live, phase, replayOf } = this.store;
+    return (phase === "running" || phase === "paused") && (live?.tick ?? 0) > 0 && !replayOf;
+  }
+
+  /** How far the run is that would end, in words. */
+  get end() {
+    const { live } = this.store;
+    if (!live) return "";
+    const [time, of] = [live.time_s, live.duration_s].map((time_s) => seconds(time_s, live.tick_s));
+    return `This ends the run in progress at ${time} of ${of}. What was recorded stays.`;
+  }
+
+  /**
+   * Asks before a run in progress is ended.
+   * @param {string} label of what ends it
+   * @param {string} back what was pressed
+   * @param {() => void} act
+   */
+  askToEnd(label, back, act) {
+    if (!this.isInProgress) return act();
+    this.ask({
+      label: "End of the run",
+      text: `${this.end} The next epoch begins at tick 0.`,
+      back,
+      answers: [
+        { name: "end-run", label, tone: "danger", act },
+        { name: "end-run-cancel", label: "Go on with it", tone: "", act: () => {} },
+      ],
+    });
+  }
+
+  /**
+   * Starts the clock or begins the next epoch. Changes of the set-up that are not applied are asked about, and the end of a run
+   * that is in progress.
+   * @param {"start" | "init"} what
+   */
   begin(what) {
     const { control, draft } = this.transport;
     const changed = draft();
+    if (!changed && what === "init") return this.askToEnd("End it and begin again", "btn-init", () => control({ do: what }));
     if (!changed) return control({ do: what });
 
     const isStart = what === "start";
@@ -99,7 +137,7 @@ export class Controls {
     };
     this.ask({
       label: "Changes of the set-up",
-      text: "The set-up has changes that are not applied. They take effect with the next epoch, from tick 0 on.",
+      text: `The set-up has changes that are not applied. They take effect with the next epoch, from tick 0 on. ${this.isInProgress ? this.end : ""}`,
       back: `btn-${what}`,
       answers: [
         { name: "draft-apply", label: isStart ? "Apply them and start" : "Apply them", tone: "primary", act: apply },

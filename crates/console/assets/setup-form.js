@@ -17,14 +17,14 @@ import { html, nothing } from "./vendor/lit-html.js";
  * @property {(field: string, change: (draft: Setup) => void) => void} edit
  * @property {boolean} isOvertaken
  * @property {{past: unknown[], future: unknown[]}} undo
- * @property {() => void} apply
+ * @property {() => void} begin
  * @property {() => void} refresh
  * @property {() => void} revert
  * @property {() => void} keepMine
  * @property {(isBack: boolean) => void} step
  * @property {() => void} drawSeed
  * @property {() => void} save
- * @property {(file: File) => Promise<void>} load
+ * @property {(file: File) => void} load
  */
 
 /** @typedef {import("./types/messages.js").Setup} Setup */
@@ -45,7 +45,7 @@ export function form(view, faults) {
   const unit = view.units.unit;
   const submit = (/** @type {Event} */ event) => {
     event.preventDefault();
-    view.apply();
+    view.begin();
   };
 
   return html`
@@ -204,12 +204,12 @@ function other(faults, draft) {
  * @param {Faults} faults
  */
 function actions(view, faults) {
-  const load = async (/** @type {Event} */ event) => {
+  const load = (/** @type {Event} */ event) => {
     const input = /** @type {HTMLInputElement} */ (event.target);
     const file = input.files?.[0];
     // At once: while the file is loaded the user may have chosen the next one.
     input.value = "";
-    if (file) await view.load(file);
+    if (file) view.load(file);
   };
 
   return html`

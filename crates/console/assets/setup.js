@@ -23,15 +23,17 @@ const SEED_BITS = 2 ** 32;
 export class SetupView {
   /**
    * @param {HTMLElement} place
-   * @param {{store: Store, units: Units, editor: Editor, notices: Notices, request: (control: Control) => Promise<ControlAnswer>}} parts
+   * @param {{store: Store, units: Units, editor: Editor, notices: Notices, request: (control: Control) => Promise<ControlAnswer>,
+   *   askToEnd: (label: string, back: string, act: () => void) => void}} parts what `askToEnd` does, is done once a run in progress may end
    */
-  constructor(place, { store, units, editor, notices, request }) {
+  constructor(place, { store, units, editor, notices, request, askToEnd }) {
     this.place = place;
     this.store = store;
     this.units = units;
     this.editor = editor;
     this.notices = notices;
     this.request = request;
+    this.askToEnd = askToEnd;
     /** The set-up of the run. @type {Setup | null} */
     this.applied = null;
     /** The set-up as it is edited. @type {Setup | null} */
@@ -247,6 +249,12 @@ export class SetupView {
     this.changed();
   }
 
+  /** Begins the next epoch with the draft, once a run in progress may end. */
+  begin() {
+    if (this.isOvertaken || this.faults().size > 0) this.apply();
+    else this.askToEnd("End it and begin again", "", () => this.apply());
+  }
+
   /** Begins the next epoch with the draft; resolves with whether that was accepted. */
   async apply() {
     const { draft } = this;
@@ -295,9 +303,14 @@ export class SetupView {
     this.notices.note(this.isChanged ? "Saved without the changes that are not applied." : "Saved.");
   }
 
-  /** @param {File} file */
-  async load(file) {
+  /** Begins the next epoch with another scenario, once a run in progress may end. @param {File} file */
+  load(file) {
     if (file.size > LARGEST_FILE) return this.notices.refusal(`${file.name} is larger than a scenario can be (1 MiB).`);
+    this.askToEnd(`End it and load ${file.name}`, "", () => this.loadNow(file));
+  }
+
+  /** @param {File} file */
+  async loadNow(file) {
     const answer = await this.request({ do: "load", scenario: await file.text() });
     if (answer.answer === "refused") return this.notices.refusal(`${file.name}: ${answer.explanation}`);
     this.notices.note(`${file.name} is loaded: the next epoch is ready at tick 0.`);
