@@ -17,7 +17,9 @@ mod words;
 
 use protocol::messages::Awaited;
 use protocol::{Event, Tick};
-use timeline::{Span, Timeline};
+use timeline::{Span, StateKind, StateOrder, Timeline};
+
+use crate::data::{DataRow, digits};
 
 use self::draw::draw;
 use self::items::{HeldTick, Items};
@@ -93,16 +95,103 @@ impl Diagram {
     /// # Errors
     /// [`TooMuch`] if the window has more than [`MAX_ITEMS`] things.
     pub fn to_svg(&self) -> Result<String, TooMuch> {
-        let mut items = self.items.clone();
-        for span in self.timeline.in_progress() {
-            self.add(span, &mut items);
-        }
+        let items = self.shown();
         let count = items.count() + self.beyond;
         if count > MAX_ITEMS {
             return Err(TooMuch { items: count });
         }
 
-        Ok(draw(&self.timeline, &items, self.window, &self.options))
+        Ok(draw(
+            &self.timeline,
+            &items,
+            self.window,
+            &self.options,
+            None,
+        ))
+    }
+
+    /// The last of several diagrams with a legend of all of them; `None` if there is none, or one has too much.
+    pub(crate) fn svg_with_legend(diagrams: &[Self]) -> Option<String> {
+        let (first, last) = (diagrams.first()?, diagrams.last()?);
+        let mut all = Items::default();
+        for diagram in diagrams {
+            all.append(diagram.shown());
+        }
+        let window = VisibleTicks {
+            from: first.window.from,
+            ..last.window
+        };
+        let own = last.shown();
+        (own.count() + last.beyond <= MAX_ITEMS).then(|| {
+            let legend = Some((&all, window));
+            draw(&last.timeline, &own, last.window, &last.options, legend)
+        })
+    }
+
+    /// What it shows, with what is in progress.
+    fn shown(&self) -> Items {
+        let mut items = self.items.clone();
+        for span in self.timeline.in_progress() {
+            self.add(span, &mut items);
+        }
+        items
+    }
+
+    /// First and last moment, simulated seconds.
+    pub(crate) fn window_s(&self) -> (f64, f64) {
+        let tick_s = self.window.tick_s;
+        let ends = [self.window.from, self.window.end()];
+        let [from, to] = ends.map(|tick| tick as f64 * tick_s);
+        (from, to)
+    }
+
+    /// The emotions and behaviors that have their colors by it.
+    pub(crate) fn names(&self) -> StateOrder {
+        let mut names = self.options.names.clone();
+        names.add_all(self.timeline.names());
+        names
+    }
+
+    /// The states of a kind that the robots have had so far.
+    pub(crate) fn states(&self, kind: StateKind) -> Vec<&String> {
+        self.timeline.names().of(kind).iter().collect()
+    }
+
+    /// Its bands and commands as rows, in seconds.
+    pub(crate) fn data(&self) -> Vec<DataRow> {
+        let seconds = |tick: Tick| digits(tick as f64 * self.window.tick_s);
+        let items = self.shown();
+        let mut rows = Vec::new();
+        for band in &items.bands {
+            if let Some((begin, end)) = self.window.clip(band.period) {
+                let kind = match band.kind {
+                    StateKind::Emotion => "emotion",
+                    StateKind::Behavior => "behavior",
+                };
+                rows.push(vec![
+                    ("kind", kind.to_owned()),
+                    ("robot", band.robot.to_string()),
+                    ("state", band.name.clone()),
+                    ("from_s", seconds(begin)),
+                    ("to_s", seconds(end)),
+                    ("to_robot", String::new()),
+                ]);
+            }
+        }
+        for command in &items.commands {
+            for end in &command.ends {
+                rows.push(vec![
+                    ("kind", "command".to_owned()),
+                    ("robot", command.from.to_string()),
+                    ("text", command.text.clone()),
+                    ("from_s", seconds(command.sent)),
+                    ("to_s", seconds(end.tick)),
+                    ("to_robot", command.to.to_string()),
+                    ("lost", end.lost.is_some().to_string()),
+                ]);
+            }
+        }
+        rows
     }
 
     /// Adds what is shown.

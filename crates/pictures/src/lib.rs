@@ -5,20 +5,23 @@
 
 mod axis;
 mod chart;
+mod data;
 pub mod diagram;
 mod labels;
 mod markup;
 mod number;
 mod page;
 mod palette;
+mod print;
 mod scale;
 mod shapes;
 mod style;
 mod table;
+mod vega;
 
 pub use chart::PlottedEstimate;
 pub use chart::bands::{Band, BandRow, Bands};
-pub use chart::course::{Course, CourseLine};
+pub use chart::course::{CourseLine, TimeCourse};
 pub use chart::floor::Floor;
 pub use chart::intervals::{IntervalRow, Intervals};
 pub use chart::matrix::{Matrix, MatrixCell, MatrixLabel};
@@ -28,6 +31,8 @@ pub use labels::width_px;
 pub use number::{decimals_for, fixed};
 pub use page::{ChartPanel, Figure, Page, Text};
 pub use palette::{StateLook, state_look};
+pub use print::{LEAST_LETTERS_PT, PrintedFigure, PrintedPicture, WIDTHS_MM};
 pub use scale::round_range;
 pub use style::style;
 pub use table::{Cell, Table};
+pub use vega::Chart;

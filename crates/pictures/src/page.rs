@@ -4,8 +4,10 @@ use std::ops::Range;
 
 use crate::markup::Markup;
 
+use crate::diagram::Diagram;
 use crate::style::sheet;
 use crate::table::Table;
+use crate::vega::Chart;
 
 /// What the page may load: nothing. Its style is in it.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; img-src data:";
@@ -36,6 +38,12 @@ impl Text {
         self.with(Some("code"), text.into())
     }
 
+    /// The text without what stands out.
+    #[must_use]
+    pub(crate) fn plain(&self) -> String {
+        self.parts.iter().map(|(_, text)| text.as_str()).collect()
+    }
+
     fn with(mut self, element: Option<&'static str>, text: String) -> Self {
         self.parts.push((element, text));
         self
@@ -64,28 +72,62 @@ pub struct ChartPanel {
     pub heading: String,
     /// The chart, SVG.
     pub svg: String,
+    /// What the chart shows.
+    pub(crate) chart: Chart,
     /// Whether it is as wide as the page.
-    pub is_wide: bool,
+    pub(crate) is_wide: bool,
+    /// The chart as it is printed, if that is another one.
+    printed: Option<String>,
 }
 
 impl ChartPanel {
-    /// A chart that has the width of a panel.
+    /// A chart.
     #[must_use]
-    pub fn new(heading: impl Into<String>, svg: String) -> Self {
+    pub fn new(heading: impl Into<String>, chart: Chart) -> Self {
+        let (svg, is_wide) = match &chart {
+            Chart::Bands(chart) => (chart.draw(), true),
+            Chart::Course(chart) => (chart.draw(), true),
+            Chart::Floor(chart) => (chart.draw(), false),
+            Chart::Intervals(chart) => (chart.draw(), false),
+            Chart::Matrix(chart) => (chart.draw(), chart.is_wide()),
+            Chart::Steps(chart) => (chart.draw(), false),
+            Chart::Trend(chart) => (chart.draw(), false),
+            // That of a diagram with too much is not drawn.
+            Chart::Diagram(diagram) => (diagram.to_svg().unwrap_or_default(), true),
+        };
         Self {
             heading: heading.into(),
             svg,
-            is_wide: false,
+            chart,
+            is_wide,
+            printed: None,
         }
     }
 
-    /// A chart that is as wide as the page.
+    /// The lines of a diagram, from top to bottom, of which the last one has a legend of all of them in print.
     #[must_use]
-    pub fn wide(heading: impl Into<String>, svg: String) -> Self {
-        Self {
-            is_wide: true,
-            ..Self::new(heading, svg)
+    pub fn diagram(lines: Vec<Diagram>) -> Vec<Self> {
+        let legend = Diagram::svg_with_legend(&lines);
+        let lines = lines.into_iter();
+        let panels = lines.map(|line| Self::new("", Chart::Diagram(Box::new(line))));
+        let mut panels: Vec<Self> = panels.collect();
+        if let Some(last) = panels.last_mut() {
+            last.printed = legend;
         }
+        panels
+    }
+
+    /// The chart as it is printed, SVG.
+    pub(crate) fn printed(&self) -> &str {
+        self.printed.as_ref().unwrap_or(&self.svg)
+    }
+
+    /// Its height in print, pixels.
+    pub(crate) fn height_px(&self) -> f64 {
+        // The root element is the first one with a height.
+        let height = self.printed().split_once(" height=\"");
+        let height = height.and_then(|(_, rest)| rest.split('"').next()?.parse().ok());
+        height.unwrap_or(0.0)
     }
 }
 
@@ -120,8 +162,8 @@ pub struct Page {
     body: Markup,
     /// Headings of the sections with their ids.
     sections: Vec<(String, String)>,
-    /// Where the figures are in the body.
-    figures: Vec<Range<usize>>,
+    /// The figures, and where they are in the body.
+    pub(crate) figures: Vec<(Figure, Range<usize>)>,
     tables: usize,
 }
 
@@ -183,7 +225,7 @@ impl Page {
     }
 
     /// Adds a figure and returns its number.
-    pub fn figure(&mut self, figure: &Figure) -> usize {
+    pub fn figure(&mut self, figure: Figure) -> usize {
         let number = self.figures.len() + 1;
         let begin = self.body.size();
         let body = &mut self.body;
@@ -212,7 +254,8 @@ impl Page {
             body.close("details");
         }
         body.close("figure");
-        self.figures.push(begin..self.body.size());
+        let place = begin..self.body.size();
+        self.figures.push((figure, place));
         number
     }
 
@@ -289,7 +332,7 @@ impl Page {
     pub fn into_figures(self) -> Vec<String> {
         let body = self.body.finish();
         let mut pages = Vec::new();
-        for place in self.figures {
+        for (_, place) in self.figures {
             let mut page = begin(&self.title);
             page.add(&body[place]);
             pages.push(end(page));

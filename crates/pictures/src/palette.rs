@@ -4,7 +4,7 @@
 //! The emotions of the documented robots have colors of Okabe and Ito (2008). They and the colors of other names are told apart
 //! with protanopia and deuteranopia, too.
 
-use timeline::{StateKind, StateNames};
+use timeline::{StateKind, StateOrder};
 
 /// A color in light and in dark surroundings, as `#rrggbb`. Prints are light.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -148,11 +148,19 @@ impl StateLook {
     pub fn class(&self) -> String {
         format!("{}{}", self.prefix, self.color)
     }
+
+    /// Its color on paper, `#rrggbb`.
+    pub(crate) fn light(&self) -> &'static str {
+        match self.prefix {
+            "e" => EMOTION_SHADES[self.color].light,
+            _ => BEHAVIOR_SHADES[self.color].light,
+        }
+    }
 }
 
 /// How an emotion or a behavior looks in a run with these names. A name that is not among them looks like the next one.
 #[must_use]
-pub fn state_look(kind: StateKind, name: &str, names: &StateNames) -> StateLook {
+pub fn state_look(kind: StateKind, name: &str, names: &StateOrder) -> StateLook {
     let (prefix, known, shades): (_, &[&str], _) = match kind {
         StateKind::Emotion => ("e", &EMOTIONS, EMOTION_SHADES.len()),
         StateKind::Behavior => ("b", &BEHAVIORS, BEHAVIOR_SHADES.len()),
@@ -212,8 +220,8 @@ mod tests {
 
     use super::*;
 
-    fn names(kind: StateKind, all: &[&str]) -> StateNames {
-        let mut names = StateNames::default();
+    fn names(kind: StateKind, all: &[&str]) -> StateOrder {
+        let mut names = StateOrder::default();
         for name in all {
             names.add(kind, name);
         }
@@ -222,7 +230,7 @@ mod tests {
 
     #[test]
     fn known_names_have_colors_of_their_own() {
-        let none = StateNames::default();
+        let none = StateOrder::default();
         for (index, name) in EMOTIONS.iter().enumerate() {
             let look = state_look(StateKind::Emotion, name, &none);
             assert_eq!((look.class(), look.hatching), (format!("e{index}"), 0));

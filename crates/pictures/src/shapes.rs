@@ -6,7 +6,7 @@ use crate::palette::StateLook;
 /// Font of labels, pixels.
 pub(crate) const LABEL_PX: f64 = 10.5;
 /// Font of labels with little space, pixels.
-pub(crate) const SMALL_PX: f64 = 9.0;
+pub(crate) const SMALL_PX: f64 = 10.0;
 
 /// A place in a picture, pixels from its left and upper edge.
 pub(crate) type Pixel = (f64, f64);

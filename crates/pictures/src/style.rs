@@ -36,12 +36,7 @@ pub fn style() -> String {
         dark.push('\n');
     }
 
-    let [light, dark] = [(rules, false), (dark, true)].map(|(mut rules, is_dark)| {
-        for (name, color) in variables(is_dark) {
-            rules = rules.replace(&format!("var(--{name})"), color);
-        }
-        rules
-    });
+    let [light, dark] = [(rules, false), (dark, true)].map(|(rules, dark)| resolved(rules, dark));
     format!("{light}@media screen and (prefers-color-scheme:dark){{\n{dark}}}\n")
 }
 
@@ -55,6 +50,17 @@ pub(crate) fn sheet() -> String {
         }
         values
     });
+    format!(
+        ":root{{{light}color-scheme:light dark}}\n\
+         @media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}\n\
+         @media print{{:root{{color-scheme:light}}}}\n{PAGE}{}{}",
+        below(".chart", &chart_rules()),
+        style()
+    )
+}
+
+/// What charts have.
+fn chart_rules() -> String {
     let mut charts = [PICTURE, CHART, &classes(&STATES), &classes(&AMOUNTS)].concat();
     for index in 0..ARM_SHADES.len() {
         let color = format!("var(--a{index})");
@@ -63,14 +69,22 @@ pub(crate) fn sheet() -> String {
         let _ = writeln!(charts, ".mark.a{index}{{stroke:{color}}}");
         let _ = writeln!(charts, ".mark.hollow.a{index}{{fill:var(--paper)}}");
     }
+    charts
+}
 
-    format!(
-        ":root{{{light}color-scheme:light dark}}\n\
-         @media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}\n\
-         @media print{{:root{{color-scheme:light}}}}\n{PAGE}{}{}",
-        below(".chart", &charts),
-        style()
-    )
+/// The sheet of printed charts and diagrams: light, without variables.
+pub(crate) fn printed_sheet() -> String {
+    let diagrams = [PICTURE, DIAGRAM, &classes(&STATES)].concat();
+    let rules = below(".chart", &chart_rules()) + &below(".cars-diagram", &diagrams);
+    resolved(rules, false)
+}
+
+/// Rules with the values of their variables.
+fn resolved(mut rules: String, is_dark: bool) -> String {
+    for (name, color) in variables(is_dark) {
+        rules = rules.replace(&format!("var(--{name})"), color);
+    }
+    rules
 }
 
 /// Names of all colors with their values.

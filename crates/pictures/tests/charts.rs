@@ -8,12 +8,12 @@
 use std::collections::BTreeMap;
 
 use pictures::{
-    Band, BandRow, Bands, Cell, ChartPanel, Curve, CurveStep, Figure, Floor, IntervalRow,
+    Band, BandRow, Bands, Cell, Chart, ChartPanel, Curve, CurveStep, Figure, Floor, IntervalRow,
     Intervals, Matrix, MatrixCell, MatrixLabel, Page, PlottedEstimate, Steps, Table, Text, Trend,
     TrendLine, TrendPoint, state_look,
 };
 use roxmltree::{Document, Node, ParsingOptions};
-use timeline::{StateKind, StateNames};
+use timeline::{StateKind, StateOrder};
 
 /// A text that would leave its place if it were not escaped.
 const HOSTILE: &str = "</svg><script>alert(\"1\")</script>&amp;'\u{1b}[31m\u{202e}\u{0}]]>";
@@ -78,7 +78,7 @@ fn bands_are_as_many_as_the_states() {
             label: HOSTILE.to_owned(),
             bands,
         }],
-        names: StateNames::default(),
+        names: StateOrder::default(),
     };
     let svg = chart.draw();
     let document = parsed(&svg);
@@ -108,7 +108,7 @@ fn a_long_row_has_a_bounded_size() {
             label: "one".to_owned(),
             bands,
         }],
-        names: StateNames::default(),
+        names: StateOrder::default(),
     };
     let svg = chart.draw();
     parsed(&svg);
@@ -117,7 +117,7 @@ fn a_long_row_has_a_bounded_size() {
 
 #[test]
 fn a_matrix_has_a_cell_for_each_value() {
-    let names = StateNames::default();
+    let names = StateOrder::default();
     for size in [1, 3, 8, 24, 60] {
         let labels: Vec<MatrixLabel> = (0..size)
             .map(|index| MatrixLabel {
@@ -394,7 +394,7 @@ fn charts_of_nothing_are_drawn() {
         kind: StateKind::Emotion,
         end_s: 0.0,
         rows: Vec::new(),
-        names: StateNames::default(),
+        names: StateOrder::default(),
     };
     parsed(&bands.draw());
     let steps = Steps {
@@ -426,18 +426,21 @@ fn a_page_is_well_formed_and_loads_nothing() {
     let mut table = Table::new(&format!("{HOSTILE} | n"));
     table.row([HOSTILE.into(), Cell::Number(0.1 + 0.2, 1)]);
     table.row([Cell::Code(HOSTILE.to_owned()), Cell::Empty]);
+    let chart = Bands {
+        title: HOSTILE.to_owned(),
+        kind: StateKind::Emotion,
+        end_s: 1.0,
+        rows: Vec::new(),
+        names: StateOrder::default(),
+    };
     let figure = Figure {
-        panels: vec![ChartPanel {
-            heading: HOSTILE.to_owned(),
-            svg: String::new(),
-            is_wide: false,
-        }],
+        panels: vec![ChartPanel::new(HOSTILE, Chart::Bands(chart))],
         caption: Text::default().code(HOSTILE),
         table: Some(table),
     };
-    assert_eq!(page.figure(&figure), 1);
+    assert_eq!(page.figure(figure.clone()), 1);
     page.section("second");
-    assert_eq!(page.figure(&figure), 2);
+    assert_eq!(page.figure(figure), 2);
     page.file(HOSTILE, "a\n\u{7}<b>");
     page.commands(&["cars report 'a b'".to_owned()]);
     let html = page.finish();

@@ -593,10 +593,10 @@ fn heading_and_legend_fit_however_short_the_window_is() {
     ));
     let title = "a title of a run that is not short, seed 17";
 
-    for tick_px in [None, Some(3.0)] {
+    for width in [None, Some((720.0, 150))] {
         let options = DiagramOptions {
             title: title.to_owned(),
-            tick_px,
+            width,
             ..DiagramOptions::default()
         };
         let text = draw_with(&events, 5, 5, options).unwrap();

@@ -1,13 +1,13 @@
 //! The course of a run: its states over time and its space-time diagram.
 
-use pictures::{BandRow, Bands, ChartPanel, Course, CourseLine, Figure, round_range};
+use pictures::{BandRow, Bands, Chart, ChartPanel, CourseLine, Figure, TimeCourse, round_range};
 use protocol::{RobotName, Tick};
 use record::EpochFiles;
-use timeline::{StateKind, StateNames};
+use timeline::{StateKind, StateOrder};
 
 use super::facts::{COURSES, RobotFacts, RunFacts};
 use super::words::capitalized;
-use crate::diagram::{DiagramOptions, Window, draw};
+use crate::diagram::{DiagramOptions, Window, read};
 use lab::LabError;
 use lab::moment::Moment;
 
@@ -24,8 +24,8 @@ const MAX_LINES: Tick = 12;
 const MAX_LINES_OF_COURSE: usize = 24;
 /// No further line is drawn after this many bytes.
 const MAX_DIAGRAM_BYTES: usize = 400_000;
-/// Width of a line without the names at its left, pixels.
-const LINE_PX: f64 = 620.0;
+/// Width of a line, pixels: that of the page.
+const LINE_PX: f64 = 720.0;
 
 /// The course of a run: its emotions, and how strongly they are felt and what the robots have over time; `None` if it has nothing of it.
 pub(super) fn course_figure(facts: &RunFacts) -> Option<Figure> {
@@ -81,7 +81,7 @@ fn variable_panel(facts: &RunFacts, name: &str) -> Option<ChartPanel> {
         return None;
     }
 
-    let chart = Course {
+    let chart = TimeCourse {
         title: format!("{} over time", capitalized(name)),
         axis: name.to_owned(),
         end_s: facts.time_s(),
@@ -89,7 +89,7 @@ fn variable_panel(facts: &RunFacts, name: &str) -> Option<ChartPanel> {
         range: round_range(least, most, 3),
         lines,
     };
-    Some(ChartPanel::wide("", chart.draw()))
+    Some(ChartPanel::new("", Chart::Course(chart)))
 }
 
 /// The states of the robots of one run over time; `None` if they have none.
@@ -109,7 +109,7 @@ pub(super) fn state_panel(
     kind: StateKind,
     end_s: f64,
     heading: &str,
-    names: &StateNames,
+    names: &StateOrder,
 ) -> ChartPanel {
     let chart = Bands {
         title: format!("{} over time {heading}", states_in_words(kind)),
@@ -118,7 +118,7 @@ pub(super) fn state_panel(
         rows,
         names: names.clone(),
     };
-    ChartPanel::wide(heading, chart.draw())
+    ChartPanel::new(heading, Chart::Bands(chart))
 }
 
 /// What the states are.
@@ -162,16 +162,16 @@ pub(super) fn diagram_lines(
             has_style: false,
             has_legend: false,
             names: facts.names.clone(),
-            tick_px: Some(LINE_PX / length as f64),
+            width: Some((LINE_PX, length)),
             ..DiagramOptions::default()
         };
-        let svg = draw(files, window, options)?.svg;
-        bytes += svg.len();
-        lines.push(ChartPanel::wide("", svg));
+        let (diagram, _) = read(files, window, options)?;
+        bytes += diagram.to_svg().map_err(LabError::refused)?.len();
+        lines.push(diagram);
         next += length;
     }
     Ok(DiagramLines {
-        lines,
+        lines: ChartPanel::diagram(lines),
         last: facts.last_tick.min(next - 1),
     })
 }

@@ -41,8 +41,21 @@ pub struct Drawn {
 pub fn draw(
     files: &EpochFiles,
     window: Window,
-    mut options: DiagramOptions,
+    options: DiagramOptions,
 ) -> Result<Drawn, LabError> {
+    let (diagram, notes) = read(files, window, options)?;
+    let svg = diagram.to_svg().map_err(|error| {
+        LabError::refused(error).with_help("draw a part of the run with --from and --to")
+    })?;
+    Ok(Drawn { svg, notes })
+}
+
+/// Reads the diagram of an epoch, as [`draw`], with notes about what it lacks.
+pub(crate) fn read(
+    files: &EpochFiles,
+    window: Window,
+    mut options: DiagramOptions,
+) -> Result<(Diagram, Vec<String>), LabError> {
     let events = files.events.display();
     let mut record = Record::of_events(&files.events)?;
     let mut next = record.next_entry()?;
@@ -100,10 +113,7 @@ pub fn draw(
         ));
     }
 
-    let svg = diagram.to_svg().map_err(|error| {
-        LabError::refused(error).with_help("draw a part of the run with --from and --to")
-    })?;
-    Ok(Drawn { svg, notes })
+    Ok((diagram, notes))
 }
 
 /// Seed and length of a tick, simulated seconds, which the first event has.

@@ -6,7 +6,7 @@ use observe::{Measure, Measured};
 use pictures::{Cell, Figure, Page, Table, Text};
 use protocol::RunName;
 use record::{EpochFiles, RunFolder};
-use timeline::StateNames;
+use timeline::StateOrder;
 
 use super::answer::{answer, counts, sentences};
 use super::course::{READ_DIAGRAM, course_figure, diagram_lines};
@@ -70,7 +70,7 @@ pub fn of_experiment(folder: &Path) -> Result<Page, LabError> {
         && let Some(figure) = verdicts(&study)
     {
         page.section("Expectations");
-        page.figure(&figure);
+        page.figure(figure);
     }
     write_examples(&mut page, &study, folder);
     write_reproduction(&mut page, &study, folder, provenance.as_ref());
@@ -134,7 +134,7 @@ fn write_answer(page: &mut Page, study: &Study<'_>, first: Option<&Measure>) {
     }
 
     if let Some(measure) = first {
-        page.figure(&answer_figure(study, measure).1);
+        page.figure(answer_figure(study, measure).1);
     }
     page.paragraph(counts(study));
     for measure in study.measures() {
@@ -274,12 +274,12 @@ fn write_measure(
     if before.is_some() {
         page.remark("Figure 1 is of this measure, too.");
     }
-    for figure in &figures {
+    for figure in figures {
         page.figure(figure);
     }
     if has_distributions {
         page.begin_details(&format!("Distributions, figure {}", page.figures() + 1));
-        page.figure(&distributions(study, measure));
+        page.figure(distributions(study, measure));
         page.end_details();
     }
 }
@@ -309,7 +309,7 @@ fn write_examples(page: &mut Page, study: &Study<'_>, folder: &Path) {
              median of all runs of the arm {baseline}."
         ));
     }
-    let mut names = StateNames::default();
+    let mut names = StateOrder::default();
     for run in runs {
         let (name, outcome) = match run {
             Example::Typical => ("The typical run".to_owned(), found.map(|found| found.0)),
@@ -376,7 +376,7 @@ fn write_example(
     study: &Study<'_>,
     folder: &Path,
     (measure, outcome): (&Measure, &UnitOutcome),
-    names: &mut StateNames,
+    names: &mut StateOrder,
 ) {
     let measured = outcome
         .measures
@@ -408,7 +408,7 @@ fn write_course(
     page: &mut Page,
     study: &Study<'_>,
     outcome: &UnitOutcome,
-    names: &mut StateNames,
+    names: &mut StateOrder,
 ) -> Result<(), LabError> {
     let plan = &study.results.plan;
     let unit = plan.unit(outcome.unit);
@@ -444,7 +444,7 @@ fn write_course(
     }
 
     let all = figures.len();
-    for (index, figure) in figures.iter().enumerate() {
+    for (index, figure) in figures.into_iter().enumerate() {
         if page.size() > MAX_BYTES_OF_EXAMPLES {
             page.remark(format!(
                 "So that this page stays small, {} of this run are left out.",

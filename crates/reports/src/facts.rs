@@ -12,7 +12,7 @@ use record::EpochFiles;
 use record::Record;
 use recording::{RecordedTick, Recording, RecordingError};
 use timeline::{
-    Counts, LinkCounts, Period, RobotCounts, Span, StateKind, StateNames, StateSpan, Timeline,
+    Counts, LinkCounts, Period, RobotCounts, Span, StateKind, StateOrder, StateSpan, Timeline,
 };
 
 /// Parts of the floor along its longer side.
@@ -48,7 +48,7 @@ pub(super) struct RunFacts {
     /// The verdicts about expectations, in the order in which they were decided.
     pub(super) judged: Vec<JudgedFacts>,
     /// The emotions and behaviors of its robots.
-    pub(super) names: StateNames,
+    pub(super) names: StateOrder,
     /// Where the robots were, if it was recorded.
     pub(super) floors: BTreeMap<RobotName, Floor>,
     /// What is missing, a sentence each.

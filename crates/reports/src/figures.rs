@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use observe::Measure;
 use pictures::{
-    Cell, ChartPanel, Curve, CurveStep, Figure, Matrix, MatrixCell, MatrixLabel, Steps, Table,
-    decimals_for, fixed,
+    Cell, Chart, ChartPanel, Curve, CurveStep, Figure, Matrix, MatrixCell, MatrixLabel, Steps,
+    Table, decimals_for, fixed,
 };
 use protocol::messages::Verdict;
 use statistics::{Interval, ecdf};
@@ -52,7 +52,7 @@ pub(super) fn estimates(study: &Study<'_>, measure: &Measure) -> Figure {
             caption += &differences_in_words(study, measure, of);
         }
         panels("charts", trends, |(heading, trend)| {
-            ChartPanel::new(heading, trend.draw())
+            ChartPanel::new(heading, Chart::Trend(trend))
         })
     };
 
@@ -369,7 +369,7 @@ fn curves(
     chart: impl Fn(&str, Vec<Curve>) -> Steps,
 ) -> Figure {
     let (panels, sentence) = study.panels(measure, curve, |heading, curves| {
-        chart(heading, curves).draw()
+        Chart::Steps(chart(heading, curves))
     });
     Figure::new(panels, caption + &sentence, None)
 }
@@ -411,7 +411,7 @@ pub(super) fn heat_maps(study: &Study<'_>, measure: &Measure) -> Option<Figure> 
             columns: labels(&column_levels),
             cells,
         };
-        chart.panel(&of.name)
+        ChartPanel::new(&of.name, Chart::Matrix(chart))
     });
     let caption = format!(
         "{} by {rows} and {columns}, a map for each arm; darker is more. {}.{sentence}",
@@ -497,7 +497,7 @@ pub(super) fn verdicts(study: &Study<'_>) -> Option<Figure> {
             columns: study.conditions.iter().map(column).collect(),
             cells,
         };
-        chart.panel(name)
+        ChartPanel::new(name, Chart::Matrix(chart))
     });
     let caption = format!(
         "Verdicts about the expectations: runs that pass of those in which it was asked, and how many fail or are undecided \

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use pictures::{Cell, ChartPanel, Figure, Floor, Table};
+use pictures::{Cell, Chart, ChartPanel, Figure, Floor, Table};
 use protocol::RobotName;
 
 use super::facts::RunFacts;
@@ -37,7 +37,7 @@ pub(super) fn occupancy(runs: &[&RunFacts]) -> Option<Figure> {
     let floors = floors.into_iter().collect();
     let (panels, sentence) = panels("robots", floors, |(name, floor)| {
         add_row(&mut table, name, &floor);
-        ChartPanel::new(name.as_str(), floor.draw())
+        ChartPanel::new(name.as_str(), Chart::Floor(floor))
     });
     let mut caption = format!(
         "Where the robots were, from above: the time that the center of a robot spent in each part of the floor. Darkness grows \

@@ -36,13 +36,24 @@ pub(super) fn panels<T>(
 
 #[cfg(test)]
 mod tests {
+    use pictures::{Bands, Chart};
+    use timeline::{StateKind, StateOrder};
+
     use super::*;
 
     #[test]
     fn what_is_left_out_is_named() {
         let of_sizes = |what, sizes: Vec<usize>| {
-            let (panels, sentence) =
-                panels(what, sizes, |bytes| ChartPanel::new("", "x".repeat(bytes)));
+            let (panels, sentence) = panels(what, sizes, |bytes| {
+                let chart = Bands {
+                    title: "x".repeat(bytes),
+                    kind: StateKind::Emotion,
+                    end_s: 1.0,
+                    rows: Vec::new(),
+                    names: StateOrder::default(),
+                };
+                ChartPanel::new("", Chart::Bands(chart))
+            });
             (panels.len(), sentence)
         };
         let (count, sentence) = of_sizes("robots", vec![10, 10]);

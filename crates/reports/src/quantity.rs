@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use observe::Measure;
 use pictures::{
-    ChartPanel, IntervalRow, Intervals, PlottedEstimate, Trend, TrendLine, TrendPoint, round_range,
+    Chart, ChartPanel, IntervalRow, Intervals, PlottedEstimate, Trend, TrendLine, TrendPoint,
+    round_range,
 };
 
 use super::study::{CellPlace, FactorLine, Study, axis, drawn, is_shown, label};
@@ -156,7 +157,7 @@ impl Quantity {
                 reference: self.reference,
                 rows,
             };
-            chart.draw()
+            Chart::Intervals(chart)
         })
     }
 

@@ -8,7 +8,7 @@ use protocol::messages::{End, Variable};
 use protocol::time::{self, tick_seconds, time_s};
 use protocol::{RobotName, Tick};
 use record::{EpochFiles, RunFolder, Summary};
-use timeline::{LinkCounts, StateKind, StateNames};
+use timeline::{LinkCounts, StateKind, StateOrder};
 
 use super::course::{
     READ_DIAGRAM, course_figure, diagram_lines, run_panel, state_panel, states_in_words,
@@ -86,11 +86,11 @@ pub fn of_runs(folders: &[RunFolder]) -> Result<Page, LabError> {
     let facts: Vec<&RunFacts> = runs.iter().map(|run| &run.facts).collect();
     page.section("Transitions");
     for figure in transitions(&facts) {
-        page.figure(&figure);
+        page.figure(figure);
     }
     if let Some(figure) = occupancy(&facts) {
         page.section("Occupancy of the floor");
-        page.figure(&figure);
+        page.figure(figure);
     }
     write_disturbances(&mut page, &runs);
     write_expectations(&mut page, &runs);
@@ -100,7 +100,7 @@ pub fn of_runs(folders: &[RunFolder]) -> Result<Page, LabError> {
 
 /// Gives an emotion or a behavior the same color in the pictures of all runs.
 fn share_names(runs: &mut [ReportedRun]) {
-    let mut names = StateNames::default();
+    let mut names = StateOrder::default();
     for run in runs.iter() {
         names.add_all(&run.facts.names);
     }
@@ -301,7 +301,7 @@ fn write_states(page: &mut Page, runs: &[ReportedRun]) {
             [run] if kind == StateKind::Emotion => {
                 if let Some(mut figure) = course_figure(&run.facts) {
                     figure.table = Some(states_table(runs, kind));
-                    page.figure(&figure);
+                    page.figure(figure);
                 }
                 continue;
             }
@@ -321,11 +321,7 @@ fn write_states(page: &mut Page, runs: &[ReportedRun]) {
             states_in_words(kind),
             counted(runs.len(), "run")
         );
-        page.figure(&Figure::new(
-            panels,
-            caption,
-            Some(states_table(runs, kind)),
-        ));
+        page.figure(Figure::new(panels, caption, Some(states_table(runs, kind))));
     }
 }
 
@@ -417,7 +413,7 @@ fn write_diagrams(page: &mut Page, runs: &[ReportedRun]) {
             ));
             caption = caption.code(format!("cars diagram {path} --from {next}"));
         }
-        page.figure(&Figure::new(diagram.lines, caption, None));
+        page.figure(Figure::new(diagram.lines, caption, None));
     }
 
     if let Some(run) = runs.get(MAX_DIAGRAMS) {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
 use observe::{Measure, Measured};
-use pictures::{ChartPanel, PlottedEstimate};
+use pictures::{Chart, ChartPanel, PlottedEstimate};
 use statistics::CensoredTime;
 
 use super::limits::panels;
@@ -118,7 +118,7 @@ impl<'a> Study<'a> {
         &self,
         measure: &Measure,
         of: impl Fn(CellPlace) -> Option<T>,
-        draw: impl Fn(&str, Vec<T>) -> String,
+        draw: impl Fn(&str, Vec<T>) -> Chart,
     ) -> (Vec<ChartPanel>, String) {
         let mut shown = Vec::new();
         let mut zero = Vec::new();
@@ -134,8 +134,8 @@ impl<'a> Study<'a> {
             }
         }
         let (panels, mut sentence) = panels("conditions", shown, |(heading, of_arms)| {
-            let svg = draw(&heading, of_arms);
-            ChartPanel::new(heading, svg)
+            let chart = draw(&heading, of_arms);
+            ChartPanel::new(heading, chart)
         });
         if !zero.is_empty() {
             let what = match measure.is_time() {

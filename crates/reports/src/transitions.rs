@@ -2,9 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use pictures::{Cell, ChartPanel, Figure, Matrix, MatrixCell, MatrixLabel, Table, state_look};
+use pictures::{
+    Cell, Chart, ChartPanel, Figure, Matrix, MatrixCell, MatrixLabel, Table, state_look,
+};
 use protocol::RobotName;
-use timeline::{StateKind, StateNames};
+use timeline::{StateKind, StateOrder};
 
 use super::facts::RunFacts;
 use super::limits::panels;
@@ -55,7 +57,7 @@ fn figure(runs: &[&RunFacts], kind: StateKind, what: &str) -> Option<Figure> {
 fn matrix(
     name: &RobotName,
     title: String,
-    (kind, names): (StateKind, &StateNames),
+    (kind, names): (StateKind, &StateOrder),
     counts: &Counts,
     table: &mut Table,
 ) -> ChartPanel {
@@ -98,11 +100,11 @@ fn matrix(
         columns: labels,
         cells,
     };
-    chart.panel(name.as_str())
+    ChartPanel::new(name.as_str(), Chart::Matrix(chart))
 }
 
 /// The states of transitions: emotions of the paper from HAPPY up the ladder, others after them as they first occurred in the run.
-fn on_ladder<'a>(kind: StateKind, names: &StateNames, counts: &'a Counts) -> Vec<&'a str> {
+fn on_ladder<'a>(kind: StateKind, names: &StateOrder, counts: &'a Counts) -> Vec<&'a str> {
     let mut states = BTreeSet::new();
     for (from, to) in counts.keys() {
         for state in [from, to] {
@@ -114,17 +116,24 @@ fn on_ladder<'a>(kind: StateKind, names: &StateNames, counts: &'a Counts) -> Vec
 
 #[cfg(test)]
 mod tests {
-    use affect::{EmotionLabel, StandardEmotion};
-
     use super::*;
 
     #[test]
     fn emotions_are_in_the_order_of_the_ladder_and_others_as_they_occur() {
-        let mut names = StateNames::default();
+        let mut names = StateOrder::default();
         for name in ["ZEN", "BORED", "HAPPY"] {
             names.add(StateKind::Emotion, name);
         }
-        let ladder = StandardEmotion::ALL.map(EmotionLabel::name);
+        // That of `affect::StandardEmotion`.
+        let ladder = [
+            "HAPPY",
+            "CONFIDENT",
+            "CONCERNED",
+            "FRUSTRATED",
+            "ANGRY",
+            "DISCOURAGED",
+            "HOPEFUL",
+        ];
         let mut counts = Counts::new();
         for name in ["BORED", "ZEN"].into_iter().chain(ladder) {
             counts.insert((name.to_owned(), "HAPPY".to_owned()), 1);

@@ -6,7 +6,7 @@ use protocol::event::Cause;
 use protocol::messages::FaultKind;
 use protocol::{Event, RobotName, Seq, Tick};
 
-use crate::names::StateNames;
+use crate::names::StateOrder;
 use crate::span::{
     Absence, ChangeSpan, CommandEnd, CommandSpan, CutSpan, FaultSpan, Joined, MissedTicks, Period,
     QueriesLost, Span, StateKind, StateSpan,
@@ -23,7 +23,7 @@ pub struct Timeline {
     queries: BTreeMap<(RobotName, RobotName), QueriesLost>,
     /// The last change of each part of the scenario, by its path.
     set: BTreeMap<String, String>,
-    names: StateNames,
+    names: StateOrder,
 }
 
 /// What is in progress at a robot.
@@ -199,7 +199,7 @@ impl Timeline {
 
     /// The emotions and behaviors that the robots have had so far.
     #[must_use]
-    pub fn names(&self) -> &StateNames {
+    pub fn names(&self) -> &StateOrder {
         &self.names
     }
 

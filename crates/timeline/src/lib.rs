@@ -16,7 +16,7 @@ mod span;
 
 pub use counts::{Counts, LinkCounts, RobotCounts, StateCounts};
 pub use fold::Timeline;
-pub use names::StateNames;
+pub use names::StateOrder;
 pub use span::{
     Absence, ChangeSpan, CommandEnd, CommandSpan, CutSpan, FaultSpan, Joined, MissedTicks, Period,
     QueriesLost, Span, StateKind, StateSpan,

@@ -8,12 +8,12 @@ const MAX_NAMES: usize = 64;
 /// The names of the emotions and the behaviors of a run, each once, in the order in which they first occurred: so a name that is
 /// new changes nothing about those before it. The first 64 of each kind are kept.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct StateNames {
+pub struct StateOrder {
     emotions: Vec<String>,
     behaviors: Vec<String>,
 }
 
-impl StateNames {
+impl StateOrder {
     /// The names of a kind.
     #[must_use]
     pub fn of(&self, kind: StateKind) -> &[String] {

@@ -671,3 +671,70 @@ fn what_is_no_run_and_no_experiment_is_refused_by_name() {
     let (_, text) = lab.fails(&["report", "hall", folder]);
     assert!(text.contains("runs or one experiment"), "{text}");
 }
+
+#[test]
+fn figures_are_files_of_their_own_and_replace_nothing_unasked() {
+    let lab = Lab::new();
+    play(&lab, "hall", &["--duration", "60 s"]);
+    let folder = lab.out().join("figures");
+    let into = folder.to_str().unwrap();
+    let printed = lab.ok(&["report", "hall", "--figures", into]);
+    assert!(!printed.contains("<html"), "the page is not asked for");
+
+    let mut names: Vec<String> = std::fs::read_dir(&folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    // The course, behaviors, the diagram, transitions between emotions and between behaviors, and the floor.
+    let mut expected = Vec::new();
+    for number in 1..=6 {
+        for end in ["csv", "pdf", "svg", "vl.json"] {
+            expected.push(format!("figure-{number}.{end}"));
+        }
+    }
+    assert_eq!(names, expected);
+    let csv = std::fs::read_to_string(folder.join("figure-1.csv")).unwrap();
+    assert!(
+        csv.starts_with("panel,heading,row,state,from_s,to_s,robot,time_s,value\n"),
+        "{csv}"
+    );
+    let treats = csv.lines().filter(|line| line.ends_with(",30")).count();
+    assert!(treats > 0, "{csv}");
+    let number_of_figures = lab.ok(&["report", "hall"]).matches("<figure id=").count();
+    assert_eq!(
+        number_of_figures, 6,
+        "a figure has its number in the report"
+    );
+
+    let own = folder.join("figure-1.svg");
+    std::fs::write(&own, "mine").unwrap();
+    let (_, text) = lab.fails(&["report", "hall", "--figures", into]);
+    assert!(text.contains("is not empty"), "{text}");
+    assert_eq!(std::fs::read_to_string(&own).unwrap(), "mine");
+    let printed = lab.ok(&[
+        "report",
+        "hall",
+        "--figures",
+        into,
+        "--replace",
+        "--width-mm",
+        "120",
+    ]);
+    assert!(std::fs::read_to_string(&own).unwrap().starts_with("<svg"));
+    let narrow = "figure-1: 180 mm: narrower, its letters would be too small";
+    assert!(printed.contains(narrow), "{printed}");
+    let (_, text) = lab.fails(&[
+        "report",
+        "hall",
+        "--figures",
+        into,
+        "--replace",
+        "--width-mm",
+        "50",
+    ]);
+    assert!(text.contains("from 86 to 400 mm"), "{text}");
+    let run = lab.out().join("hall");
+    let (_, text) = lab.fails(&["report", "hall", "--figures", run.to_str().unwrap()]);
+    assert!(text.contains("is not empty"), "{text}");
+}

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use timeline::{StateKind, StateNames};
+use timeline::{StateKind, StateOrder};
 
 use crate::axis::draw_below;
 use crate::chart::{WIDE_PX, begin, end};
@@ -62,7 +62,7 @@ pub struct Bands {
     /// The rows, from top to bottom.
     pub rows: Vec<BandRow>,
     /// The emotions and behaviors of all that is shown together, which have their colors by it.
-    pub names: StateNames,
+    pub names: StateOrder,
 }
 
 impl Bands {

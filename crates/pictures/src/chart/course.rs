@@ -31,7 +31,7 @@ pub struct CourseLine {
 
 /// A chart of values over time.
 #[derive(Debug, Clone)]
-pub struct Course {
+pub struct TimeCourse {
     /// Name of the chart.
     pub title: String,
     /// Name and unit of the values.
@@ -46,7 +46,7 @@ pub struct Course {
     pub lines: Vec<CourseLine>,
 }
 
-impl Course {
+impl TimeCourse {
     /// The chart as SVG. Values that cannot be told apart are drawn as one.
     #[must_use]
     pub fn draw(&self) -> String {

@@ -3,7 +3,6 @@
 use crate::chart::{PANEL_PX, WIDE_PX, begin, end};
 use crate::labels::{shortened, widest_px, width_px};
 use crate::markup::Markup;
-use crate::page::ChartPanel;
 use crate::palette::{StateLook, level};
 use crate::shapes::{LABEL_PX, Pixel, SMALL_PX};
 
@@ -63,15 +62,6 @@ pub struct Matrix {
 }
 
 impl Matrix {
-    /// The chart as a panel, which is as wide as its numbers need.
-    #[must_use]
-    pub fn panel(&self, heading: impl Into<String>) -> ChartPanel {
-        ChartPanel {
-            is_wide: self.is_wide(),
-            ..ChartPanel::new(heading, self.draw())
-        }
-    }
-
     /// Whether its numbers need the width of the page.
     #[must_use]
     pub fn is_wide(&self) -> bool {

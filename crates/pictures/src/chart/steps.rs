@@ -160,7 +160,7 @@ impl Curve {
     }
 
     /// Share at a place.
-    fn at(&self, place: f64) -> f64 {
+    pub(crate) fn at(&self, place: f64) -> f64 {
         let next = self.steps.partition_point(|step| step.x <= place);
         match next.checked_sub(1) {
             Some(index) => self.steps[index].y,

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use protocol::{RobotName, Tick};
-use timeline::{StateNames, Timeline};
+use timeline::{StateOrder, Timeline};
 
 use crate::diagram::commands::{draw_commands, draw_queries, place_labels};
 use crate::diagram::cuts::draw_cuts;
@@ -44,9 +44,9 @@ pub struct DiagramOptions {
     /// Whether the picture has a legend of signs and colors. A legend on the page can be that of several pictures.
     pub has_legend: bool,
     /// Emotions and behaviors whose colors are taken: those of other pictures on the same page.
-    pub names: StateNames,
-    /// Width of a tick, pixels, so that several pictures have the same scale; without it the window decides.
-    pub tick_px: Option<f64>,
+    pub names: StateOrder,
+    /// Width of a picture of so many ticks, pixels, so that several pictures have the same scale; without it the window decides.
+    pub width: Option<(f64, Tick)>,
 }
 
 impl Default for DiagramOptions {
@@ -58,18 +58,19 @@ impl Default for DiagramOptions {
             max_width_px: 4800.0,
             has_style: true,
             has_legend: true,
-            names: StateNames::default(),
-            tick_px: None,
+            names: StateOrder::default(),
+            width: None,
         }
     }
 }
 
-/// The picture of a window, as SVG.
+/// The picture of a window, as SVG. `legend` is what it has a legend of, and in which window, if that is more than the picture.
 pub(crate) fn draw(
     timeline: &Timeline,
     items: &Items,
     window: VisibleTicks,
     options: &DiagramOptions,
+    legend: Option<(&Items, VisibleTicks)>,
 ) -> String {
     let heading = heading(window, options);
     let mut picture = begin(timeline, items, window, &heading, options);
@@ -84,10 +85,10 @@ pub(crate) fn draw(
     place_labels(&mut picture, &labels);
     draw_axis(&mut picture);
     picture.draw_labels();
-    let height = if options.has_legend {
-        draw_legend(&mut picture, items)
-    } else {
-        picture.lanes.bottom + AXIS_PX
+    let legend = legend.or(options.has_legend.then_some((items, window)));
+    let height = match legend {
+        Some((items, window)) => draw_legend(&mut picture, items, window),
+        None => picture.lanes.bottom + AXIS_PX,
     };
 
     finish(picture, height, &heading, options.has_style)
@@ -120,7 +121,9 @@ fn begin(
     let width = Width {
         least_px,
         most_px,
-        tick_px: options.tick_px,
+        tick_px: options.width.map(|(width_px, ticks)| {
+            (width_px - lanes.left_px - RIGHT_PX).max(100.0) / ticks as f64
+        }),
     };
     let scale = scale(
         (window.from, window.end()),

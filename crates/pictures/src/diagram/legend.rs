@@ -82,8 +82,8 @@ fn signs(window: VisibleTicks, items: &Items) -> Vec<(&'static str, Draw)> {
 }
 
 /// Draws the legend below the axis. Returns the lower end of the picture.
-pub(crate) fn draw_legend(picture: &mut Picture, items: &Items) -> f64 {
-    let signs = signs(picture.window, items);
+pub(crate) fn draw_legend(picture: &mut Picture, items: &Items, window: VisibleTicks) -> f64 {
+    let signs = signs(window, items);
     let names: Vec<&str> = signs.iter().map(|(name, _)| *name).collect();
     let y = picture.lanes.bottom + 50.0;
     let y = draw_entries(
@@ -96,21 +96,21 @@ pub(crate) fn draw_legend(picture: &mut Picture, items: &Items) -> f64 {
             (signs[index].1)(svg, x, y - 3.5);
         },
     );
-    let y = draw_colors(picture, items, StateKind::Emotion, "emotion", y);
-    draw_colors(picture, items, StateKind::Behavior, "behavior", y) - 4.0
+    let y = draw_colors(picture, (items, window), StateKind::Emotion, "emotion", y);
+    draw_colors(picture, (items, window), StateKind::Behavior, "behavior", y) - 4.0
 }
 
 /// Draws the colors of the states of a kind; returns where the next entries are.
 fn draw_colors(
     picture: &mut Picture,
-    items: &Items,
+    (items, window): (&Items, VisibleTicks),
     kind: StateKind,
     caption: &str,
     y: f64,
 ) -> f64 {
     let mut found = BTreeSet::new();
     for band in &items.bands {
-        if band.kind == kind && picture.window.clip(band.period).is_some() {
+        if band.kind == kind && window.clip(band.period).is_some() {
             let look = state_look(kind, &band.name, &picture.names);
             found.insert((look, shortened(&band.name, NAME_LETTERS)));
         }

@@ -1,7 +1,7 @@
 //! A picture that is being drawn: where ticks and robots are, and labels that are placed at the end.
 
 use protocol::{RobotName, Tick};
-use timeline::{Period, StateNames};
+use timeline::{Period, StateOrder};
 
 use crate::diagram::lanes::{Lane, Lanes};
 use crate::diagram::words::Titles;
@@ -75,7 +75,7 @@ pub(crate) struct Picture {
     pub(crate) window: VisibleTicks,
     pub(crate) titles: Titles,
     /// The emotions and behaviors of the run up to the end of the window, which have their colors by it.
-    pub(crate) names: StateNames,
+    pub(crate) names: StateOrder,
 }
 
 impl Picture {
@@ -85,7 +85,7 @@ impl Picture {
         scale: Scale,
         least_px: f64,
         window: VisibleTicks,
-        names: StateNames,
+        names: StateOrder,
     ) -> Self {
         let (left, right) = (scale.begin_px(), scale.end_px());
         let right_px = right.max(left + least_px);
