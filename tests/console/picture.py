@@ -30,10 +30,15 @@ def draw(folder, seed, ticks):
         address = start_console(processes, "--recording", folder / "hors_doeuvres")
         with sync_playwright() as playwright:
             browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-            page = browser.new_page(viewport={"width": 1280, "height": 760}, color_scheme="light", reduced_motion="reduce")
+            size = {"width": 1280, "height": 760}
+            context = browser.new_context(viewport=size, color_scheme="light", reduced_motion="reduce")
+            page = context.new_page()
             page.goto(address)
             plain = page.url
             for tick in ticks:
+                # One page may save no more than twenty files in a short time.
+                page.close()
+                page = context.new_page()
                 page.goto(f"{plain}#tick={tick}")
                 expect(page.get_by_test_id("tick")).to_have_text(str(tick))
                 with page.expect_download() as download:
