@@ -8,10 +8,9 @@ use clap::Args;
 use experiments::PLAN;
 use export::draft::{Draft, unwritable};
 use lab::folder::find;
-use pictures::{Page, WIDTHS_MM};
 use record::RunFolder;
 use record::names::LATEST;
-use reports::{of_experiment, of_runs};
+use reports::{Page, WIDTHS_MM, of_experiment, of_runs};
 use terminal::OutputError;
 
 use crate::errors::{Result, refusal};

@@ -16,4 +16,5 @@ mod transitions;
 mod words;
 
 pub use experiment::of_experiment;
+pub use pictures::{Page, WIDTHS_MM};
 pub use runs::{MAX_RUNS, of_runs};
