@@ -28,7 +28,7 @@ const HEAD: [&str; 5] = ["robot", "emotion", "behavior", "commands", "moves"];
 /// [`OutputError`] if the standard output cannot be written.
 pub(crate) fn print(summary: &Summary, folder: &Path) -> Result<(), OutputError> {
     let heading = heading(summary);
-    let table = terminal::table(HEAD, rows(summary), HEAD.len());
+    let table = terminal::table(HEAD, rows(summary), 1, HEAD.len());
     let mut text = format!("\n{heading}\n{table}");
     for line in verdicts(&summary.expectations) {
         text += &format!("\n{line}");

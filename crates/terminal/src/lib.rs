@@ -18,7 +18,7 @@ use clap::{Command, Parser};
 use clap_mangen::Man;
 use protocol::plain::{escape_report, escape_text};
 
-pub use table::table;
+pub use table::{table, wrapped};
 
 /// Exit status of a simulator that cannot listen because another process does at its address.
 pub const ADDRESS_TAKEN: u8 = 3;

@@ -30,9 +30,9 @@ pub(super) fn print_json(results: &Results) -> Result<()> {
 /// If the standard output cannot be written.
 pub(super) fn print(results: &Results) -> Result<()> {
     let experiment = &results.plan.experiment;
-    let compared = results.plan.compared();
+    let compared = terminal::wrapped(&results.plan.compared());
     let table = render(experiment, &results.estimates());
-    terminal::print(format_args!("{compared}\n{table}\n"))?;
+    terminal::print(format_args!("{compared}\n\n{table}\n"))?;
 
     let contrasts = results.contrasts();
     if let Some(contrast) = contrasts.first() {
@@ -208,5 +208,5 @@ fn table(head: Vec<String>, mut rows: Vec<Vec<String>>) -> String {
         }
     }
 
-    terminal::table(head, rows, 2)
+    terminal::table(head, rows, 2, 2)
 }
