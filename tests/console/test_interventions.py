@@ -127,6 +127,32 @@ def test_the_clock_goes_on_without_a_late_robot_and_waits_again(launched, open_p
     expect(effects).not_to_contain_text("goes on without Leguin")
 
 
+@pytest.mark.parametrize("kind, done", [("crash", "Start again"), ("hang", "Go on")])
+def test_a_robot_without_which_the_clock_went_on_can_be_let_go_on(launched, open_page, kind, done):
+    run = launched("--paused", "--duration", "120 s", "--speed", "5", "--set", "deadline=60 s")
+    page = open_page(run.address)
+    open_menu(page)
+    page.get_by_test_id("experiment-robot").select_option("Leguin")
+    # The launcher may not be connected yet: the order waits for it.
+    page.get_by_test_id(f"do-{kind}").click()
+    expect(page.get_by_test_id("message")).to_contain_text("with the next tick")
+    page.get_by_test_id("btn-start").click()
+    page.get_by_test_id("go-on-Leguin").click()
+    # At once, and not after the deadline.
+    eventually("ticks", lambda: run.status()["tick"] > 3, patience_s=10)
+    effects = page.get_by_test_id("effects")
+    effects.get_by_role("button", name=f"{done}:").click()
+    expect(page.get_by_test_id("panel-Leguin").get_by_test_id("presence")).to_have_text("returned")
+    expect(effects).not_to_contain_text(done)
+
+    page.get_by_test_id("speed").select_option("max")
+    expect(page.get_by_test_id("phase")).to_have_text("ended", ignore_case=True)
+    verified = run.verify()
+    assert verified.returncode == 0, verified.stdout + verified.stderr
+    faults = [(event["kind"], event["begins"]) for event in run.events() if event["event"] == "fault"]
+    assert faults == [(kind, True), (kind, False)]
+
+
 def test_a_robots_menu_opens_on_the_plan_and_by_a_key(launch, open_page, screenshots):
     run = launch(options=("--set", "guests.count=0"))
     for scheme in ("light", "dark"):

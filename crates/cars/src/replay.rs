@@ -67,6 +67,7 @@ pub(crate) fn replay(args: &ReplayArgs) -> Result<ExitCode> {
         run: run.clone(),
         speed: args.speed.0,
         is_paused: args.paused,
+        is_launched: false,
         stay: KeepAlive::Always,
         repeat_after: REPEAT_AFTER,
     };

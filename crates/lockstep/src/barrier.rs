@@ -388,13 +388,54 @@ impl<R, C> Barrier<R, C> {
         }
     }
 
-    /// Changes what the clock does about late robots.
+    /// Changes what the clock does about late robots. An open tick no longer waits for robots that cannot report, if the
+    /// clock goes on without them from now on.
     pub fn set_lateness(&mut self, lateness: LatePolicy, out: &mut Vec<BarrierOutput<R, C>>) {
         self.lateness = lateness;
-        // The tick that is open may have no deadline yet, if all robots were waited for.
-        if self.phase == BarrierPhase::Open {
-            self.set_timers(out);
+        if self.phase != BarrierPhase::Open {
+            return;
         }
+
+        // The tick that is open may have no deadline yet, if all robots were waited for.
+        self.set_timers(out);
+        let mut out_of_reach = Vec::new();
+        for (name, member) in &self.members {
+            if member.is_out(self.tick) {
+                out_of_reach.push(name.clone());
+            }
+        }
+        self.give_up_awaited(out_of_reach, out);
+    }
+
+    /// The process of this robot is known to be stopped: where the clock goes on without late robots, the open tick does not
+    /// wait for the deadline.
+    pub fn note_stopped(&mut self, robot: &RobotName, out: &mut Vec<BarrierOutput<R, C>>) {
+        if self.phase == BarrierPhase::Open {
+            self.give_up_awaited(vec![robot.clone()], out);
+        }
+    }
+
+    /// Gives up those of the robots for which the open tick waits although the clock goes on without late robots. They are
+    /// lost: ticks that follow do not wait for them either.
+    fn give_up_awaited(&mut self, robots: Vec<RobotName>, out: &mut Vec<BarrierOutput<R, C>>) {
+        // Where the tick is executed again, its record says who misses it.
+        if self.attendance.is_some() {
+            return;
+        }
+
+        for name in robots {
+            let goes_on = self.lateness.of(&name) == OnLate::Continue;
+            let Some(member) = self.members.get_mut(&name) else {
+                continue;
+            };
+            if goes_on && member.is_awaited() {
+                if member.miss(1, None) {
+                    self.membership.push(Membership::Lost(name.clone()));
+                }
+                self.stand_in(&name, out);
+            }
+        }
+        self.settle(out);
     }
 
     /// What the clock does about late robots.

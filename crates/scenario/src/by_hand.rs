@@ -62,6 +62,24 @@ impl Scenario {
         Ok(vec![words])
     }
 
+    /// The end, before a tick, of the last fault of a robot that the wall clock would end, in the words of the scenario.
+    ///
+    /// # Errors
+    /// In words, if the last fault of the robot does not last for a time of wall clock.
+    pub fn words_of_early_end(&self, robot: &RobotName, at: Tick) -> Result<Override, String> {
+        let mut faults = self.faults_at(at).to_vec();
+        let begun = faults
+            .iter_mut()
+            .filter(|fault| fault.robot == *robot && fault.at < at);
+        let last = begun.max_by_key(|fault| fault.at);
+
+        match last {
+            Some(last) if matches!(last.end, FaultEnd::After(_)) => last.end = FaultEnd::At(at),
+            _ => return Err(no_fault_holds(robot)),
+        }
+        words::faults(&faults, self.tick_s)
+    }
+
     /// A rule for late robots, or for one of them, in the words of the scenario.
     ///
     /// # Errors
@@ -266,7 +284,7 @@ impl Scenario {
             .iter()
             .position(|fault| fault.robot == *robot && fault.holds(at, false));
         let Some(index) = found else {
-            return Err(format!("no fault holds {robot}"));
+            return Err(no_fault_holds(robot));
         };
 
         if faults[index].at == at {
@@ -349,6 +367,10 @@ impl Scenario {
             restarted: Vec::new(),
         }
     }
+}
+
+fn no_fault_holds(robot: &RobotName) -> String {
+    format!("no fault holds {robot}")
 }
 
 /// What a fault does to a robot, as the end of a sentence about it.

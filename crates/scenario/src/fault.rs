@@ -44,7 +44,7 @@ impl Fault {
     }
 
     /// What is certain of the fault before a tick: one that has not ended by then may end in any way later.
-    pub fn before(&self, tick: Tick) -> Self {
+    fn before(&self, tick: Tick) -> Self {
         let end = match self.end {
             FaultEnd::At(end) if end >= tick => FaultEnd::Never,
             end => end,
@@ -53,6 +53,17 @@ impl Fault {
             end,
             ..self.clone()
         }
+    }
+
+    /// Whether a change before a tick can make this fault, which has begun, to another one.
+    pub fn may_become(&self, other: &Self, tick: Tick) -> bool {
+        let mut before = other.before(tick);
+        // The wall clock has not ended it yet, and now a tick does.
+        let is_ended_early = matches!(other.end, FaultEnd::At(end) if end >= tick);
+        if matches!(self.end, FaultEnd::After(_)) && is_ended_early {
+            before.end = self.end;
+        }
+        self.before(tick) == before
     }
 
     /// Whether the process is killed and started again at once.

@@ -149,6 +149,7 @@ fn run(args: &SimulatorArgs) -> Result<ExitCode, Box<dyn Error + Send + Sync>> {
         run: args.run.clone(),
         speed: args.speed.0,
         is_paused: args.paused,
+        is_launched: args.prepared || args.resume,
         stay: args.stay.map_or(KeepAlive::Never, KeepAlive::from),
         repeat_after: REPEAT_AFTER,
     };

@@ -269,6 +269,15 @@ impl Simulation {
         self.change_by_hand(&set)
     }
 
+    /// Ends the fault of a robot before the next tick that the wall clock would end, and without which the clock has gone on.
+    ///
+    /// # Errors
+    /// In words, if the last fault of the robot is not of that kind; nothing has changed then.
+    pub fn end_fault_for_a_time(&mut self, robot: &RobotName) -> Result<(), String> {
+        let words = self.scenario.words_of_early_end(robot, self.now + 1)?;
+        self.change_by_hand(&[words])
+    }
+
     /// Sets something in the scenario from the next tick on that has not begun, as a person wants it.
     ///
     /// # Errors

@@ -352,6 +352,30 @@ fn faults_are_ordered_for_the_next_tick_and_end_when_a_person_says_so() {
     assert_eq!(held[0].kind, FaultKind::Crash);
 }
 
+/// The process of a robot may be held longer than the scenario says: the clock has gone on without it.
+#[test]
+fn a_fault_for_a_time_is_ended_before_its_time() {
+    let mut simulation = Simulation::new(scenario(""), 1).unwrap();
+    let mut robots = Robots::of(&simulation);
+    simulation.init(&mut robots).unwrap();
+    let robot = name("B");
+    let none = simulation.end_fault_for_a_time(&robot);
+    assert_eq!(none.unwrap_err(), "no fault holds B");
+    simulation
+        .intervene(&fault(FaultKind::Crash, None))
+        .unwrap();
+    simulation.step(&mut robots).unwrap();
+    simulation.step(&mut robots).unwrap();
+
+    simulation.end_fault_for_a_time(&robot).unwrap();
+    let due = simulation.faults_due();
+    assert!(due.len() == 1 && !due[0].begins && due[0].robot == robot);
+    let twice = simulation.end_fault_for_a_time(&robot);
+    assert_eq!(twice.unwrap_err(), "no fault holds B");
+    simulation.step(&mut robots).unwrap();
+    assert!(simulation.faults_due().is_empty());
+}
+
 #[test]
 fn a_restart_is_over_at_once() {
     let mut simulation = Simulation::new(scenario(""), 1).unwrap();

@@ -206,6 +206,68 @@ fn going_on_without_a_late_robot_is_an_event_and_is_executed_again() {
     verified(&lab, run);
 }
 
+/// Also one that the clock waited for until a person did not want to: it goes on at once, and not after a deadline.
+#[test]
+fn a_robot_without_which_the_clock_went_on_is_let_go_on_by_hand() {
+    for (kind, done) in [("crash", "is killed"), ("hang", "is stopped")] {
+        let lab = Lab::new();
+        let run = format!("by-hand-without-{kind}");
+        let run = run.as_str();
+        let mut launch = paused(&lab, run, &["--set", "deadline=60 s"]);
+        lab.step(run, 5);
+        lab.ctl(run, &[kind, "Leguin"]);
+        lab.ctl(run, &["step", "5"]);
+        held_by_leguin(&lab, run);
+        lab.ctl(run, &["late", "continue", "--robot", "Leguin"]);
+        assert_eq!(lab.settled(run), 10, "{kind}");
+        let (_, again) = lab.fails(&["ctl", "crash", "Leguin", "--run", run]);
+        assert!(again.contains(&format!("{done} already")), "{again}");
+
+        lab.ctl(run, &["recover", "Leguin"]);
+        lab.step(run, 1);
+        let (_, again) = lab.fails(&["ctl", "recover", "Leguin", "--run", run]);
+        assert!(again.contains("no fault holds Leguin"), "{again}");
+        lab.ctl(run, &["start"]);
+        launch.finish();
+        nobody_is_left(run);
+
+        let begins = of_kind(&lab, run, "fault", "begins");
+        assert_eq!(begins.last().unwrap(), &(11, "false".to_owned()));
+        let missed = of_kind(&lab, run, "missed", "robot");
+        assert!(
+            missed.last().is_some_and(|(tick, _)| *tick == 10),
+            "{missed:?}"
+        );
+        let joined = of_kind(&lab, run, "joined", "generation");
+        assert!(joined.contains(&(11, "3".to_owned())), "{joined:?}");
+        verified(&lab, run);
+    }
+}
+
+#[test]
+fn a_robot_that_was_let_go_on_early_comes_back_when_a_killed_run_is_resumed() {
+    let lab = Lab::new();
+    let run = "by-hand-early";
+    let mut launch = paused(&lab, run, &["--set", "deadline=60 s"]);
+    lab.step(run, 5);
+    lab.ctl(run, &["crash", "Leguin"]);
+    lab.ctl(run, &["step", "5"]);
+    held_by_leguin(&lab, run);
+    lab.ctl(run, &["late", "continue", "--robot", "Leguin"]);
+    assert_eq!(lab.settled(run), 10);
+    lab.ctl(run, &["recover", "Leguin"]);
+    lab.step(run, 20);
+    send(launch.process("cars-sim"), Signal::SIGKILL);
+    assert!(!launch.wait().success());
+    nobody_is_left(run);
+
+    let resume = ["launch", "--no-console", "--resume", run, "--speed", "max"];
+    lab.ok(&resume);
+    let missed = of_kind(&lab, run, "missed", "robot");
+    assert!(missed.iter().all(|(tick, _)| *tick <= 10), "{missed:?}");
+    verified(&lab, run);
+}
+
 #[test]
 fn what_cannot_be_done_by_hand_is_refused_with_the_reason() {
     let lab = Lab::new();

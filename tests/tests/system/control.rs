@@ -324,6 +324,31 @@ fn orders_are_carried_out_whatever_a_launch_prints() {
     }
 }
 
+/// The launcher connects when the simulator listens, and a person may be faster.
+#[test]
+fn an_order_in_the_first_moments_of_a_launch_is_carried_out() {
+    let lab = Lab::new();
+    let run = "orders-first";
+    let args = ["launch", FILE, "--quiet", "--no-console", "--paused"];
+    let more = ["--speed", "max", "--duration", "30 s"];
+    let mut launch = lab.start(run, &[&args[..], &more].concat());
+    eventually("the simulator", || {
+        let output = lab.cars(&["ctl", "restart", "Leguin", "--run", run]);
+        let output = { output }.output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(!said.contains("no launcher"), "{said}");
+        output.status.success().then_some(())
+    });
+    lab.until_ready(run);
+    lab.ctl(run, &["start"]);
+    launch.finish();
+
+    let restarts = lab.events(run);
+    let mut restarts = restarts.iter().filter(|event| event["event"] == "fault");
+    assert!(restarts.all(|event| event["kind"] == "restart"));
+    lab.ok(&["verify", run]);
+}
+
 /// A run with orders by hand is resumed in the same way.
 #[test]
 fn a_run_with_orders_is_resumed_without_a_word_and_without_a_console() {

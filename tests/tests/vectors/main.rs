@@ -214,6 +214,7 @@ fn echo_over_zenoh() {
         run: run.clone(),
         speed: None,
         is_paused: true,
+        is_launched: false,
         stay: KeepAlive::Never,
         repeat_after: REPEAT_AFTER,
     };

@@ -575,6 +575,37 @@ fn a_deadline_is_set_where_a_robot_does_not_wait() {
 }
 
 #[test]
+fn a_tick_stops_waiting_for_a_robot_that_cannot_report_when_the_clock_is_to_go_on() {
+    for is_stopped in [false, true] {
+        let mut barrier = gathered(lateness(OnLate::Wait, 3));
+        open(&mut barrier, 0);
+        report(&mut barrier, "A", 0);
+        report(&mut barrier, "B", 0);
+        open(&mut barrier, 1);
+        report(&mut barrier, "A", 1);
+        if !is_stopped {
+            barrier.token(&name("B"), false, &mut Vec::new());
+        }
+
+        let mut out = Vec::new();
+        barrier.note_stopped(&name("B"), &mut out);
+        assert!(out.is_empty() && barrier.is_open());
+        barrier.set_lateness(lateness(OnLate::Continue, 3), &mut out);
+        if is_stopped {
+            assert!(barrier.is_open());
+            barrier.note_stopped(&name("B"), &mut out);
+        }
+        assert!(!barrier.is_open());
+        let lost = |output: &BarrierOutput<_, _>| match output {
+            BarrierOutput::Complete(outcome) => Some(outcome.membership.clone()),
+            _ => None,
+        };
+        let lost: Vec<_> = out.iter().filter_map(lost).collect();
+        assert_eq!(lost, [vec![Membership::Lost(name("B"))]]);
+    }
+}
+
+#[test]
 fn a_run_that_is_over_admits_no_robot() {
     let mut barrier = gathered(lateness(OnLate::Wait, 1));
     open(&mut barrier, 0);

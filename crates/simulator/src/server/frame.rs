@@ -8,12 +8,17 @@ use crate::simulation::Simulation;
 /// In every tick the clock waits a short time for each robot.
 const LATE_S: f64 = 0.5;
 
-/// The field now, without flights.
-pub(super) fn frame(simulation: &Simulation, status: &Status) -> WorldFrame {
+/// The field now, without flights. `held` are robots whose processes are killed or stopped for a time, and without which the clock
+/// may have gone on.
+pub(super) fn frame(
+    simulation: &Simulation,
+    status: &Status,
+    held: impl IntoIterator<Item = RobotName>,
+) -> WorldFrame {
     let world = simulation.world();
     let scenario = simulation.scenario();
 
-    let mut late = Vec::new();
+    let mut late: Vec<RobotName> = held.into_iter().collect();
     for awaited in &status.awaiting {
         if awaited.since_s > LATE_S {
             late.push(awaited.name.clone());

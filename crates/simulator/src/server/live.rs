@@ -174,7 +174,7 @@ impl Server<LiveRun> {
             outputs: Vec::new(),
             timers: Timers::default(),
             departed: Departed::default(),
-            orders: Orders::new(bus.publisher(&keys.faults())?),
+            orders: Orders::new(bus.publisher(&keys.faults())?, options.is_launched),
             with_bodies: BTreeSet::new(),
             epoch: LiveEpoch::begin(scenario, number, folder, &frontend, replay_log)?,
             pause_at: 0,
@@ -234,6 +234,7 @@ impl TickSource for LiveRun {
     }
 
     fn advance(&mut self, frontend: &mut Frontend) -> Result<Next, EpochStop> {
+        let early = self.handle_early(frontend)?;
         if self.epoch.record.is_closed() {
             return Ok(self.linger()?);
         }
@@ -262,7 +263,10 @@ impl TickSource for LiveRun {
         }
 
         match self.open_next_tick(frontend)? {
-            Next::Wait(rest) => Ok(Next::Wait(rest.into_iter().chain(standby).min())),
+            Next::Wait(rest) => {
+                let looks = rest.into_iter().chain(standby).chain(early);
+                Ok(Next::Wait(looks.min()))
+            }
             next @ Next::GoOn => Ok(next),
         }
     }

@@ -16,6 +16,8 @@ pub struct ServerOptions {
     pub speed: Option<f64>,
     /// Whether the clock waits for `start` once every robot is connected.
     pub is_paused: bool,
+    /// Whether a launcher has started the process: it is about to connect, and stops and starts robots' processes.
+    pub is_launched: bool,
     /// Whether the process stays when the run is over.
     pub stay: KeepAlive,
     /// While the clock is held it is repeated this often; [`REPEAT_AFTER`] unless a test is in a hurry.

@@ -6,8 +6,9 @@ use bus::Query;
 use protocol::messages::{Control, ControlAnswer, FaultKind, Intervention, OnLate, Phase, Setup};
 use protocol::{Epoch, RobotName};
 
-use super::control::execute;
+use super::control::{execute, on_control};
 use super::event::EpochStop;
+use super::faults::POLL_INTERVAL;
 use super::frontend::{Frontend, answer, refuse, refused};
 use super::live::{LiveRun, WaitsFor};
 use super::source::TickSource;
@@ -45,8 +46,34 @@ impl LiveRun {
                 self.defer(query);
                 Ok(())
             }
+            Control::Intervene { what } if self.awaits_launcher(what) => {
+                self.orders.early.push(query);
+                Ok(())
+            }
             other => execute(query, other, self, frontend),
         }
+    }
+
+    /// Whether a request is for a launcher that has started this simulator, and that has not subscribed yet.
+    fn awaits_launcher(&self, what: &Intervention) -> bool {
+        let is_to_come =
+            self.orders.is_launcher_to_come() && self.orders.early.len() < MAX_DEFERRED;
+        is_to_come && concerns_processes(what) && self.check_interventions().is_ok()
+    }
+
+    /// Handles the requests that have waited for the launcher, if they need not wait any more. Returns how long to wait before
+    /// looking again; `None` if there are none.
+    pub(super) fn handle_early(
+        &mut self,
+        frontend: &mut Frontend,
+    ) -> Result<Option<Duration>, EpochStop> {
+        if self.orders.early.is_empty() || self.orders.is_launcher_to_come() {
+            return Ok((!self.orders.early.is_empty()).then_some(POLL_INTERVAL));
+        }
+        for query in std::mem::take(&mut self.orders.early) {
+            on_control(query, self, frontend)?;
+        }
+        Ok(None)
     }
 
     pub(super) fn on_action(&mut self, control: &Control) -> Result<(), String> {
@@ -129,6 +156,9 @@ impl LiveRun {
             lateness.deadline = Duration::try_from_secs_f64(deadline_s).unwrap_or(Duration::MAX);
         }
         self.barrier.set_lateness(lateness, &mut self.outputs);
+        for robot in self.robots_held_for_a_time() {
+            self.barrier.note_stopped(&robot, &mut self.outputs);
+        }
         Ok(())
     }
 
@@ -146,17 +176,7 @@ impl LiveRun {
         // Refused before anything is looked at: while the record is executed again, nothing may differ
         // from it.
         self.check_interventions()?;
-        let concerns_processes = match what {
-            Intervention::Fault { .. } | Intervention::Recover { .. } => true,
-            Intervention::Set { set } => {
-                let mut set = set.iter();
-                set.any(|one| one.starts_with("fault") || one.starts_with("robot"))
-            }
-            Intervention::Cut { .. } | Intervention::Heal { .. } | Intervention::Lose { .. } => {
-                false
-            }
-        };
-        if concerns_processes && !self.orders.publisher.has_subscribers() {
+        if concerns_processes(what) && !self.orders.publisher.has_subscribers() {
             return Err(
                 "no launcher is connected that could stop or start processes: start the run by `cars launch`"
                     .to_owned(),
@@ -172,12 +192,35 @@ impl LiveRun {
             return order.map_err(|error| error.to_string());
         }
         if let Intervention::Fault { robot, .. } = what
-            && let Some(kind) = self.fault_that_holds_clock(robot)
+            && let Some(kind) = self
+                .fault_that_holds_clock(robot)
+                .or_else(|| self.fault_for_a_time(robot))
         {
             let kind = kind_in_words(kind);
             return Err(format!("{robot} {kind} already: let it go on first"));
         }
+        // The clock has gone on without the robot, so for the scenario its fault may be over: its process knows nothing of that.
+        if let Intervention::Recover { robot } = what
+            && self.fault_for_a_time(robot).is_some()
+        {
+            return self.epoch.simulation.end_fault_for_a_time(robot);
+        }
         self.epoch.simulation.intervene(what)
+    }
+
+    /// Robots whose processes the launcher keeps killed or stopped for a time, and that are not back.
+    pub(super) fn robots_held_for_a_time(&self) -> Vec<RobotName> {
+        let roster = self.barrier.roster();
+        roster
+            .filter(|robot| self.fault_for_a_time(robot).is_some())
+            .cloned()
+            .collect()
+    }
+
+    fn fault_for_a_time(&self, robot: &RobotName) -> Option<FaultKind> {
+        let fault = self.orders.holding_for_a_time(robot)?;
+        let is_awaited = self.barrier.awaited().iter().any(|(name, _)| name == robot);
+        (is_awaited || !self.barrier.is_back(robot)).then_some(fault)
     }
 
     /// The fault of a robot because of which the clock waits for it: only the wall clock, or a person, ends that.
@@ -224,6 +267,18 @@ impl LiveRun {
 
         self.show(frontend);
         Ok(())
+    }
+}
+
+/// Whether the launcher may have to do something for an intervention.
+fn concerns_processes(what: &Intervention) -> bool {
+    match what {
+        Intervention::Fault { .. } | Intervention::Recover { .. } => true,
+        Intervention::Set { set } => {
+            let mut set = set.iter();
+            set.any(|one| one.starts_with("fault") || one.starts_with("robot"))
+        }
+        Intervention::Cut { .. } | Intervention::Heal { .. } | Intervention::Lose { .. } => false,
     }
 }
 

@@ -251,9 +251,10 @@ impl LiveRun {
             tracing::debug!("{error}");
         }
         let status = self.status(frontend);
+        let held = self.robots_held_for_a_time();
         frontend
             .observers
-            .put(frame(&self.epoch.simulation, &status));
+            .put(frame(&self.epoch.simulation, &status, held));
     }
 
     /// The clock is held: tells people for which robots, and answers a client that waits for a step.
