@@ -107,6 +107,23 @@ def open_page(browser, launch, launched, processes):
     assert errors == []
 
 
+@pytest.fixture
+def open_quietly(browser):
+    """Opens pages of consoles that go: their browsers log that a connection is lost."""
+    contexts = []
+
+    def open_at(address, scheme="light", width=1440):
+        contexts.append(browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme))
+        page = contexts[-1].new_page()
+        page.goto(address)
+        return page
+
+    yield open_at
+
+    for context in contexts:
+        context.close()
+
+
 @pytest.fixture(scope="session")
 def screenshots():
     SCREENSHOTS.mkdir(parents=True, exist_ok=True)

@@ -12,23 +12,6 @@ from lab import BIN, eventually
 pytestmark = pytest.mark.thorough
 
 
-@pytest.fixture
-def open_quietly(browser):
-    """Opens pages of consoles that go: their browsers log that a connection is lost."""
-    contexts = []
-
-    def open_at(address, scheme="light", width=1440):
-        contexts.append(browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme))
-        page = contexts[-1].new_page()
-        page.goto(address)
-        return page
-
-    yield open_at
-
-    for context in contexts:
-        context.close()
-
-
 def ready(page):
     expect(page.get_by_test_id("phase")).to_have_text("ready", ignore_case=True)
 

@@ -280,7 +280,7 @@ function drawBar() {
 
   box("gone").hidden = isEmpty || isRecording() || store.isLive || store.stranger !== null || store.failed !== null;
   box("gone").textContent = store.isConnected
-    ? "The simulator is disconnected. This is its last frame."
+    ? `The simulator is disconnected. This is its last frame. If it was killed, this goes on after the last recorded tick: cars launch --resume ${store.run}`
     : "The console is not reachable. This is the last frame.";
 
   document.title = store.run ? `${store.run} · CARS` : "CARS";

@@ -10,6 +10,7 @@
 /**
  * What the server sends.
  * @typedef {{type: "hello", mode: "live" | "recording", run: string, endpoint?: string, version: string}
+ *   | {type: "beat", at_ms: number}
  *   | {type: "simulator", present: boolean}
  *   | {type: "frame", frame: WorldFrame}
  *   | {type: "panel", robot: string, panel: TickPanel}
@@ -19,13 +20,21 @@
  */
 
 /** Why a run has failed, and the command by which it goes on. @typedef {{text: string, lines: string[], log: string, command: string}} Failed */
-/** Messages that do not answer a request. @typedef {Exclude<ServerMessage, {type: "answer"}>} Broadcast */
+/** Messages for the store. @typedef {Exclude<ServerMessage, {type: "answer" | "beat"}>} Broadcast */
 /** The first message of a server. @typedef {Extract<ServerMessage, {type: "hello"}>} Hello */
 /** @typedef {{resolve: (answer: ControlAnswer) => void, timer: number}} Pending */
 
 const FIRST_PAUSE_MS = 500;
 const LONGEST_PAUSE_MS = 8000;
 const ANSWER_TIMEOUT_MS = 15000;
+/** The server sends a beat every half second. Without a message for this long the connection is lost; `browser.rs` carries out no
+ * request that may be older. */
+const SILENCE_MS = 2500;
+/** Over a slow link one message may take longer: after each loss by silence twice as long is waited, up to this. */
+const LONGEST_SILENCE_MS = 20000;
+const LOOK_EVERY_MS = 100;
+/** This page did not run for a while: what has arrived meanwhile is yet to be read. */
+const OVERSLEPT_MS = 1000;
 
 /** Another run at the address of this page; without a name if the server there refuses this browser. @typedef {{run: string | null}} Stranger */
 
@@ -51,6 +60,13 @@ export class Connection {
     this.pending = new Map();
     this.lastId = 0;
     this.pause_ms = FIRST_PAUSE_MS;
+    this.silence_ms = SILENCE_MS;
+    /** When something was heard last, or the attempt to connect began, in the time of `performance.now()`. */
+    this.heardAt_ms = 0;
+    this.lookedAt_ms = 0;
+    /** The server's time in its newest beat. @type {number | undefined} */
+    this.beat_ms = undefined;
+    window.setInterval(() => this.look(), LOOK_EVERY_MS);
   }
 
   /** Connects, and reconnects whenever the connection is lost. */
@@ -60,18 +76,39 @@ export class Connection {
 
     const socket = new WebSocket(url);
     this.socket = socket;
+    this.heardAt_ms = performance.now();
+    this.beat_ms = undefined;
     let wasOpen = false;
 
+    // A connection that was given up has no say any more.
+    const isCurrent = () => this.socket === socket;
     socket.addEventListener("open", () => {
       wasOpen = true;
-      this.pause_ms = FIRST_PAUSE_MS;
+      if (isCurrent()) this.pause_ms = FIRST_PAUSE_MS;
     });
 
-    socket.addEventListener("message", (event) => this.receive(String(event.data)));
+    socket.addEventListener("message", (event) => {
+      if (isCurrent()) this.receive(String(event.data));
+    });
     socket.addEventListener("close", () => {
+      if (!isCurrent()) return;
       this.closed();
       if (!wasOpen) this.explainIfRefused();
     });
+  }
+
+  /** Gives up a connection that is silent: it would be closed after minutes only. */
+  look() {
+    const now_ms = performance.now();
+    const hasSlept = now_ms - this.lookedAt_ms > OVERSLEPT_MS;
+    this.lookedAt_ms = now_ms;
+    if (hasSlept) this.heardAt_ms = now_ms;
+    const socket = this.socket;
+    if (!socket || now_ms - this.heardAt_ms < this.silence_ms) return;
+
+    this.silence_ms = Math.min(this.silence_ms * 2, LONGEST_SILENCE_MS);
+    this.closed();
+    socket.close();
   }
 
   /**
@@ -107,7 +144,7 @@ export class Connection {
 
     const socket = this.socket;
     if (!socket || socket.readyState !== WebSocket.OPEN) {
-      return Promise.resolve(refused("The console server is not reachable; the page reconnects by itself."));
+      return Promise.resolve(refused("The console server is not reachable, and nothing was sent; the page reconnects by itself."));
     }
 
     const id = ++this.lastId;
@@ -117,7 +154,7 @@ export class Connection {
         this.settle(id, refused("No answer from the simulator in 15 seconds."));
       }, ANSWER_TIMEOUT_MS);
       this.pending.set(id, { resolve, timer });
-      socket.send(JSON.stringify({ ...message, id }));
+      socket.send(JSON.stringify({ ...message, id, heard_ms: this.beat_ms }));
     });
   }
 
@@ -125,6 +162,13 @@ export class Connection {
   receive(text) {
     /** @type {ServerMessage} */
     const message = JSON.parse(text);
+    this.heardAt_ms = performance.now();
+    if (message.type === "beat") {
+      // A second beat in time: the link is fast enough again.
+      if (this.beat_ms !== undefined) this.silence_ms = SILENCE_MS;
+      this.beat_ms = message.at_ms;
+      return;
+    }
     if (message.type === "hello") this.greet(message);
     if (this.stranger) return;
     if (message.type === "frame" || this.shown?.mode === "recording") this.hasContent = true;
@@ -183,10 +227,11 @@ export class Connection {
   }
 
   closed() {
+    this.socket = null;
     this.onConnection(false);
 
     for (const id of [...this.pending.keys()]) {
-      this.settle(id, refused("The connection was lost before an answer arrived."));
+      this.settle(id, refused("The connection was lost before an answer arrived. What was not done by then is not done later."));
     }
 
     window.setTimeout(() => this.open(), this.pause_ms);

@@ -18,7 +18,7 @@ use crate::app::{App, Ending, MAX_BROWSERS, Mode};
 use crate::failed::Failed;
 use crate::feed::Cursor;
 use crate::live::{Live, Viewer};
-use crate::page::{PageMessage, RequestId, ServerMessage};
+use crate::page::{PageMessage, RequestHead, ServerMessage};
 
 /// Largest message of a page, bytes: a scenario of 1 MiB, and the JSON around it.
 pub(crate) const MAX_BYTES: usize = (1 << 20) + 1024;
@@ -28,6 +28,11 @@ const MAX_PLAIN_BYTES: usize = 64 << 10;
 const STALL_TIMEOUT: Duration = Duration::from_secs(30);
 /// Time without a ping after which one is sent.
 const PING_INTERVAL: Duration = Duration::from_secs(5);
+/// Time between two beats. `connection.js` expects a message within [`MAX_REQUEST_AGE`].
+const BEAT_INTERVAL: Duration = Duration::from_millis(500);
+/// A request is not carried out if the page may have sent it earlier than this: after as long without a message the page takes
+/// the connection for lost, and tells people so.
+const MAX_REQUEST_AGE: Duration = Duration::from_millis(2500);
 /// How long to wait for a browser's close frame.
 const CLOSE_TIMEOUT: Duration = Duration::from_secs(1);
 /// Batches that may be sent before the browser answers the ping of the first one.
@@ -96,10 +101,12 @@ struct Browser {
     batches_sent: u64,
     /// Number of the last batch whose ping was answered.
     batches_acknowledged: u64,
+    opened_at: Instant,
     last_received: Instant,
     next_batch: Instant,
     next_request: Instant,
     next_ping: Instant,
+    next_beat: Instant,
 }
 
 /// A browser's view of a run in progress.
@@ -156,10 +163,12 @@ impl Browser {
             requests: Arc::new(Semaphore::new(MAX_REQUESTS)),
             batches_sent: 0,
             batches_acknowledged: 0,
+            opened_at: now,
             last_received: now,
             next_batch: now,
             next_request: now,
             next_ping: now + PING_INTERVAL,
+            next_beat: now,
         }
     }
 
@@ -185,6 +194,7 @@ impl Browser {
                     self.send_text(text).await?;
                 }
                 () = sleep_until(self.next_ping) => self.check_liveness().await?,
+                () = sleep_until(self.next_beat) => self.beat().await?,
                 () = self.ending.reached() => {
                     return Err(Disconnect::closed(close_code::AWAY, "the console ends"));
                 }
@@ -247,6 +257,13 @@ impl Browser {
         self.send(Message::Ping(payload)).await
     }
 
+    async fn beat(&mut self) -> Result<(), Disconnect> {
+        self.next_beat = Instant::now() + BEAT_INTERVAL;
+        let at_ms = u64::try_from(self.opened_at.elapsed().as_millis()).unwrap_or(u64::MAX);
+        let text = ServerMessage::Beat { at_ms }.text();
+        self.send_text(text).await
+    }
+
     async fn check_liveness(&mut self) -> Result<(), Disconnect> {
         if self.last_received.elapsed() > STALL_TIMEOUT {
             return Err(Disconnect::Stalled);
@@ -287,12 +304,18 @@ impl Browser {
     }
 
     async fn on_text(&mut self, text: &str) -> Result<(), Disconnect> {
+        let head: RequestHead = serde_json::from_str(text).unwrap_or_default();
+        // The time is this process's own, which goes on also while the process is stopped.
+        let heard_at = head.heard_ms.map(Duration::from_millis);
+        let age = heard_at.map(|heard_at| self.opened_at.elapsed().saturating_sub(heard_at));
+        if let Some(age) = age.filter(|age| *age > MAX_REQUEST_AGE) {
+            return self.decline(head.id, too_old(age)).await;
+        }
         let message: PageMessage = match serde_json::from_str(text) {
             Ok(message) => message,
             Err(error) => {
-                let id = id_of_malformed(text);
                 return self
-                    .decline(id, format!("malformed request: {error}"))
+                    .decline(head.id, format!("malformed request: {error}"))
                     .await;
             }
         };
@@ -358,9 +381,9 @@ async fn next_failure(failed: &mut watch::Receiver<Option<Arc<Failed>>>) -> Arc<
     std::future::pending().await
 }
 
-fn id_of_malformed(text: &str) -> Option<u64> {
-    let request: RequestId = serde_json::from_str(text).unwrap_or_default();
-    request.id
+fn too_old(age: Duration) -> String {
+    let age_s = age.as_secs_f64();
+    format!("the request was up to {age_s:.1} s on its way, and was not carried out: ask again")
 }
 
 fn too_large(len: usize) -> Disconnect {

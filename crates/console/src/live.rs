@@ -23,8 +23,6 @@ use crate::feed::Feed;
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(1);
 /// Pause between two attempts.
 const CONNECT_RETRY: Duration = Duration::from_millis(200);
-/// How long to wait for a reply of the simulator, which replies to everything but `step` at once.
-const REPLY_TIMEOUT: Duration = Duration::from_secs(5);
 /// How long to wait for the reply to `step`, which comes when its ticks are complete.
 const STEP_TIMEOUT: Duration = Duration::from_secs(600);
 /// How long a request waits for a simulator that the console has not found yet. Both start at the same time, and a page
@@ -69,6 +67,8 @@ pub(crate) struct Live {
     connect: String,
     keys: Keys,
     feed: Feed,
+    /// How long to wait for a reply of the simulator, which replies to everything but `step` at once.
+    reply_timeout: Duration,
     /// When the console began to look for the simulator.
     started_at: Instant,
     /// Set when the simulator has been reached.
@@ -108,7 +108,7 @@ impl Drop for Viewer {
 }
 
 impl Live {
-    /// Begins to connect to the simulator of `run`, which may start later.
+    /// Begins to connect to the simulator of `run`, which may start later. Requests wait for its reply for `reply_timeout`.
     ///
     /// # Errors
     /// The configuration file cannot be read, or a thread cannot be started.
@@ -116,13 +116,14 @@ impl Live {
         run: RunName,
         connect: String,
         config: Option<PathBuf>,
+        reply_timeout: Duration,
     ) -> Result<Arc<Self>, String> {
         if let Some(file) = &config {
             std::fs::metadata(file).map_err(|error| format!("{}: {error}", file.display()))?;
         }
 
         let (queue, samples) = sync_channel(MAX_QUEUED_SAMPLES);
-        let live = Arc::new(Self::new(run, connect, queue));
+        let live = Arc::new(Self::new(run, connect, reply_timeout, queue));
 
         let decoder = live.clone();
         spawn("decoder", move || decoder.decode_all(&samples))?;
@@ -132,8 +133,14 @@ impl Live {
         Ok(live)
     }
 
-    fn new(run: RunName, connect: String, queue: SyncSender<Sample>) -> Self {
+    fn new(
+        run: RunName,
+        connect: String,
+        reply_timeout: Duration,
+        queue: SyncSender<Sample>,
+    ) -> Self {
         Self {
+            reply_timeout,
             keys: Keys::new(&run),
             run,
             connect,
@@ -212,7 +219,7 @@ impl Live {
         let timeout = if matches!(control, Control::Step { .. }) {
             STEP_TIMEOUT
         } else {
-            REPLY_TIMEOUT
+            self.reply_timeout
         };
         self.query(control, timeout)
     }
@@ -239,7 +246,7 @@ impl Live {
             .map_err(|error| error.to_string())?;
 
         // On one session the command arrives before this query: the answer means that the simulator has it.
-        let answer = self.query(&Control::Status, REPLY_TIMEOUT)?;
+        let answer = self.query(&Control::Status, self.reply_timeout)?;
         match &answer {
             ControlAnswer::Done(status) if status.replay_of.is_some() => {
                 Err("this is a replay: its robots execute no commands".to_owned())
@@ -510,7 +517,7 @@ impl Live {
 
     /// Queries the lines of the log that were put before this console could receive them.
     fn request_log(&self) {
-        let lines = match self.query(&Control::Log, REPLY_TIMEOUT) {
+        let lines = match self.query(&Control::Log, self.reply_timeout) {
             Ok(ControlAnswer::Log { lines }) => Some(lines),
             other => {
                 tracing::warn!("the log so far is not told: {other:?}");
@@ -532,7 +539,7 @@ impl Live {
         let mut retry = FRAME_RETRY;
 
         while self.lacks_frame(&self.lock(), frames_before) {
-            if let Err(error) = self.query(&Control::Status, REPLY_TIMEOUT) {
+            if let Err(error) = self.query(&Control::Status, self.reply_timeout) {
                 tracing::debug!("requested a frame: {error}");
             }
 

@@ -77,6 +77,15 @@ struct ConsoleArgs {
     /// Open the page in a browser.
     #[arg(long)]
     open: bool,
+    /// How long to wait for a reply of the simulator, seconds.
+    #[arg(
+        long,
+        env = "CARS_CONSOLE_REPLY_TIMEOUT",
+        value_name = "SECONDS",
+        default_value = "5",
+        value_parser = seconds
+    )]
+    reply_timeout: Duration,
     /// Keep address and token in this file, and take those that it has: browsers that were admitted stay so when a console that
     /// was killed is started again.
     #[arg(long, env = "CARS_CONSOLE_KEEP", value_name = "FILE")]
@@ -130,7 +139,8 @@ fn run(args: ConsoleArgs) -> Result<AfterFailure, String> {
         None => {
             let run = args.run.clone();
             let past = args.folder.map(|folder| Past::growing(folder, run));
-            let live = Live::start(args.run, args.connect, args.zenoh_config)?;
+            let config = args.zenoh_config;
+            let live = Live::start(args.run, args.connect, config, args.reply_timeout)?;
             (Mode::Live(live), past)
         }
     };
@@ -148,6 +158,14 @@ fn run(args: ConsoleArgs) -> Result<AfterFailure, String> {
     // Requests that still wait for the simulator get no answer any more.
     runtime.shutdown_timeout(SHUTDOWN_TIMEOUT);
     outcome
+}
+
+/// A time on the command line, in seconds.
+fn seconds(text: &str) -> Result<Duration, String> {
+    let seconds: f64 = text
+        .parse()
+        .map_err(|_| "not a number of seconds".to_owned())?;
+    Duration::try_from_secs_f64(seconds).map_err(|error| error.to_string())
 }
 
 fn open_recording(path: &std::path::Path) -> Result<(Mode, Option<Past>), String> {

@@ -23,6 +23,12 @@ pub(crate) enum ServerMessage<'a> {
         /// Version of the console.
         version: &'static str,
     },
+    /// Sent regularly: a page that receives nothing for a while has lost the connection. Requests carry the time back, so that the
+    /// server knows how old they are at most.
+    Beat {
+        /// Since the connection was opened, milliseconds of the server's clock.
+        at_ms: u64,
+    },
     /// Whether the simulator is connected.
     Simulator {
         /// Whether its liveliness token is declared.
@@ -138,9 +144,12 @@ impl PageMessage {
     }
 }
 
-/// The number of a request that is malformed otherwise.
+/// What a request says of itself, also one that is malformed otherwise.
 #[derive(Debug, Default, Deserialize)]
-pub(crate) struct RequestId {
-    /// `None` if the message has none.
+pub(crate) struct RequestHead {
+    /// Number of the request; `None` if the message has none.
     pub(crate) id: Option<u64>,
+    /// The newest `at_ms` that the page had received when it sent the request; `None` from a client that ignores
+    /// [`ServerMessage::Beat`].
+    pub(crate) heard_ms: Option<u64>,
 }
