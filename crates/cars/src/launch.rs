@@ -42,7 +42,8 @@ pub(crate) struct LaunchArgs {
     /// Wait for `cars ctl start` once all robots have joined.
     #[arg(long)]
     paused: bool,
-    /// Open the console in a browser.
+    /// Open the console in a browser. The run waits until it is started there, and goes on at 5 simulated seconds a second unless
+    /// --speed says otherwise. If no browser has come after 30 s, it begins by itself.
     #[arg(long, conflicts_with = "no_console")]
     open: bool,
     /// Keep the processes when the run is over, so that `init` begins the next one. While a browser shows the run they are kept

@@ -9,6 +9,7 @@ import { Crosshair } from "./crosshair.js";
 import { DiagramView } from "./diagram.js";
 import { Editor } from "./editor.js";
 import { renderFailed } from "./failed.js";
+import { renderGuide } from "./guide.js";
 import { Hover } from "./hover.js";
 import { Interventions } from "./interventions.js";
 import { classesIn } from "./known.js";
@@ -161,6 +162,11 @@ function drawDraft() {
   /** @type {HTMLElement} */ (mark.firstElementChild).textContent = editor.atCursor;
 }
 
+const guidePlace = document.createElement("section");
+Object.assign(guidePlace, { id: "guide", className: "guide", hidden: true, ariaLabel: "First steps" });
+guidePlace.dataset.testid = "guide";
+box("notice").before(guidePlace);
+
 const interventions = new Interventions({ menu: box("experiment-menu"), effects: box("effects") }, store, {
   act: (control, note) => act(control, note),
   save: () => setup.save(),
@@ -261,6 +267,7 @@ function drawBar() {
   box("experiment").hidden = !interventions.isPossible;
   renderStranger(box("stranger"), store);
   renderFailed(box("failed"), store, resume);
+  renderGuide(guidePlace, store);
   renderVerdicts(box("verdicts"), store);
 
   timeline.render();

@@ -9,7 +9,7 @@
 
 /**
  * What the server sends.
- * @typedef {{type: "hello", mode: "live" | "recording", run: string, endpoint?: string, version: string}
+ * @typedef {{type: "hello", mode: "live" | "recording", run: string, endpoint?: string, version: string, has_guide: boolean}
  *   | {type: "beat", at_ms: number}
  *   | {type: "simulator", present: boolean}
  *   | {type: "frame", frame: WorldFrame}

@@ -31,6 +31,8 @@ export class Store {
     this.endpoint = "";
     /** What has taken the address of this page, see `connection.js`. @type {import("./connection.js").Stranger | null} */
     this.stranger = null;
+    /** Whether first steps are explained. */
+    this.hasGuide = false;
     /** Why the run has failed. @type {import("./connection.js").Failed | null} */
     this.failed = null;
     this.isConnected = false;
@@ -112,6 +114,7 @@ export class Store {
     switch (message.type) {
       case "hello":
         this.endpoint = message.endpoint ?? "";
+        this.hasGuide = message.has_guide;
         this.hello(message.mode, message.run, message.version);
         break;
       case "failed":

@@ -32,6 +32,10 @@ pub(crate) struct App {
     pub(crate) mode: Mode,
     /// What is recorded of it; none if its folder is not known.
     pub(crate) past: Option<Past>,
+    /// Whether pages explain their first steps.
+    pub(crate) has_guide: bool,
+    /// Whether a browser has been connected so far.
+    was_viewed: watch::Sender<bool>,
     browsers: Arc<Semaphore>,
     requests: Arc<Semaphore>,
     reads: Semaphore,
@@ -43,11 +47,13 @@ pub(crate) struct App {
 
 impl App {
     /// A console that shows `mode` to clients that `guard` admits.
-    pub(crate) fn new(guard: Guard, mode: Mode, past: Option<Past>) -> Self {
+    pub(crate) fn new(guard: Guard, mode: Mode, past: Option<Past>, has_guide: bool) -> Self {
         Self {
             guard,
             mode,
             past,
+            has_guide,
+            was_viewed: watch::Sender::new(false),
             browsers: Arc::new(Semaphore::new(MAX_BROWSERS)),
             requests: Arc::new(Semaphore::new(MAX_REQUESTS)),
             reads: Semaphore::new(MAX_READS),
@@ -111,7 +117,16 @@ impl App {
 
     /// A permit for one browser; `None` if [`MAX_BROWSERS`] are connected.
     pub(crate) fn admit_browser(&self) -> Option<OwnedSemaphorePermit> {
-        self.browsers.clone().try_acquire_owned().ok()
+        let permit = self.browsers.clone().try_acquire_owned().ok()?;
+        self.was_viewed.send_replace(true);
+        Some(permit)
+    }
+
+    /// Waits until a browser has been connected.
+    pub(crate) async fn viewed(&self) {
+        // It cannot fail: this owns the sender.
+        let mut was_viewed = self.was_viewed.subscribe();
+        let _viewed = was_viewed.wait_for(|viewed| *viewed).await;
     }
 
     /// A permit for one request to the simulator; `None` if too many wait for an answer.

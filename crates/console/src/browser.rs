@@ -212,6 +212,7 @@ impl Browser {
             run,
             endpoint,
             version: env!("CARGO_PKG_VERSION"),
+            has_guide: self.app.has_guide,
         };
 
         let text = hello.text();

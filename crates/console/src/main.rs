@@ -77,6 +77,9 @@ struct ConsoleArgs {
     /// Open the page in a browser.
     #[arg(long)]
     open: bool,
+    /// With --open: how long the run waits for the browser, seconds. If none has come by then, the console begins the run.
+    #[arg(long, value_name = "SECONDS", requires = "open", hide = true, value_parser = seconds)]
+    begin_after: Option<Duration>,
     /// How long to wait for a reply of the simulator, seconds.
     #[arg(
         long,
@@ -110,6 +113,8 @@ struct Serving {
     bind: Option<SocketAddr>,
     /// Whether a browser is started.
     opens: bool,
+    /// After how long the run begins without a browser; `None` if it does not wait for one.
+    begins_after: Option<Duration>,
     keep: Option<PathBuf>,
     failed: Option<PathBuf>,
     allowed: Vec<AllowedHost>,
@@ -147,6 +152,7 @@ fn run(args: ConsoleArgs) -> Result<AfterFailure, String> {
     let serving = Serving {
         bind: args.bind,
         opens: args.open,
+        begins_after: args.begin_after,
         keep: args.keep,
         failed: args.failed,
         allowed: args.allow_host,
@@ -210,12 +216,16 @@ async fn serve(mode: Mode, past: Option<Past>, how: Serving) -> Result<AfterFail
         tracing::warn!("{}: {error}", file.display());
     }
     let url = guard.url();
-    let app = Arc::new(App::new(guard, mode, past));
+    let has_guide = how.opens && matches!(mode, Mode::Live(_));
+    let app = Arc::new(App::new(guard, mode, past, has_guide));
     let mut terminate = handle(SignalKind::terminate())?;
     let mut interrupt = handle(SignalKind::interrupt())?;
 
     announce(address, &url);
     let is_opening = how.opens && !was_open && opening::open(&url, app.clone());
+    if let Some(patience) = how.begins_after.filter(|_| !was_open) {
+        tokio::spawn(opening::begin_without_browser(patience, app.clone()));
+    }
     let failure = async {
         match &how.failed {
             Some(file) => failing::watch(file, &app, is_opening || was_open).await,

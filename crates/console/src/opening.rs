@@ -8,9 +8,10 @@ use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::time::Duration;
 
+use protocol::messages::{Control, ControlAnswer, Phase};
 use tempfile::{Builder, NamedTempFile};
 
-use crate::app::App;
+use crate::app::{App, Mode};
 
 /// How the names of these files begin and end.
 const PREFIX: &str = "cars-console-";
@@ -114,6 +115,47 @@ fn start_browser(file: &Path) -> bool {
         ));
     }
     started.is_ok()
+}
+
+/// Begins the run if no browser has come within `patience`: it has waited for one.
+pub(crate) async fn begin_without_browser(patience: Duration, app: Arc<App>) {
+    if tokio::time::timeout(patience, app.viewed()).await.is_ok() {
+        return;
+    }
+
+    let because = match tokio::task::spawn_blocking(move || begin(&app)).await {
+        Ok(Ok(false)) => return,
+        Ok(Ok(true)) => {
+            let waited_s = patience.as_secs_f64();
+            return terminal::note(format_args!(
+                "no browser has opened the page within {waited_s:.0} s: the run begins without one; open the address above yourself"
+            ));
+        }
+        Ok(Err(reason)) => reason,
+        Err(error) => error.to_string(),
+    };
+    terminal::note(format_args!(
+        "no browser has opened the page, and the run does not begin: {because}"
+    ));
+}
+
+/// Begins the run, unless it has begun already; returns whether it did.
+fn begin(app: &App) -> Result<bool, String> {
+    let Mode::Live(live) = &app.mode else {
+        return Ok(false);
+    };
+    let waits = match live.control(&Control::Status)? {
+        ControlAnswer::Done(status) => matches!(status.phase, Phase::Gathering | Phase::Ready),
+        _ => false,
+    };
+    if !waits {
+        return Ok(false);
+    }
+
+    match live.control(&Control::Start)? {
+        ControlAnswer::Refused { explanation, .. } => Err(explanation),
+        _ => Ok(true),
+    }
 }
 
 /// The file is removed on drop, also where the runtime drops the task.

@@ -22,6 +22,8 @@ pub(crate) enum ServerMessage<'a> {
         endpoint: Option<&'a str>,
         /// Version of the console.
         version: &'static str,
+        /// Whether the page explains its first steps.
+        has_guide: bool,
     },
     /// Sent regularly: a page that receives nothing for a while has lost the connection. Requests carry the time back, so that the
     /// server knows how old they are at most.

@@ -34,6 +34,9 @@ const PORTS: usize = 3;
 /// Name of a run that is launched again from a folder that is not named like a run.
 const AGAIN: &str = "again";
 
+/// Speed of a run that is opened in a browser, unless the command line states another one.
+const WATCHED: Speed = Speed(Some(5.0));
+
 /// Where the processes of a launch are listed.
 #[derive(Debug, Clone)]
 pub enum What {
@@ -50,7 +53,7 @@ pub struct LaunchOptions {
     pub run: RunOptions,
     /// Whether the clock waits for `cars ctl start` once all robots have joined.
     pub is_paused: bool,
-    /// Whether the console opens in a browser.
+    /// Whether the console opens in a browser. The run waits for a person to start it there, and goes at a speed to look at.
     pub opens_browser: bool,
     /// Whether the console is started.
     pub has_console: bool,
@@ -318,7 +321,9 @@ impl Launch {
     }
 
     fn speed(&self) -> Speed {
-        let speed = self.options.run.speed.or(self.file.speed);
+        // A person who opens the page wants to see what happens.
+        let watched = self.options.opens_browser.then_some(WATCHED);
+        let speed = self.options.run.speed.or(watched).or(self.file.speed);
         speed.unwrap_or(Speed(None))
     }
 

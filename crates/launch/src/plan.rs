@@ -30,6 +30,10 @@ const FAILED_VARIABLE: &str = "CARS_CONSOLE_FAILED";
 
 /// Environment variable with the time for which a robot tries to reach the simulator and to join, seconds.
 const PATIENCE_VARIABLE: &str = "CARS_PATIENCE_S";
+/// How long a run waits for the browser that is started for it, seconds, instead of [`BROWSER_PATIENCE_S`].
+const BROWSER_PATIENCE_VARIABLE: &str = "CARS_BROWSER_PATIENCE_S";
+/// A browser that was not running takes some seconds.
+const BROWSER_PATIENCE_S: &str = "30";
 /// Its default. All robots of a launch are started at the same time: of more robots than this, each adds a second.
 const PATIENCE_S: usize = 20;
 
@@ -140,6 +144,11 @@ pub(super) fn plan(file: &LaunchFile, execution: &Execution) -> Result<Vec<Plann
         let mut args = vec![format!("--folder={}", folder.path().display())];
         if execution.opens_browser {
             args.push("--open".to_owned());
+            if !execution.is_paused {
+                let patience_s = std::env::var(BROWSER_PATIENCE_VARIABLE);
+                let patience_s = patience_s.unwrap_or_else(|_| BROWSER_PATIENCE_S.to_owned());
+                args.push(format!("--begin-after={patience_s}"));
+            }
         }
         let mut command = client(file, process, args, execution, &places)?;
         let logs = execution.folder().file(LOGS);
@@ -248,7 +257,12 @@ fn simulator(
         "--no-verdict".to_owned(),
     ]);
 
-    args.extend(execution.is_paused.then(|| "--paused".to_owned()));
+    // The run begins when a person at the page wants it to.
+    let waits_for_browser =
+        execution.opens_browser && execution.has_console && file.console.is_some();
+    if execution.is_paused || waits_for_browser {
+        args.push("--paused".to_owned());
+    }
     let taking = if execution.is_resumed {
         "--resume"
     } else {

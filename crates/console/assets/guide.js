@@ -1,0 +1,56 @@
+// @ts-check
+// First steps, for people who have opened the page for the first time. They can be put away for good.
+
+import { html, nothing, render } from "./vendor/lit-html.js";
+
+const KEY = "cars-guide";
+let isOpen = !isPutAway();
+
+/**
+ * @param {HTMLElement} place
+ * @param {import("./store.js").Store} store
+ */
+export function renderGuide(place, store) {
+  place.hidden = !isOpen || !store.hasGuide || store.failed !== null;
+  render(place.hidden ? nothing : guide(place, store), place);
+}
+
+/**
+ * @param {HTMLElement} place
+ * @param {import("./store.js").Store} store
+ */
+function guide(place, store) {
+  const close = (/** @type {boolean} */ isForGood) => {
+    isOpen = false;
+    if (isForGood) putAway();
+    renderGuide(place, store);
+  };
+  const hasNotBegun = store.phase === "ready" || store.phase === "gathering";
+
+  return html`<header><h2>First steps</h2>
+      <button type="button" class="close" aria-label="Close" data-testid="guide-close" @click=${() => close(false)}>×</button></header>
+    <ol>
+      <li><b>Look.</b> ${hasNotBegun ? html`The run waits: press <i>Start</i> at the top. ` : nothing}The ring around a robot is its emotion, an envelope is a command.</li>
+      <li><b>Cut a link.</b> <i>Experiment</i>, one robot <i>from</i>, the other one <i>to</i>, <i>Cut</i>. Then close the menu.</li>
+      <li><b>Why?</b> The panel beside the plan says <i>why</i> a robot feels so; the log has each change.</li>
+      <li><b>Go back.</b> Drag the time line to any moment; <i>Live</i> goes on with the run.</li>
+      <li><b>Verify.</b> After the end, in a terminal: <code data-testid="guide-verify">cars verify ${store.run}</code> executes it again, and compares.</li>
+    </ol>
+    <button type="button" data-testid="guide-dismiss" @click=${() => close(true)}>Do not show this again</button>`;
+}
+
+function isPutAway() {
+  try {
+    return localStorage.getItem(KEY) !== null;
+  } catch {
+    return false;
+  }
+}
+
+function putAway() {
+  try {
+    localStorage.setItem(KEY, "put away");
+  } catch {
+    // This browser keeps nothing: the guide is closed until the page is loaded again.
+  }
+}
