@@ -14,7 +14,7 @@ use pictures::{
     PrintedFigure, Steps, TimeCourse, Trend, TrendLine, TrendPoint,
 };
 use protocol::{Event, RobotName};
-use roxmltree::Document;
+use roxmltree::{Document, Node};
 use serde_json::Value;
 use timeline::{StateKind, StateOrder, Timeline};
 
@@ -210,7 +210,7 @@ fn every_figure_has_the_width_of_a_column_and_letters_that_can_be_read() {
                 !figure.pictures[0].svg.contains("class="),
                 "no style sheet is needed"
             );
-            let mut children = root.children().filter(|node| node.is_element());
+            let mut children = root.children().filter(Node::is_element);
             assert_eq!(children.nth(1).unwrap().text(), Some("What it shows."));
             assert_eq!(children.next().unwrap().attribute("fill"), Some("#ffffff"));
         }

@@ -9,7 +9,7 @@ use crate::subject::Subject;
 pub(crate) fn print(all: &[Results]) -> Result<(), OutputError> {
     let is_compared = all.iter().any(|results| !results.there.is_empty());
     let rows = all.iter().map(|results| row(results, all, is_compared));
-    let table = terminal::table(head(is_compared), rows, 1);
+    let table = terminal::table(head(is_compared), rows, 1, 1);
     terminal::print_line(format_args!(
         "{table}\nRatios are medians over rounds of pairs that were measured in the same round."
     ))

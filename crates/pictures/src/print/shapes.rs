@@ -85,7 +85,7 @@ fn add(element: Node<'_, '_>, sheet: &Sheet, parent: &Paint, shapes: &mut Vec<Pr
             );
             shapes.push(PrintedShape::Path(segments(&around), paint));
         }
-        "text" => shapes.push(PrintedShape::Text(text(element, sheet, paint))),
+        "text" => shapes.push(PrintedShape::Text(text(element, sheet, &paint))),
         "svg" | "g" => {
             for child in element.children().filter(Node::is_element) {
                 add(child, sheet, &paint, shapes);
@@ -95,11 +95,11 @@ fn add(element: Node<'_, '_>, sheet: &Sheet, parent: &Paint, shapes: &mut Vec<Pr
     }
 }
 
-fn text(element: Node<'_, '_>, sheet: &Sheet, paint: Paint) -> PrintedText {
+fn text(element: Node<'_, '_>, sheet: &Sheet, paint: &Paint) -> PrintedText {
     let mut runs = Vec::new();
     for child in element.children() {
         let of_child = match child.is_element() {
-            true => sheet.paint(child, &paint),
+            true => sheet.paint(child, paint),
             false => paint.clone(),
         };
         let words = child
