@@ -175,6 +175,11 @@ class Launch:
 
         subprocess.run(command, input=json.dumps(message).encode(), check=True, timeout=PATIENCE_S)
 
+    def put_panel(self, robot, widgets):
+        """Puts a panel of the tick that the run is at, as the robot does."""
+        status = self.status()
+        self.put(f"robot/{robot}/panel", {"epoch": status["epoch"], "tick": status["tick"], "widgets": widgets})
+
     def end(self):
         self.processes.end()
 

@@ -57,7 +57,7 @@ def test_an_empty_panel_is_replaced_by_what_is_known(launch, open_page):
     expect(panel.locator(".pair", has_text="behavior")).to_contain_text("REFILL")
     expect(page.get_by_test_id("log")).to_contain_text("-> Leguin: refill")
 
-    run.put("robot/Leguin/panel", {"widgets": []})
+    run.put_panel("Leguin", [])
     expect(panel.locator(".text", has_text="last commands")).to_contain_text("from operator: refill")
     expect(panel.locator("tr", has_text="class")).to_contain_text("Leguin")
     expect(panel.locator(".pair", has_text="behavior")).to_contain_text("REFILL")
@@ -67,7 +67,7 @@ def test_an_empty_panel_is_replaced_by_what_is_known(launch, open_page):
     expect(panel.locator("tr", has_text="trips")).to_be_visible()
 
     # A panel with nothing but buttons has them below what is known.
-    run.put("robot/Leguin/panel", {"widgets": [{"widget": "button", "label": "Hurry", "command": "hurry"}]})
+    run.put_panel("Leguin", [{"widget": "button", "label": "Hurry", "command": "hurry"}])
     expect(panel.get_by_test_id("button-hurry")).to_be_visible()
     expect(panel.locator("tr", has_text="class")).to_contain_text("Leguin")
 
@@ -107,7 +107,7 @@ def test_all_of_a_why_can_be_read(launch, open_page, width, height):
     text = page.get_by_test_id("panel-Vonda").locator(".text p").first
     for words in (40, 300):
         why = " ".join(f"reason{number}" for number in range(words))
-        run.put("robot/Vonda/panel", {"widgets": [{"widget": "text", "label": "why", "text": why}]})
+        run.put_panel("Vonda", [{"widget": "text", "label": "why", "text": why}])
         expect(text).to_have_text(why)
         hidden = text.evaluate(
             "(p) => { p.scrollTop = p.scrollHeight; const range = document.createRange();"

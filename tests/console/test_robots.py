@@ -133,7 +133,7 @@ def test_content_of_a_panel_or_line_is_not_executed(launch, open_page):
     expect(panel.get_by_test_id("face")).to_be_visible()
 
     panel.locator("summary").click()
-    run.put("robot/Leguin/panel", HOSTILE)
+    run.put_panel("Leguin", HOSTILE["widgets"])
     expect(panel).to_contain_text("<script>window.hacked=1</script>")
     expect(panel.locator(".details table")).to_be_visible()
     page.wait_for_timeout(500)
@@ -151,9 +151,11 @@ def test_content_of_a_panel_or_line_is_not_executed(launch, open_page):
     expect(page.get_by_test_id("log")).to_contain_text("<b id='injected'>")
 
     # Malformed panels, frames and unknown robots are ignored.
-    for wrong in ({}, [], {"widgets": [{"widget": "html", "html": MARKUP}]}, {"widgets": [HOSTILE["widgets"][1]] * 100}):
+    for wrong in ({}, [], HOSTILE):
         run.put("robot/Leguin/panel", wrong)
-    run.put("robot/Unknown/panel", HOSTILE)
+    for widgets in ([{"widget": "html", "html": MARKUP}], [HOSTILE["widgets"][1]] * 100):
+        run.put_panel("Leguin", widgets)
+    run.put_panel("Unknown", HOSTILE["widgets"])
     run.put("world", {"tick": 10**9})
 
     page.get_by_test_id("btn-step").click()
@@ -209,9 +211,9 @@ def test_the_page_works_with_any_content_of_a_panel(launch, open_page):
 
     chance = random.Random(2002)
     for number in range(60):
-        run.put("robot/Leguin/panel", {"widgets": [odd_widget(chance) for _ in range(chance.randrange(20))]})
+        run.put_panel("Leguin", [odd_widget(chance) for _ in range(chance.randrange(20))])
         if number % 10 == 9:
-            run.put("robot/Leguin/panel", {"widgets": [{"widget": "text", "label": "number", "text": f"shown {number}"}]})
+            run.put_panel("Leguin", [{"widget": "text", "label": "number", "text": f"shown {number}"}])
             expect(panel).to_contain_text(f"shown {number}")
 
     assert page.evaluate("typeof window.hacked") == "undefined"

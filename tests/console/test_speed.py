@@ -72,13 +72,13 @@ def test_what_does_not_change_costs_nothing(page):
     counted(page, lambda: None)
 
     # The status of a paused run arrives again, and a panel that says what it said before.
-    panel = {"widgets": [{"widget": "text", "label": "why", "text": "because"}]}
-    page.run.put("robot/Leguin3/panel", panel)
+    panel = [{"widget": "text", "label": "why", "text": "because"}]
+    page.run.put_panel("Leguin3", panel)
     counted(page, lambda: None)
 
     def again():
         page.run.control("speed", "3")
-        page.run.put("robot/Leguin3/panel", panel)
+        page.run.put_panel("Leguin3", panel)
         expect(page.get_by_test_id("speed")).to_have_value("3")
 
     calls, changes = counted(page, again)
