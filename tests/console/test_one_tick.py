@@ -127,7 +127,7 @@ def is_still(run):
 
 @pytest.mark.parametrize("speed", [20, "max"])
 def test_all_views_agree_at_every_stop_and_seek(launch, open_page, processes, speed):
-    compare(launch, open_page, processes, seed=7, speed=speed, duration_s=200, stops=12, seeks=60)
+    compare(launch, open_page, processes, seed=7, speed=speed, duration_s=200, stops=6, seeks=30)
 
 
 @pytest.mark.thorough
