@@ -11,23 +11,6 @@ from lab import eventually
 pytestmark = pytest.mark.thorough
 
 
-@pytest.fixture
-def open_quietly(browser):
-    """Opens pages of consoles that go: their browsers log that a connection is lost."""
-    contexts = []
-
-    def open_at(address):
-        contexts.append(browser.new_context(viewport={"width": 1440, "height": 900}))
-        page = contexts[-1].new_page()
-        page.goto(address)
-        return page
-
-    yield open_at
-
-    for context in contexts:
-        context.close()
-
-
 def test_the_run_ends_and_init_starts_the_next_one(launched, open_page, screenshots):
     run = launched("--paused", "--duration", "5 s", "--speed", "max")
     page = open_page(run.address)

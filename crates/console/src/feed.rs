@@ -1,8 +1,9 @@
 //! What a run shows now. The live connection writes it; every browser reads it at its own pace.
 //!
 //! A browser has a [`Cursor`] and no queue: when it is ready, it takes what is new since its last batch. A frame replaces its
-//! predecessor, so the newest wins, and comes with the panels of its tick: one of another tick is never shown. The last lines of the log are kept, and a browser that is too slow for
-//! some is told how many it missed. So memory is bounded however slowly a browser reads.
+//! predecessor, so the newest wins, and comes with the panels of its tick: one of another tick is never shown. The last lines
+//! of the log are kept, and a browser that is too slow for some is told how many it missed. So memory is bounded however slowly
+//! a browser reads.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

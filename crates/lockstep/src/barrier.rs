@@ -229,7 +229,7 @@ impl<R, C> Barrier<R, C> {
             && self.lateness.of(name) == OnLate::Continue
         {
             // It will not report in time.
-            self.give_up(name);
+            self.give_up(name, self.lateness.lose_after);
             self.stand_in(name, out);
             self.settle(out);
         }
@@ -425,13 +425,8 @@ impl<R, C> Barrier<R, C> {
 
         for name in robots {
             let goes_on = self.lateness.of(&name) == OnLate::Continue;
-            let Some(member) = self.members.get_mut(&name) else {
-                continue;
-            };
-            if goes_on && member.is_awaited() {
-                if member.miss(1, None) {
-                    self.membership.push(Membership::Lost(name.clone()));
-                }
+            if goes_on && self.is_member(&name, Member::is_awaited) {
+                self.give_up(&name, 1);
                 self.stand_in(&name, out);
             }
         }
@@ -674,7 +669,7 @@ impl<R, C> Barrier<R, C> {
         }
 
         for name in unavailable {
-            self.give_up(&name);
+            self.give_up(&name, self.lateness.lose_after);
         }
     }
 
@@ -695,19 +690,20 @@ impl<R, C> Barrier<R, C> {
 
         for (name, policy) in late {
             if policy == OnLate::Continue {
-                self.give_up(&name);
+                self.give_up(&name, self.lateness.lose_after);
                 self.stand_in(&name, out);
             }
         }
         self.settle(out);
     }
 
-    /// The clock goes on without a robot in the open tick, and from then on if it is lost.
-    fn give_up(&mut self, name: &RobotName) {
+    /// The clock goes on without a robot in the open tick, and from then on if it is lost: that is after `lose_after` ticks that
+    /// it has missed in a row, or by the record of a run that is executed again.
+    fn give_up(&mut self, name: &RobotName, lose_after: u32) {
         let attendance = self.attendance.as_ref();
         let recorded = attendance.map(|recorded| recorded.lost.contains(name));
         if let Some(member) = self.members.get_mut(name)
-            && member.miss(self.lateness.lose_after, recorded)
+            && member.miss(lose_after, recorded)
         {
             self.membership.push(Membership::Lost(name.clone()));
         }
