@@ -23,6 +23,7 @@ import { Player } from "./recording.js";
 import { setRoster } from "./roster.js";
 import { SetupView } from "./setup.js";
 import { download, readLink, share } from "./share.js";
+import { splitter } from "./splitter.js";
 import { Store } from "./store.js";
 import { renderStranger } from "./stranger.js";
 import { tabs } from "./tabs.js";
@@ -232,6 +233,9 @@ function choose(robot) {
     document.querySelector(`[data-testid="${part}-${CSS.escape(chosen)}"]`)?.scrollIntoView({ block: "nearest" });
   }
 }
+
+splitter(box("columns"), [box("plan-pane"), box("panels")]);
+splitter(box("rows"), [box("panels"), box("deck")]);
 
 let openTab = "log";
 const tabList = tabs(box("tabs"), (name) => {

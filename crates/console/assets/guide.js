@@ -1,10 +1,11 @@
 // @ts-check
 // First steps, for people who have opened the page for the first time. They can be put away for good.
 
+import { keep, kept } from "./kept.js";
 import { html, nothing, render } from "./vendor/lit-html.js";
 
 const KEY = "cars-guide";
-let isOpen = !isPutAway();
+let isOpen = kept(KEY) === null;
 
 /**
  * @param {HTMLElement} place
@@ -22,7 +23,7 @@ export function renderGuide(place, store) {
 function guide(place, store) {
   const close = (/** @type {boolean} */ isForGood) => {
     isOpen = false;
-    if (isForGood) putAway();
+    if (isForGood) keep(KEY, "put away");
     renderGuide(place, store);
   };
   const hasNotBegun = store.phase === "ready" || store.phase === "gathering";
@@ -37,20 +38,4 @@ function guide(place, store) {
       <li><b>Verify.</b> After the end, in a terminal: <code data-testid="guide-verify">cars verify ${store.run}</code> executes it again, and compares.</li>
     </ol>
     <button type="button" data-testid="guide-dismiss" @click=${() => close(true)}>Do not show this again</button>`;
-}
-
-function isPutAway() {
-  try {
-    return localStorage.getItem(KEY) !== null;
-  } catch {
-    return false;
-  }
-}
-
-function putAway() {
-  try {
-    localStorage.setItem(KEY, "put away");
-  } catch {
-    // This browser keeps nothing: the guide is closed until the page is loaded again.
-  }
 }

@@ -1,6 +1,8 @@
 // @ts-check
 // Feet or meters for display and input. All values inside the page are in SI units.
 
+import { keep, kept } from "./kept.js";
+
 /** @typedef {"m" | "ft"} Unit */
 
 /** Meters in an international foot. */
@@ -61,7 +63,7 @@ export function inUnit(text, { unit, unit_m }) {
 export class Units {
   constructor() {
     /** @type {Unit} */
-    this.unit = remembered() === "ft" ? "ft" : "m";
+    this.unit = kept("cars-units") === "ft" ? "ft" : "m";
     /** @type {(() => void)[]} */
     this.listeners = [];
   }
@@ -69,12 +71,7 @@ export class Units {
   /** @param {Unit} unit */
   choose(unit) {
     this.unit = unit;
-    try {
-      localStorage.setItem("cars-units", unit);
-    } catch {
-      // Without local storage the choice lasts until the page is closed.
-    }
-
+    keep("cars-units", unit);
     this.listeners.forEach((listener) => listener());
   }
 
@@ -91,14 +88,5 @@ export class Units {
   /** @param {number} speed_mps */
   speed(speed_mps) {
     return `${(speed_mps / this.unit_m).toFixed(2)} ${this.unit}/s`;
-  }
-}
-
-/** @returns {string | null} */
-function remembered() {
-  try {
-    return localStorage.getItem("cars-units");
-  } catch {
-    return null;
   }
 }
