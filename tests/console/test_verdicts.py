@@ -6,8 +6,8 @@ from playwright.sync_api import expect
 pytestmark = pytest.mark.thorough
 
 EXPECTATIONS = """expect=[
-    { name = "Butler does not serve", never = { robot = "Butler", behavior = "SERVE", for = "2 s" } },
     { name = "nobody overlaps", never = { overlap = "any" } },
+    { name = "Butler does not serve", never = { robot = "Butler", behavior = "SERVE", for = "2 s" } },
 ]"""
 
 
@@ -15,17 +15,31 @@ def test_a_verdict_shows_with_the_tick_that_decides_it(launch, open_page, screen
     run = launch(options=("--set", EXPECTATIONS))
     page = open_page(run.address)
     expect(page.get_by_test_id("tick")).to_have_text("0")
+    # One chip, which unfolds by a click and by the keys.
+    chip = page.get_by_test_id("verdicts-chip")
+    expect(chip).to_have_accessible_name("2 of 2 open")
+    expect(chip).to_have_attribute("aria-expanded", "false")
     verdicts = page.get_by_test_id("verdict")
-    expect(verdicts).to_have_text(["… open Butler does not serve", "… open nobody overlaps"])
+    expect(verdicts.first).to_be_hidden()
+    chip.focus()
+    page.keyboard.press("Enter")
+    expect(chip).to_have_attribute("aria-expanded", "true")
+    expect(page.locator(f"#{chip.get_attribute('aria-controls')}")).to_be_visible()
+    expect(verdicts).to_have_text(["… open nobody overlaps", "… open Butler does not serve"])
 
     for tick in range(1, 9):
         page.get_by_test_id("btn-step").click()
         expect(page.get_by_test_id("tick")).to_have_text(str(tick))
+    # The worst verdict is the first, in the chip and below it.
     expect(verdicts).to_have_text(["✗ fail Butler does not serve", "… open nobody overlaps"])
+    expect(chip).to_have_accessible_name("1 of 2 fails, 1 open")
+    expect(chip).to_contain_text("✗")
     expect(page.get_by_test_id("log")).to_contain_text("fail: Butler does not serve")
     page.screenshot(path=screenshots / "verdicts-live-1440x900-light.png")
 
     page.get_by_test_id("btn-init").click()
     page.get_by_test_id("end-run").click()
     expect(page.get_by_test_id("tick")).to_have_text("0")
-    expect(verdicts).to_have_text(["… open Butler does not serve", "… open nobody overlaps"])
+    expect(verdicts).to_have_text(["… open nobody overlaps", "… open Butler does not serve"])
+    chip.click()
+    expect(verdicts.first).to_be_hidden()

@@ -272,7 +272,7 @@ function drawBar() {
   renderStranger(box("stranger"), store);
   renderFailed(box("failed"), store, resume);
   renderGuide(guidePlace, store);
-  renderVerdicts(box("verdicts"), store);
+  renderVerdicts({ chip: box("verdicts-chip"), list: box("verdicts") }, store);
 
   timeline.render();
   crosshair.render();
