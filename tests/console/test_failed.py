@@ -27,7 +27,7 @@ def test_a_parameter_that_a_robot_refuses_is_refused_before_anything_happens(lau
     ready(page)
     step(page, 1)
     before = run.pid("cars-butler")
-    page.get_by_test_id("experiment").click()
+    page.get_by_test_id("tab-experiment").click()
     for robot, path, value, reason in [
         ("Butler", "policy", "nonsense", "Butler refuses these parameters: policy: unknown variant `nonsense`"),
         ("Butler", "polcy", "rules", "Butler refuses these parameters: polcy: unknown field `polcy`"),

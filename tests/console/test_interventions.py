@@ -10,7 +10,7 @@ pytestmark = pytest.mark.thorough
 
 def open_menu(page):
     expect(page.get_by_test_id("phase")).to_have_text("ready", ignore_case=True)
-    page.get_by_test_id("experiment").click()
+    page.get_by_test_id("tab-experiment").click()
     expect(page.get_by_test_id("experiment-menu")).to_be_visible()
 
 
@@ -182,6 +182,27 @@ def test_a_robots_menu_opens_on_the_plan_and_by_a_key(launch, open_page, screens
             overflow = page.evaluate("document.documentElement.scrollWidth > document.documentElement.clientWidth")
             assert not overflow
             page.context.close()
+
+
+@pytest.mark.parametrize("width, height", [(1440, 900), (1280, 720), (820, 1180)])
+def test_the_plan_is_seen_and_goes_on_while_one_experiments(launch, open_page, width, height):
+    run = launch(options=("--speed", "5", "--set", "guests.count=20"))
+    page = open_page(run.address, width=width, height=height)
+    open_menu(page)
+    page.get_by_test_id("btn-start").click()
+    for tab, field in (("experiment", "experiment-path"), ("setup", "setup-seed")):
+        page.get_by_test_id(f"tab-{tab}").click()
+        page.get_by_test_id(field).fill("77")
+        plan = page.locator(".plan").bounding_box()
+        form = page.locator(f"#panel-{tab}").bounding_box()
+        assert plan["x"] + plan["width"] <= form["x"], (tab, plan, form)
+        covering = page.evaluate(
+            "(() => { const {left, top, width, height} = document.getElementById('plan').getBoundingClientRect();"
+            " return document.elementFromPoint(left + width * 0.7, top + height * 0.7).id; })()"
+        )
+        assert covering == "plan"
+        before = page.evaluate("window.carsConsole.frame().tick")
+        eventually("further ticks", lambda: page.evaluate("window.carsConsole.frame().tick") > before + 3)
 
 
 def test_a_run_by_hand_is_saved_as_a_scenario(launch, open_page, tmp_path):

@@ -172,9 +172,9 @@ def test_the_tools_of_a_run_in_progress_need_one_row(launch, open_page, screensh
     page = open_page(run.address, 1280, 720)
     expect(page.get_by_test_id("tick")).to_have_text("0")
     step_to(page, 4)
-    expect(page.get_by_test_id("experiment")).to_be_visible()
+    expect(page.get_by_test_id("link")).to_be_visible()
     heights = page.locator(".tools button:visible").evaluate_all("(all) => all.map((one) => one.getBoundingClientRect().top)")
-    assert len(heights) == 6
+    assert len(heights) == 5
     assert max(heights) - min(heights) < 4, heights
     page.screenshot(path=screenshots / "tools-1280.png")
 

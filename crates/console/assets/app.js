@@ -168,17 +168,33 @@ Object.assign(guidePlace, { id: "guide", className: "guide", hidden: true, ariaL
 guidePlace.dataset.testid = "guide";
 box("notice").before(guidePlace);
 
-const interventions = new Interventions({ menu: box("experiment-menu"), effects: box("effects") }, store, {
+const interventions = new Interventions({ menu: box("panel-experiment"), effects: box("effects") }, store, {
   act: (control, note) => act(control, note),
   save: () => setup.save(),
+  close: () => closeExperiment(),
 });
-box("experiment").addEventListener("click", () => interventions.open(!interventions.isOpen, plan.chosen));
+
+/** @param {string | null} robot that it is about */
+function openExperiment(robot) {
+  if (!interventions.isPossible) return;
+  tabList.select("experiment");
+  if (robot) interventions.about(robot);
+  box("panel-experiment").querySelector("select")?.focus();
+}
+
+/** Shows the tab that was shown before. */
+function closeExperiment() {
+  tabList.select(tabBefore);
+  /** @type {HTMLElement | null} */ (document.querySelector(".tabs [aria-selected=true]"))?.focus();
+}
+
 document.addEventListener("keydown", (event) => {
   const { target } = event;
   const isTyping = target instanceof HTMLElement && target.closest("input:not([type=range]), select, textarea, dialog[open]") !== null;
   if (event.key.toLowerCase() !== "e" || isTyping || event.ctrlKey || event.metaKey || event.altKey) return;
   event.preventDefault();
-  interventions.open(!interventions.isOpen, plan.chosen);
+  if (openTab === "experiment") closeExperiment();
+  else openExperiment(plan.chosen);
 });
 element("plan", HTMLCanvasElement).addEventListener("contextmenu", (event) => {
   if (editor.draft || !interventions.isPossible) return;
@@ -186,7 +202,7 @@ element("plan", HTMLCanvasElement).addEventListener("contextmenu", (event) => {
   const robot = plan.robotAt(plan.camera.place(event.clientX - frame.left, event.clientY - frame.top));
   if (!robot) return;
   event.preventDefault();
-  interventions.open(true, robot);
+  openExperiment(robot);
 });
 new Hover(box("hover"), plan);
 const panels = new Panels(box("panels"), store, units, {
@@ -238,7 +254,10 @@ splitter(box("columns"), [box("plan-pane"), box("panels")]);
 splitter(box("rows"), [box("panels"), box("deck")]);
 
 let openTab = "log";
+/** What is shown again when an experiment is closed. */
+let tabBefore = "log";
 const tabList = tabs(box("tabs"), (name) => {
+  if (openTab !== "experiment") tabBefore = openTab;
   openTab = name;
   document.body.dataset.tab = name;
   setup.open(name === "setup");
@@ -246,6 +265,7 @@ const tabList = tabs(box("tabs"), (name) => {
   if (name === "log") log.shown();
   if (name === "charts") [charts, bands].forEach((view) => view.render());
   if (name === "diagram") diagram.render();
+  if (name === "experiment") interventions.render();
 });
 
 // Views are rendered at most once per animation frame, and those with an expensive layout less often.
@@ -268,7 +288,6 @@ function drawBar() {
     act({ do: "late", robot, on_late: "continue" }, `The clock goes on without ${robot} when it is late.`);
   });
   interventions.render();
-  box("experiment").hidden = !interventions.isPossible;
   renderStranger(box("stranger"), store);
   renderFailed(box("failed"), store, resume);
   renderGuide(guidePlace, store);
@@ -280,7 +299,8 @@ function drawBar() {
   document.body.dataset.time = isRecording() ? "recording" : player.isLive ? "live" : "past";
   const isPast = isRecording() || store.replayOf !== null;
   box("tab-setup").hidden = isPast;
-  if (isPast && openTab === "setup") tabList.select("log");
+  box("tab-experiment").hidden = !interventions.isPossible;
+  if ((isPast && openTab === "setup") || (!interventions.isPossible && openTab === "experiment")) tabList.select("log");
   box("voice-label").hidden = isRecording();
 
   const isEmpty = store.frame === null && !store.failed && !isRecording() && !(store.isLive && store.status);

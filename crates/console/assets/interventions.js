@@ -1,5 +1,5 @@
 // @ts-check
-// Experiments by hand: links are cut, robots stopped, parameters changed. What is in effect is listed, and can be undone.
+// Experiments by hand, in a tab: links are cut, robots stopped, parameters changed. What is in effect is listed, and can be undone.
 
 import { html, nothing, render } from "./vendor/lit-html.js";
 
@@ -25,13 +25,12 @@ export class Interventions {
   /**
    * @param {{menu: HTMLElement, effects: HTMLElement}} places
    * @param {Store} store
-   * @param {{act: (control: Control, note: string) => Promise<boolean>, save: () => void}} client
+   * @param {{act: (control: Control, note: string) => Promise<boolean>, save: () => void, close: () => void}} client
    */
   constructor(places, store, client) {
     this.places = places;
     this.store = store;
     this.client = client;
-    this.isOpen = false;
     /** The robots of the two groups. @type {[Set<string>, Set<string>]} */
     this.groups = [new Set(), new Set()];
     this.isOneWay = false;
@@ -40,9 +39,7 @@ export class Interventions {
     this.value = "";
 
     places.menu.addEventListener("keydown", (event) => {
-      if (event.key !== "Escape") return;
-      event.stopPropagation();
-      this.open(false);
+      if (event.key === "Escape") this.client.close();
     });
   }
 
@@ -56,19 +53,11 @@ export class Interventions {
     return (this.store.frame?.robots ?? []).map((robot) => robot.name);
   }
 
-  /**
-   * @param {boolean} isOpen
-   * @param {string | null} robot that the menu is about
-   */
-  open(isOpen, robot = null) {
-    this.isOpen = isOpen && this.isPossible;
-    if (robot) {
-      this.robot = robot;
-      this.groups = [new Set([robot]), new Set()];
-    }
+  /** Makes the menu about a robot. @param {string} robot */
+  about(robot) {
+    this.robot = robot;
+    this.groups = [new Set([robot]), new Set()];
     this.render();
-    if (this.isOpen) this.places.menu.querySelector("select")?.focus();
-    else document.getElementById("experiment")?.focus();
   }
 
   /** @param {Intervention} what */
@@ -78,9 +67,7 @@ export class Interventions {
 
   render() {
     const { menu, effects } = this.places;
-    if (!this.isPossible) this.isOpen = false;
-    menu.hidden = !this.isOpen;
-    render(this.isOpen ? this.menu() : nothing, menu);
+    render(this.isPossible && !menu.hidden ? this.menu() : nothing, menu);
 
     const listed = this.isPossible ? this.inEffect() : [];
     effects.hidden = listed.length === 0;
@@ -143,9 +130,7 @@ export class Interventions {
       this.render();
     };
 
-    return html`
-      <header><h2>Experiment</h2>
-        <button type="button" class="close" aria-label="Close" data-testid="experiment-close" @click=${() => this.open(false)}>×</button></header>
+    return html`<div class="experiment">
       <fieldset><legend>A robot</legend>
         <select aria-label="Robot" data-testid="experiment-robot" .value=${this.robot} @change=${choose}>
           ${names.map((name) => html`<option value=${name} ?selected=${name === this.robot}>${name}</option>`)}</select>
@@ -154,7 +139,7 @@ export class Interventions {
       <fieldset><legend>Its parameters</legend>${this.parameter()}</fieldset>
       <fieldset><legend>Links</legend>${this.links()}</fieldset>
       <button type="button" data-testid="experiment-save" title="the scenario, with what was done by hand as changes of it"
-        @click=${() => this.client.save()}>Save as a scenario</button>`;
+        @click=${() => this.client.save()}>Save as a scenario</button></div>`;
   }
 
   faults() {
