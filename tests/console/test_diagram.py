@@ -1,6 +1,7 @@
 """The space-time diagram of a recorded run."""
 
 import re
+from xml.etree import ElementTree
 
 import pytest
 from playwright.sync_api import expect
@@ -58,6 +59,29 @@ def test_a_click_on_a_command_shows_its_tick(recorded, open_page, screenshots, s
     middle = "one => { const box = one.getBoundingClientRect(); return box.x + box.width / 2; }"
     begin = commands.nth(len(sent) // 2).locator(".start").evaluate(middle)
     eventually(f"the mark at {begin}", lambda: abs(page.locator(".diagram .cursor").evaluate(middle) - begin) < 1.5)
+
+
+@pytest.mark.parametrize("scheme, width", [("dark", 1440), ("light", 390)])
+def test_a_diagram_is_saved_light_and_of_a_stated_size(recorded, open_page, screenshots, scheme, width):
+    page = open_page(recorded[0], scheme=scheme, width=width)
+    open_diagram(page)
+    assert "180 mm" in page.get_by_test_id("diagram-save").get_attribute("title")
+    with page.expect_download() as download:
+        page.get_by_test_id("diagram-save").click()
+    assert download.value.suggested_filename == "console-test-ticks-0-119.svg"
+    kept = screenshots / f"diagram-saved-{width}.svg"
+    download.value.save_as(kept)
+
+    text = kept.read_text()
+    root = ElementTree.fromstring(text)
+    assert root.get("height").endswith("mm") and 100 < float(root.get("width").removesuffix("mm")) <= 180
+    # Its style is its own, and the same on a dark screen.
+    assert "@media" not in text
+    file = open_page(kept.as_uri(), scheme=scheme)
+    assert file.locator(".paper").first.evaluate("paper => getComputedStyle(paper).fill") == "rgb(255, 255, 255)"
+    words = " ".join("".join(one.itertext()) for one in root.iter("{http://www.w3.org/2000/svg}text"))
+    for word in ("console-test, seed 2002", "ticks 0 to 119", "HAPPY", "SERVE", "command", "Butler"):
+        assert word in words, words
 
 
 def test_a_click_beside_everything_shows_the_tick_of_its_place(recorded, open_page):

@@ -1,8 +1,10 @@
 """Links, pictures, keys, calm motion, and contrast."""
 
+import base64
 import pathlib
 import subprocess
 import sys
+import zlib
 from xml.etree import ElementTree
 
 import pytest
@@ -50,18 +52,40 @@ def test_a_link_leads_to_a_tick_and_a_robot(recorded, open_page):
     expect(page.get_by_test_id("tick")).to_have_text("150")
 
 
-def test_the_plan_is_saved_as_a_picture_and_fills_the_screen(launch, open_page, tmp_path):
-    page = open_page(launch().address)
+# The color of a pixel of a picture, which is decoded by the browser: its checksums hold.
+PIXEL = """([png, x, y]) => {
+    const picture = new Image();
+    picture.src = `data:image/png;base64,${png}`;
+    return picture.decode().then(() => {
+        const copy = new OffscreenCanvas(1, 1).getContext('2d');
+        copy.drawImage(picture, -x, -y);
+        return [...copy.getImageData(0, 0, 1, 1).data].slice(0, 3);
+    });
+}"""
+
+
+@pytest.mark.parametrize("scheme, width", [("light", 1440), ("dark", 390)])
+def test_the_plan_is_saved_as_a_light_picture_of_a_stated_size(launch, open_page, screenshots, scheme, width):
+    page = open_page(launch().address, width=width, scheme=scheme)
     expect(page.get_by_test_id("tick")).to_have_text("0")
+    assert "180 mm at 300 dpi" in page.get_by_test_id("picture").get_attribute("title")
     with page.expect_download() as download:
         page.get_by_test_id("picture").click()
     assert download.value.suggested_filename == "console-test-tick-0.png"
-    download.value.save_as(tmp_path / "plan.png")
-    start = (tmp_path / "plan.png").read_bytes()[:24]
-    width, height = (int.from_bytes(start[at : at + 4], "big") for at in (16, 20))
-    assert start[:8] == b"\x89PNG\r\n\x1a\n"
-    assert [width, height] == page.evaluate("(() => { const {width, height} = document.querySelector('#plan'); return [width, height]; })()")
+    kept = screenshots / f"plan-{width}-{scheme}.png"
+    download.value.save_as(kept)
+    png = kept.read_bytes()
+    assert png[:8] == b"\x89PNG\r\n\x1a\n"
+    assert int.from_bytes(png[16:20], "big") == round(180 / 25.4 * 300)
+    density = png.index(b"pHYs")
+    per_meter = int.from_bytes(png[density + 4 : density + 8], "big")
+    assert (per_meter, png[density + 12]) == (round(300 / 0.0254), 1)
+    assert zlib.crc32(png[density : density + 13]) == int.from_bytes(png[density + 13 : density + 17], "big")
+    assert page.evaluate(PIXEL, [base64.b64encode(png).decode(), 4, 4]) == [0xF6, 0xF5, 0xF2]
 
+
+def test_the_plan_fills_the_screen(launch, open_page):
+    page = open_page(launch().address)
     page.get_by_test_id("full-screen").click()
     until(page, "document.fullscreenElement?.classList.contains('plan') ?? false")
     page.get_by_test_id("full-screen").click()
@@ -76,7 +100,9 @@ SAME = """([text, places]) => new Promise((done, failed) => {
     picture.onerror = failed;
     picture.onload = () => {
         const plan = document.querySelector('#plan'), box = plan.getBoundingClientRect();
-        const top = (picture.height - box.height) / 2;
+        const [width, height] = text.match(/viewBox="0 0 ([\\d.]+) ([\\d.]+)"/).slice(1).map(Number);
+        const [, planHeight] = text.match(/<svg x="0" y="[\\d.]+" width="([\\d.]+)" height="([\\d.]+)"/).slice(1).map(Number);
+        const {field_m} = window.carsConsole.frame(), scale = (planHeight - 52) / field_m[1];
         const color = (image, x, y, scale) => {
             const copy = new OffscreenCanvas(1, 1).getContext('2d', {willReadFrequently: true});
             copy.drawImage(image, -Math.round(x * scale), -Math.round(y * scale));
@@ -84,8 +110,8 @@ SAME = """([text, places]) => new Promise((done, failed) => {
         };
         done(places.map(([x, y]) => {
             const at = window.carsConsole.toClient(x, y);
-            const [left, down] = [at.x - box.left, at.y - box.top];
-            return [color(plan, left, down, plan.width / box.width), color(picture, left, down + top, 1)];
+            const [left, down] = [26 + x * scale, (height - planHeight) / 2 + 26 + (field_m[1] - y) * scale];
+            return [color(plan, at.x - box.left, at.y - box.top, plan.width / box.width), color(picture, left, down, picture.naturalWidth / width)];
         }));
     };
     picture.src = 'data:image/svg+xml;charset=utf-8,' + encodeURIComponent(text);
@@ -113,10 +139,15 @@ def test_the_plan_is_saved_as_a_drawing(launch, open_page, tmp_path, screenshots
     words = [text.text for text in document.iter(f"{SVG}text")]
     for word in ("Butler", "Leguin", "Bu", "Le", "SERVE", "guest", "obstacle", "blocked", "command", "lost command", "cut off"):
         assert word in words, words
+    frame = page.evaluate("window.carsConsole.frame()")
+    for word in ("console-test", "1.5 s of 600.0 s, tick 3", f"seed {frame['seed']}", "2 m", *(robot["emotion_state"] for robot in frame["robots"])):
+        assert word in words, (word, words)
+    assert document.get("width") == "180mm" and document.get("height").endswith("mm")
     assert len([path for path in document.iter(f"{SVG}g") if path.get("transform")]) == 2, "a face for each robot"
 
-    # In the middle of an obstacle, in a robot, and on a guest the picture is what the canvas shows. The ring is two pixels wide and
+    # In the middle of an obstacle, in a robot, and on a guest the picture is what the canvas shows on a light page. The ring is two pixels wide and
     # smooth at its edges, so where the canvas has its color the picture has nearly that.
+    page.emulate_media(color_scheme="light")
     robot = page.evaluate("window.carsConsole.frame().robots[0].location")
     guest = page.evaluate("window.carsConsole.frame().guests[0]")
     places = [[0.45, 0.45], [robot["x"] - 0.25, robot["y"]], guest]
@@ -135,8 +166,8 @@ def test_the_plan_is_saved_as_a_drawing(launch, open_page, tmp_path, screenshots
 
 # A plan of its own that shows the page's frame, and a place to which Butler may move.
 PLAN = """
-    const [{Plan}, {Store}, {Units}, {Vector}] =
-        await Promise.all(['plan', 'store', 'units', 'vector'].map((name) => import(`./assets/${name}.js`)));
+    const [{Plan}, {Store}, {Units}, {picture}] =
+        await Promise.all(['plan', 'store', 'units', 'picture'].map((name) => import(`./assets/${name}.js`)));
     const frame = window.carsConsole.frame();
     const there = {x: frame.robots[0].location.x + 3, y: frame.robots[0].location.y};
     const begin = () => {
@@ -154,19 +185,16 @@ def test_pictures_are_of_a_tick_and_not_of_the_way_to_it(launch, open_page):
     expect(page.get_by_test_id("tick")).to_have_text("0")
     places = page.evaluate(
         f"""async () => {{ {PLAN}
-            const saved = {{png: (plan) => void plan.picture(), svg: (plan) => plan.drawOn(new Vector())}};
-            return Object.entries(saved).map(([kind, save]) => {{
-                const {{store, plan, butler_x}} = begin();
-                const robots = [{{...frame.robots[0], location: there}}, frame.robots[1]];
-                store.show({{...frame, tick: frame.tick + 1, speed: 1, robots}});
-                plan.paint(performance.now());
-                const onTheWay_x = butler_x();
-                save(plan);
-                return [kind, onTheWay_x < there.x, butler_x() === there.x];
-            }});
+            const {{store, plan, butler_x}} = begin();
+            const robots = [{{...frame.robots[0], location: there}}, frame.robots[1]];
+            store.show({{...frame, tick: frame.tick + 1, speed: 1, robots}});
+            plan.paint(performance.now());
+            const onTheWay_x = butler_x();
+            picture(plan, new Map());
+            return [onTheWay_x < there.x, butler_x() === there.x];
         }}"""
     )
-    assert places == [["png", True, True], ["svg", True, True]]
+    assert places == [True, True]
 
 
 def test_foreign_text_in_a_drawing_is_text(launch, open_page):
@@ -176,7 +204,7 @@ def test_foreign_text_in_a_drawing_is_text(launch, open_page):
         """() => import('./assets/vector.js').then(({Vector}) => {
             const paper = new Vector();
             paper.fillText('</text><script>1</script>&"\\u0000\\ud800', 1, 2);
-            return paper.document(10, 10, '<b>');
+            return paper.document(10, 10, '<b>', 10);
         })"""
     )
     document = ElementTree.fromstring(text)

@@ -17,7 +17,7 @@ import { renderEmotions } from "./legend.js";
 import { LogView } from "./log.js";
 import { Notices } from "./notices.js";
 import { Panels } from "./panels.js";
-import { picture } from "./picture.js";
+import { inPixels, picture } from "./picture.js";
 import { Plan } from "./plan.js";
 import { Player } from "./recording.js";
 import { setRoster } from "./roster.js";
@@ -436,7 +436,8 @@ box("link").addEventListener("click", async () => {
   notices.note(await share({ run: store.run, tick, robot: plan.chosen }));
 });
 box("picture").addEventListener("click", async () => {
-  download(await plan.picture(), `${store.run}-tick-${store.frame?.tick ?? 0}.png`);
+  const name = `${store.run}-tick-${store.frame?.tick ?? 0}.png`;
+  download(await inPixels(picture(plan, store.panels)), name);
 });
 box("vector").addEventListener("click", () => {
   const svg = new Blob([picture(plan, store.panels)], { type: "image/svg+xml" });

@@ -42,6 +42,15 @@ export class Camera {
     return this.zoom === 1;
   }
 
+  /**
+   * The height at which a field fills the width.
+   * @param {[number, number]} field_m
+   * @param {number} width_px
+   */
+  heightFor([width_m, height_m], width_px) {
+    return Math.round(((width_px - 2 * MARGIN_PX) * height_m) / width_m) + 2 * MARGIN_PX;
+  }
+
   /** CSS pixels per meter. */
   get scale() {
     const across = (this.width_px - 2 * MARGIN_PX) / this.field_m[0];

@@ -1,6 +1,8 @@
 // @ts-check
 // The space-time diagram of what is recorded, also while the run goes on: the server draws a window of it, a click seeks.
 
+import { printedRules } from "./palette.js";
+import { download } from "./share.js";
 import { html, nothing, render } from "./vendor/lit-html.js";
 
 /** Ticks of the first window. */
@@ -10,6 +12,9 @@ const LEAST_TICKS = 15;
 const MOST_TICKS = 4096;
 const LEAST_WIDTH_PX = 300;
 const MOST_WIDTH_PX = 4800;
+/** Most width of a diagram that is saved, 180 mm, at the pixels of an inch in style sheets. */
+const PAPER_PX = 680;
+const DPI = 96;
 
 export class DiagramView {
   /**
@@ -122,20 +127,41 @@ export class DiagramView {
         <button type="button" data-testid="diagram-out" aria-label="Longer time" ?disabled=${this.ticks > this.last || this.ticks >= MOST_TICKS}
           @click=${() => this.zoom(2)}>−</button>
         <label class="check"><input type="checkbox" data-testid="diagram-queries" .checked=${this.hasQueries} @change=${toggle} /><span>Lost queries</span></label>
+        <button type="button" data-testid="diagram-save" title="what is shown, in light colors: a drawing of at most 180 mm" @click=${() => this.save()}>SVG</button>
         ${this.reason ? html`<span class="muted" role="status">${this.reason}</span>` : nothing}`,
       this.bar,
     );
   }
 
-  /** Fetches the window, unless it is shown already or has been requested. @param {number} width */
-  async request(width) {
-    const query = new URLSearchParams({
+  /** The window. @param {number} width pixels */
+  query(width) {
+    return new URLSearchParams({
       from: String(this.from),
       count: String(this.ticks),
       width: String(Math.floor(width)),
       queries: String(this.hasQueries),
       epoch: String(this.player.header?.epoch ?? 0),
     });
+  }
+
+  /** Saves the window for paper: light, with its style sheet, and of a size in millimeters. */
+  async save() {
+    const { svg, reason } = await fetchDiagram(this.query(PAPER_PX));
+    this.reason = reason;
+    this.renderBar();
+    if (!svg) return;
+
+    for (const side of /** @type {const} */ (["width", "height"])) svg.setAttribute(side, `${((svg.viewBox.baseVal[side] * 25.4) / DPI).toFixed(2)}mm`);
+    const style = document.createElementNS(svg.namespaceURI, "style");
+    style.textContent = printedRules().map(({ cssText }) => cssText).join("\n");
+    svg.prepend(style);
+    const { from, to } = svg.dataset;
+    download(new Blob([new XMLSerializer().serializeToString(svg)], { type: "image/svg+xml" }), `${this.player.store.run}-ticks-${from}-${to}.svg`);
+  }
+
+  /** Fetches the window, unless it is shown already or has been requested. @param {number} width */
+  async request(width) {
+    const query = this.query(width);
     // The window of a run in progress is drawn anew until it is complete.
     const complete = Math.min(this.last, this.from + this.ticks);
     const wanted = `${query} ${complete} ${this.player.header?.number}`;

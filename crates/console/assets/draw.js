@@ -207,7 +207,7 @@ export function body({ context, theme }, { letters, radius, presence, emotion, i
   if (isLate && isHere) ring(context, x, y, outside + 2.5, theme.warning, 2.5, [4, 4]);
   if (isHere && emotion) {
     disk(context, x, y, outside, theme.muted);
-    disk(context, x, y, outside - 0.75, stateColors("emotion", emotion).fill);
+    disk(context, x, y, outside - 0.75, stateColors("emotion", emotion, theme.isOnPaper).fill);
     disk(context, x, y, radius + 0.75, theme.field);
   }
   disk(context, x, y, radius, isHere ? theme.robot : theme.absentFill);

@@ -34,7 +34,7 @@ function guide(place, store) {
       <li><b>Look.</b> ${hasNotBegun ? html`The run waits: press <i>Start</i> at the top. ` : nothing}The ring around a robot is its emotion, an envelope is a command.</li>
       <li><b>Cut a link.</b> The tab <i>Experiment</i>, one robot <i>from</i>, the other one <i>to</i>, <i>Cut</i>.</li>
       <li><b>Why?</b> The panel beside the plan says <i>why</i> a robot feels so; the log has each change.</li>
-      <li><b>Go back.</b> Drag the time line to any moment; <i>Live</i> goes on with the run.</li>
+      <li><b>Go back.</b> Drag the time line to any moment; <i>Back to now</i> goes on with the run.</li>
       <li><b>Verify.</b> After the end, in a terminal: <code data-testid="guide-verify">cars verify ${store.run}</code> executes it again, and compares.</li>
     </ol>
     <button type="button" data-testid="guide-dismiss" @click=${() => close(true)}>Do not show this again</button>`;

@@ -37,9 +37,11 @@ export function robotColor(robot) {
  * The colors of an emotion or a behavior, for what is not in a diagram: read from the style sheet of diagrams, once each.
  * @param {"emotion" | "behavior"} kind
  * @param {string} name
+ * @param {boolean} isOnPaper whether it is for a picture that is saved
  */
-export function stateColors(kind, name) {
+export function stateColors(kind, name, isOnPaper = false) {
   const area = stateClass(kind, name);
+  if (isOnPaper) return { fill: printedFill(area), ink: printedFill(`on-${area}`) };
   const before = known.get(area);
   if (before) return before;
 
@@ -47,6 +49,17 @@ export function stateColors(kind, name) {
   known.set(area, colors);
 
   return colors;
+}
+
+/** The rules of diagrams for paper. Those for dark pages are below a condition. @returns {CSSStyleRule[]} */
+export function printedRules() {
+  const sheet = [...document.styleSheets].find(({ href }) => href?.endsWith("/diagram.css"));
+  return [...(sheet?.cssRules ?? [])].flatMap((rule) => (rule instanceof CSSStyleRule ? [rule] : []));
+}
+
+/** @param {string} name of a class */
+function printedFill(name) {
+  return printedRules().find(({ selectorText }) => selectorText === `.cars-diagram .${name}`)?.style.fill ?? "";
 }
 
 /** @param {string} name of a class */

@@ -1,11 +1,14 @@
 // @ts-check
-// The plan as an SVG, with what one needs to read it: the robots with their faces, the emotions, and the signs.
+// The plan as a figure for paper: light, of a size in millimeters, and with what one needs to read it: run, seed and tick, the
+// robots with their faces, the emotions, and the signs. It is an SVG; a PNG is that SVG in pixels.
 
+import { Camera } from "./camera.js";
 import * as draw from "./draw.js";
 import { faceShapes } from "./face.js";
 import { intensityOf } from "./known.js";
 import { stateColors } from "./palette.js";
 import { barrier, cross, disk, envelope, line, ring } from "./shapes.js";
+import { readTheme } from "./theme.js";
 import { seconds } from "./units.js";
 import { Vector } from "./vector.js";
 
@@ -14,7 +17,17 @@ import { Vector } from "./vector.js";
 /** @typedef {import("./types/messages.js").RobotFrame} RobotFrame */
 /** @typedef {import("./theme.js").Theme} Theme */
 
+/** Of the whole figure, the width of two columns of a paper, and pixels per inch of a PNG. */
+const WIDTH_MM = 180;
+const DPI = 300;
+/** Of the plan and of what stands beside it: letters of 12.5 px are 8 pt on paper. */
+const PLAN_PX = 536;
 const SIDE_PX = 264;
+/** Least and most height of the plan. */
+const HEIGHTS_PX = /** @type {const} */ ([240, 1100]);
+/** The size of a pixel, as a PNG has it after its header of 33 bytes: 11811 pixels per meter, both ways, with its checksum. */
+const HEADER_BYTES = 33;
+const DENSITY = Uint8Array.from([0, 0, 0, 9, 112, 72, 89, 115, 0, 0, 46, 35, 0, 0, 46, 35, 1, 120, 165, 63, 118]);
 const PAD_PX = 18;
 const ROBOT_PX = 74;
 const SIGN_PX = 22;
@@ -29,17 +42,22 @@ const MOST_EMOTIONS = 8;
  * @returns {string} an SVG
  */
 export function picture(plan, panels) {
-  const { camera } = plan;
-  const theme = plan.pen.theme;
+  const camera = cameraOf(plan.camera);
+  const theme = readTheme(true);
   const frame = plan.motion.to;
   const robots = frame?.robots ?? [];
   const field = new Vector();
-  plan.drawOn(field);
+  plan.drawWith({ context: field, camera, theme });
 
   const side = new Vector();
   const words = new Words(side, theme);
-  words.bold(frame ? `${frame.run}, ${seconds(frame.time_s, frame.tick_s)}` : "", PAD_PX, 26, 15);
-  let y = 44;
+  if (frame) {
+    const { run, seed, tick, time_s, duration_s, tick_s } = frame;
+    words.bold(run.slice(0, 30), PAD_PX, 24, 15);
+    words.muted(`${seconds(time_s, tick_s)} of ${seconds(duration_s, tick_s)}, tick ${tick}`, PAD_PX, 44);
+    words.muted(`seed ${seed}`, PAD_PX, 62);
+  }
+  let y = 78;
   for (const robot of robots.slice(0, MOST_ROBOTS)) {
     person(side, words, theme, robot, panels.get(robot.name), y);
     y += ROBOT_PX;
@@ -57,7 +75,34 @@ export function picture(plan, panels) {
   whole.fillRect(0, 0, width, height);
   whole.put(field.element(0, (height - camera.height_px) / 2, camera.width_px, camera.height_px));
   whole.put(side.element(camera.width_px, 0, SIDE_PX, height));
-  return whole.document(width, height, sentence(robots));
+  return whole.document(width, height, sentence(robots), WIDTH_MM);
+}
+
+/** What a camera shows, in the size of the figure. @param {Camera} shown */
+function cameraOf({ field_m, zoom, center }) {
+  const [least, most] = HEIGHTS_PX;
+  const camera = new Camera();
+  camera.fit(field_m, PLAN_PX, Math.min(most, Math.max(least, camera.heightFor(field_m, PLAN_PX))));
+  return Object.assign(camera, { zoom, center });
+}
+
+/**
+ * The same figure in pixels.
+ * @param {string} svg
+ * @returns {Promise<Blob>}
+ */
+export async function inPixels(svg) {
+  const image = new Image();
+  image.src = `data:image/svg+xml;charset=utf-8,${encodeURIComponent(svg)}`;
+  await image.decode();
+
+  const width = Math.round((WIDTH_MM / 25.4) * DPI);
+  const canvas = new OffscreenCanvas(width, Math.round((width * image.naturalHeight) / image.naturalWidth));
+  const context = canvas.getContext("2d");
+  if (!context) throw new Error("this browser draws no canvas");
+  context.drawImage(image, 0, 0, canvas.width, canvas.height);
+  const png = await canvas.convertToBlob();
+  return new Blob([png.slice(0, HEADER_BYTES), DENSITY, png.slice(HEADER_BYTES)], { type: png.type });
 }
 
 /** What is to be seen, for those who do not see it. @param {RobotFrame[]} robots */
@@ -117,8 +162,7 @@ function person(paper, words, theme, robot, panel, y) {
   draw.body({ context: paper, theme }, look, left + look.radius, y + 11);
   words.bold(name.slice(0, 24), left + 2 * look.radius + 7, y + 11);
   if (emotion) {
-    const { fill } = stateColors("emotion", emotion);
-    disk(paper, left + 6, y + 32, 6, fill);
+    disk(paper, left + 6, y + 32, 6, stateColors("emotion", emotion, true).fill);
     words.put(emotion.slice(0, 24), left + 18, y + 32, "600 12.5px", theme.text);
   }
   words.muted((behavior_state || "has not acted yet").slice(0, 28), left, y + 50);
@@ -167,7 +211,7 @@ function legend(paper, words, theme, robots, hasTrails, y) {
   row((at) => draw.body({ context: paper, theme }, { ...look, emotion: first }, x, at), first ? "robot, and its emotion" : "robot");
   for (const emotion of emotions.slice(0, MOST_EMOTIONS)) {
     const count = robots.filter((robot) => robot.emotion_state === emotion).length;
-    row((at) => disk(paper, x + 26, at, 5.5, stateColors("emotion", emotion).fill), "");
+    row((at) => disk(paper, x + 26, at, 5.5, stateColors("emotion", emotion, true).fill), "");
     words.muted(`${emotion.slice(0, 22)}${robots.length > MOST_ROBOTS ? ` (${count})` : ""}`, x + 40, y - SIGN_PX);
   }
   row((at) => draw.guestCircles({ context: paper, theme }, [x, at], 6), "guest");

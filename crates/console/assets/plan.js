@@ -170,7 +170,7 @@ export class Plan {
     const { camera, theme } = this.pen;
     const radius = draw.guestRadius(camera, body_m);
     const guests = hasGuests ? draw.guestsAt(camera, this.motion.now_m, radius) : [];
-    this.ground.renew(this.pen, this.canvas, obstacles, body_m, this.step_m());
+    this.ground.renew(this.pen, this.canvas, obstacles, body_m, this.step_m(camera));
     if (this.crowd.takes(guests.length / 2, radius)) {
       this.crowd.draw(this.context, this.ground.pixels(), theme, guests, radius, this.sprites.ratio);
       return;
@@ -200,7 +200,7 @@ export class Plan {
 
     for (const robot of frame.robots) {
       const marks = { isLate: late.has(robot.name), isChosen: robot.name === this.chosen };
-      const look = draw.lookOf(robot, this.camera, frame.body_m, marks);
+      const look = draw.lookOf(robot, pen.camera, frame.body_m, marks);
       drawRobot(pen, robot, look, motion.robotsNow.get(robot.name) ?? robot.location);
     }
 
@@ -260,17 +260,17 @@ export class Plan {
   /** @param {draw.Pen} pen */
   paintScale(pen) {
     const { unit, unit_m } = this.units;
-    const wanted = 90 / this.camera.scale / unit_m;
+    const wanted = 90 / pen.camera.scale / unit_m;
     const power = 10 ** Math.floor(Math.log10(wanted));
     const length = [5, 2, 1].map((n) => n * power).find((n) => n <= wanted) ?? power;
     draw.scaleBar(pen, length * unit_m, `${Number(length.toPrecision(1))} ${unit}`);
   }
 
-  /** Distance between grid lines. */
-  step_m() {
+  /** Distance between grid lines. @param {Camera} camera */
+  step_m(camera) {
     const { unit, unit_m } = this.units;
     const steps = unit === "ft" ? [5, 10, 50, 100, 500] : [1, 5, 10, 50, 100];
-    return (steps.find((step) => step * unit_m * this.camera.scale >= 24) ?? 1000) * unit_m;
+    return (steps.find((step) => step * unit_m * camera.scale >= 24) ?? 1000) * unit_m;
   }
 
   /**
@@ -284,35 +284,28 @@ export class Plan {
   }
 
   /**
-   * Draws what the canvas shows on another paper.
-   * @param {draw.Paper} paper
+   * Draws what the canvas shows in another place.
+   * @param {draw.Pen} pen
    */
-  drawOn(paper) {
+  drawWith(pen) {
     this.motion.arrive();
     this.touch();
-    const pen = { ...this.pen, context: paper };
+    const { camera } = pen;
     const frame = this.motion.to;
     draw.outside(pen);
     if (!frame) return;
 
-    draw.field(pen, this.step_m());
+    draw.field(pen, this.step_m(camera));
     draw.obstacles(pen, frame.obstacles, frame.body_m);
-    const radius = draw.guestRadius(this.camera, frame.body_m);
-    draw.guestCircles(pen, draw.guestsAt(this.camera, this.motion.now_m, radius), radius);
+    const radius = draw.guestRadius(camera, frame.body_m);
+    draw.guestCircles(pen, draw.guestsAt(camera, this.motion.now_m, radius), radius);
     this.paintMoving(pen, frame, (_, robot, look, place) => {
-      const x = this.camera.x(place.x);
-      const y = this.camera.y(place.y);
-      if (draw.isOutside(this.camera, x, y, draw.reach(look))) return;
+      const x = camera.x(place.x);
+      const y = camera.y(place.y);
+      if (draw.isOutside(camera, x, y, draw.reach(look))) return;
       draw.body(pen, look, x, y);
       draw.course(pen, robot, look, x, y);
     });
-  }
-
-  /** A picture of the tick that is shown. @returns {Promise<Blob | null>} */
-  picture() {
-    this.motion.arrive();
-    this.paint(performance.now());
-    return new Promise((resolve) => this.canvas.toBlob(resolve, "image/png"));
   }
 
   /**

@@ -1,5 +1,5 @@
 // @ts-check
-// Links to a run, a tick and a robot, in the fragment of the address, which never reaches a server; and a picture of the plan.
+// Links to a run, a tick and a robot, in the fragment of the address, which never reaches a server; and pictures.
 
 /** What a link leads to. @typedef {{run: string, tick: number | null, robot: string | null}} Target */
 
@@ -36,11 +36,10 @@ export async function share(target) {
 }
 
 /**
- * @param {Blob | null} picture
+ * @param {Blob} picture
  * @param {string} name of the file
  */
 export function download(picture, name) {
-  if (!picture) return;
   const link = document.createElement("a");
   link.href = URL.createObjectURL(picture);
   link.download = name;

@@ -1,10 +1,10 @@
 // @ts-check
-// The colors of the style sheet for canvases; they follow light and dark mode.
+// The colors of the style sheet for canvases, which follow light and dark mode, and for pictures that are saved, which are light.
 
 /** @typedef {Record<"field" | "outside" | "grid" | "edge" | "obstacle" | "obstacleEdge" | "guest" | "guestFill" | "robot" | "robotText"
- *   | "absent" | "absentFill" | "accent" | "warning" | "bad" | "muted" | "text" | "font" | "skin" | "ink", string>} Theme */
+ *   | "absent" | "absentFill" | "accent" | "warning" | "bad" | "muted" | "text" | "font" | "skin" | "ink", string> & {isOnPaper: boolean}} Theme */
 
-/** Names in the style sheet. @type {[keyof Theme, string][]} */
+/** Names in the style sheet. @type {[string, string][]} */
 const NAMES = [
   ["field", "--field"],
   ["outside", "--outside"],
@@ -28,11 +28,14 @@ const NAMES = [
   ["ink", "--ink"],
 ];
 
-/** @returns {Theme} */
-export function readTheme() {
-  const style = getComputedStyle(document.documentElement);
+/** @param {boolean} isOnPaper whether it is that of pictures that are saved @returns {Theme} */
+export function readTheme(isOnPaper = false) {
+  const place = document.body.appendChild(document.createElement("div"));
+  place.className = isOnPaper ? "on-paper" : "";
+  const style = getComputedStyle(place);
   const entries = NAMES.map(([key, name]) => [key, style.getPropertyValue(name).trim()]);
-  return Object.fromEntries(entries);
+  place.remove();
+  return Object.fromEntries([...entries, ["isOnPaper", isOnPaper]]);
 }
 
 /** @param {() => void} listener */

@@ -137,11 +137,11 @@ export class Vector {
   }
 
   /**
-   * What was drawn, as a document.
-   * @type {(width: number, height: number, title: string) => string}
+   * What was drawn, as a document that is so wide on paper.
+   * @type {(width: number, height: number, title: string, width_mm: number) => string}
    */
-  document(width, height, title) {
-    const size = `width="${n(width)}" height="${n(height)}" viewBox="0 0 ${n(width)} ${n(height)}"`;
+  document(width, height, title, width_mm) {
+    const size = `width="${n(width_mm)}mm" height="${n((width_mm * height) / width)}mm" viewBox="0 0 ${n(width)} ${n(height)}"`;
     return `<svg xmlns="http://www.w3.org/2000/svg" ${size} role="img">\n<title>${escape(title)}</title>\n${this.parts.join("\n")}\n</svg>\n`;
   }
 }

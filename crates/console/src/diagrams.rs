@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 
 use pictures::diagram::{Diagram, DiagramOptions, TooMuch};
 use protocol::{Epoch, Tick};
-use recording::{Recording, RecordingError};
+use recording::{Header, Recording, RecordingError};
 use serde::Deserialize;
 use timeline::Timeline;
 
@@ -76,7 +76,9 @@ impl Diagrams {
     ) -> Result<String, DiagramError> {
         let from = window.from.min(file.len().saturating_sub(1));
         let to = from.saturating_add(window.count).min(file.len());
+        let Header { run, seed, .. } = file.header();
         let options = DiagramOptions {
+            title: format!("{run}, seed {seed}"),
             queries: window.queries,
             max_width_px: window.width,
             has_style: false,
