@@ -68,6 +68,27 @@ def test_axe_finds_nothing_in_a_run(launch, open_page, axe, many, width, height)
     assert found == []
 
 
+@pytest.mark.parametrize("many", [False, True])
+@pytest.mark.parametrize("on_late, presence", [("wait", "gone"), ("continue", "lost")])
+def test_what_is_told_of_a_robot_that_is_gone_can_be_read(launch, open_page, axe, screenshots, many, on_late, presence):
+    options = ("--set", f"on_late={on_late}", "--set", f"deadline={'60' if on_late == 'wait' else '0.5'} s")
+    run = launch(kind=Crowd, robots=12, guests=20, options=options) if many else launch(options=options)
+    page = open_page(run.address, *LAPTOP)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    page.get_by_test_id("btn-step").click()
+    expect(page.get_by_test_id("tick")).to_have_text("1")
+    if many:
+        page.get_by_test_id("line-Leguin3").click()
+    run.kill("refillers" if many else "Leguin")
+    page.get_by_test_id("btn-step").click()
+    panel = page.locator(f".panel.{presence}").last
+    expect(panel).to_be_visible()
+    panel.locator("summary").click()
+    found = violations(page, axe, presence)
+    page.screenshot(path=screenshots / f"{presence}-{many}.png")
+    assert found == []
+
+
 @pytest.mark.parametrize("width, height", [LAPTOP, PHONE])
 def test_axe_finds_nothing_in_a_recording(launch, open_page, axe, width, height):
     run = launch(options=("--speed", "max", "--duration", "50 s"))

@@ -212,13 +212,20 @@ export function body({ context, theme }, { letters, radius, presence, emotion, i
   }
   disk(context, x, y, radius, isHere ? theme.robot : theme.absentFill);
   if (!isHere) ring(context, x, y, radius - 1, presence === "lost" ? theme.absent : theme.robot, 2.25, [3, 3]);
-  context.fillStyle = isHere ? theme.robotText : theme.absent;
+  if (presence === "lost") cross(context, x, y, radius * 1.15, theme.absent);
   const size = letters.length > 2 ? Math.max(8.5, radius * 0.75) : Math.max(10, radius * 0.95);
   context.font = `650 ${Math.min(22, size)}px ${theme.font}`;
   context.textAlign = "center";
   context.textBaseline = "middle";
+  if (presence === "lost") {
+    // The cross is not to be taken for a part of the letters.
+    context.strokeStyle = theme.absentFill;
+    context.lineWidth = 5;
+    context.lineJoin = "round";
+    context.strokeText(letters, x, y + 0.5);
+  }
+  context.fillStyle = isHere ? theme.robotText : theme.absent;
   context.fillText(letters, x, y + 0.5);
-  if (presence === "lost") cross(context, x, y, radius * 1.15, theme.absent);
 }
 
 /**
