@@ -57,6 +57,28 @@ def test_an_emotion_has_one_color_on_the_plan_and_in_the_panel(launch, open_page
     page.screenshot(path=screenshots / f"emotions-{width}-{scheme}.png")
 
 
+def test_emotions_of_one_color_are_told_apart_on_the_plan_and_in_badges(launch, open_page):
+    """Of 40 emotions some have the same color: their areas are hatched, the rings dashed, and badges have lines."""
+    page = open_page(launch().address)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    looks = page.evaluate(
+        """async () => {
+            const [{badgeStyle, stateLook}, draw, {readTheme}] =
+                await Promise.all(['palette', 'draw', 'theme'].map((name) => import(`./assets/${name}.js`)));
+            return Array.from({length: 32}, (_, i) => `E${i}`).map((name) => {
+                const robot = {name: 'Butler', emotion_state: name, presence: 'here'};
+                const look = draw.lookOf(robot, {scale: 40}, 0.6, {isLate: false, isChosen: false});
+                const canvas = new OffscreenCanvas(60, 60), context = canvas.getContext('2d');
+                draw.body({context, theme: readTheme()}, look, 30, 30);
+                const pixels = [...context.getImageData(0, 0, 60, 60).data].join();
+                return [stateLook('emotion', name).area, pixels, badgeStyle('emotion', name)];
+            });
+        }"""
+    )
+    areas, rings, badges = ({look[i] for look in looks} for i in range(3))
+    assert (len(areas), len(rings), len(badges)) == (8, 32, 32)
+
+
 def test_initials_are_unique_and_the_name_is_shown_on_hover(launch, open_page):
     run = launch()
     page = open_page(run.address)

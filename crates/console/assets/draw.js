@@ -1,7 +1,7 @@
 // @ts-check
 // Draws the plan. Every function draws one kind of object and keeps no state.
 
-import { robotColor, stateColors } from "./palette.js";
+import { robotColor, stateColors, stateLook } from "./palette.js";
 import { initials } from "./roster.js";
 import { barrier, cross, disk, envelope, line, nose, ring, text } from "./shapes.js";
 
@@ -13,7 +13,7 @@ import { barrier, cross, disk, envelope, line, nose, ring, text } from "./shapes
 /** A canvas, or what writes SVG in its place. @typedef {import("./shapes.js").Paper} Paper */
 /** @typedef {{context: Paper, camera: Camera, theme: Theme}} Pen */
 /** How a robot looks, wherever it is and goes.
- * @typedef {{letters: string, radius: number, presence: RobotFrame["presence"], emotion: string, isLate: boolean, isChosen: boolean}} Look */
+ * @typedef {{letters: string, radius: number, presence: RobotFrame["presence"], emotion: string, hatching: number, isLate: boolean, isChosen: boolean}} Look */
 /** What is drawn of a robot beside its body. @typedef {Pick<RobotFrame, "presence" | "blocked" | "direction_rad" | "speed_mps">} Drawn */
 
 const FULL_TURN = 2 * Math.PI;
@@ -21,6 +21,8 @@ const FULL_TURN = 2 * Math.PI;
 const SMALLEST_ROBOT_PX = 9;
 /** Width of the ring in the color of the emotion, with its edge. */
 const RING_PX = 4.5;
+/** Dashes of the ring of an emotion whose areas are hatched, by their hatching. */
+const DASHES = [[], [7, 3], [3, 3], [2, 2, 8, 2]];
 /** Smaller guests would not be seen. */
 const SMALLEST_GUEST_PX = 0.75;
 /** Guests with a larger radius are pale, with an edge, so that robots stand out among them. */
@@ -185,12 +187,28 @@ export function lookOf({ name, emotion_state, presence }, camera, body_m, { isLa
   const letters = initials(name);
   const least = letters.length > 2 ? SMALLEST_ROBOT_PX + 1 : SMALLEST_ROBOT_PX;
   const radius = Math.max(least, (body_m * camera.scale) / 2);
-  return { letters, radius, presence, emotion: emotion_state, isLate, isChosen };
+  const { hatching } = stateLook("emotion", emotion_state);
+  return { letters, radius, presence, emotion: emotion_state, hatching, isLate, isChosen };
 }
 
 /** Half the side of a square around a robot's look. @param {Look} look */
 export function reach({ radius }) {
   return Math.ceil(radius * 1.15 + RING_PX + 8);
+}
+
+/**
+ * The color of an emotion: a disk, or a ring with the dashes that it has around robots.
+ * @param {Omit<Pen, "camera">} pen
+ * @param {string} emotion
+ * @param {number} x
+ * @param {number} y
+ * @param {number} radius
+ */
+export function emotionSign({ context, theme }, emotion, x, y, radius) {
+  const { hatching } = stateLook("emotion", emotion);
+  const { fill } = stateColors("emotion", emotion, theme.isOnPaper);
+  if (hatching) ring(context, x, y, radius - 1.5, fill, 3, DASHES[hatching]);
+  else disk(context, x, y, radius, fill);
 }
 
 /**
@@ -200,15 +218,17 @@ export function reach({ radius }) {
  * @param {number} x
  * @param {number} y
  */
-export function body({ context, theme }, { letters, radius, presence, emotion, isLate, isChosen }, x, y) {
+export function body({ context, theme }, { letters, radius, presence, emotion, hatching, isLate, isChosen }, x, y) {
   const isHere = presence === "here";
   const outside = radius + RING_PX;
   if (isChosen) ring(context, x, y, outside + 5, theme.accent, 2);
   if (isLate && isHere) ring(context, x, y, outside + 2.5, theme.warning, 2.5, [4, 4]);
   if (isHere && emotion) {
+    const { fill } = stateColors("emotion", emotion, theme.isOnPaper);
     disk(context, x, y, outside, theme.muted);
-    disk(context, x, y, outside - 0.75, stateColors("emotion", emotion, theme.isOnPaper).fill);
+    disk(context, x, y, outside - 0.75, hatching ? theme.field : fill);
     disk(context, x, y, radius + 0.75, theme.field);
+    if (hatching) ring(context, x, y, radius + RING_PX / 2, fill, RING_PX - 1.5, DASHES[hatching]);
   }
   disk(context, x, y, radius, isHere ? theme.robot : theme.absentFill);
   if (!isHere) ring(context, x, y, radius - 1, presence === "lost" ? theme.absent : theme.robot, 2.25, [3, 3]);

@@ -51,6 +51,19 @@ export function stateColors(kind, name, isOnPaper = false) {
   return colors;
 }
 
+/**
+ * The style of a badge: its color, and at its left the lines of an area that is hatched.
+ * @param {"emotion" | "behavior"} kind
+ * @param {string} name
+ */
+export function badgeStyle(kind, name) {
+  const { fill, ink } = stateColors(kind, name);
+  const { hatching } = stateLook(kind, name);
+  if (!hatching) return `background:${fill};color:${ink}`;
+  const lines = `repeating-linear-gradient(${[0, 135, 90, 45][hatching]}deg, transparent 0 2px, var(--surface) 2px 4px)`;
+  return `background:${lines} 0 0 / 14px 100% no-repeat, ${fill};color:${ink};padding-left:18px`;
+}
+
 /** The rules of diagrams for paper. Those for dark pages are below a condition. @returns {CSSStyleRule[]} */
 export function printedRules() {
   const sheet = [...document.styleSheets].find(({ href }) => href?.endsWith("/diagram.css"));

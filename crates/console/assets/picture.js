@@ -6,7 +6,6 @@ import { Camera } from "./camera.js";
 import * as draw from "./draw.js";
 import { faceShapes } from "./face.js";
 import { intensityOf } from "./known.js";
-import { stateColors } from "./palette.js";
 import { barrier, cross, disk, envelope, line, ring } from "./shapes.js";
 import { readTheme } from "./theme.js";
 import { seconds } from "./units.js";
@@ -162,7 +161,7 @@ function person(paper, words, theme, robot, panel, y) {
   draw.body({ context: paper, theme }, look, left + look.radius, y + 11);
   words.bold(name.slice(0, 24), left + 2 * look.radius + 7, y + 11);
   if (emotion) {
-    disk(paper, left + 6, y + 32, 6, stateColors("emotion", emotion, true).fill);
+    draw.emotionSign({ context: paper, theme }, emotion, left + 6, y + 32, 6);
     words.put(emotion.slice(0, 24), left + 18, y + 32, "600 12.5px", theme.text);
   }
   words.muted((behavior_state || "has not acted yet").slice(0, 28), left, y + 50);
@@ -206,12 +205,12 @@ function legend(paper, words, theme, robots, hasTrails, y) {
 
   const emotions = [...new Set(robots.map((robot) => robot.emotion_state))].filter(Boolean);
   const first = emotions[0] ?? "";
-  const look = /** @type {const} */ ({ letters: "", radius: 6, presence: "here", isLate: false, isChosen: false });
+  const look = /** @type {const} */ ({ letters: "", radius: 6, presence: "here", hatching: 0, isLate: false, isChosen: false });
   y += 6;
   row((at) => draw.body({ context: paper, theme }, { ...look, emotion: first }, x, at), first ? "robot, and its emotion" : "robot");
   for (const emotion of emotions.slice(0, MOST_EMOTIONS)) {
     const count = robots.filter((robot) => robot.emotion_state === emotion).length;
-    row((at) => disk(paper, x + 26, at, 5.5, stateColors("emotion", emotion, true).fill), "");
+    row((at) => draw.emotionSign({ context: paper, theme }, emotion, x + 26, at, 5.5), "");
     words.muted(`${emotion.slice(0, 22)}${robots.length > MOST_ROBOTS ? ` (${count})` : ""}`, x + 40, y - SIGN_PX);
   }
   row((at) => draw.guestCircles({ context: paper, theme }, [x, at], 6), "guest");

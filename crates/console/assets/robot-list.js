@@ -1,7 +1,7 @@
 // @ts-check
 // Many robots, one line each: sorted, filtered by emotion and by text. One click opens a robot's panel.
 
-import { stateColors } from "./palette.js";
+import { badgeStyle } from "./palette.js";
 import { initials } from "./roster.js";
 import { html, noChange, nothing, render } from "./vendor/lit-html.js";
 
@@ -121,9 +121,9 @@ export class RobotList {
   line(line, at, open) {
     const { name, emotion, intensity, behavior, held, isAbsent } = line;
     const isOpen = name === open;
-    const { fill, ink } = stateColors("emotion", emotion);
+    const style = badgeStyle("emotion", emotion);
     const part = intensity === null ? "" : intensity.toFixed(2);
-    const key = [name, initials(name), emotion, fill, part, behavior, held, isAbsent, isOpen].join("\n");
+    const key = [name, initials(name), emotion, style, part, behavior, held, isAbsent, isOpen].join("\n");
     // What has not changed is not rendered again.
     if (this.drawn[at] === key) return noChange;
     this.drawn[at] = key;
@@ -131,7 +131,7 @@ export class RobotList {
     return html`<li><button type="button" class="list-line" data-testid="line-${name}" aria-pressed=${isOpen}
       @click=${() => this.client.choose(name)}>
       <span class="name"><span class="initials ${isAbsent ? "absent" : ""} ${initials(name).length > 2 ? "three" : ""}" aria-hidden="true">${initials(name)}</span><span class="full">${name}</span></span>
-      <span class="emotion">${emotion ? html`<span class="badge state" .style=${`background:${fill};color:${ink}`}>${emotion}</span>` : "–"}</span>
+      <span class="emotion">${emotion ? html`<span class="badge state" .style=${style}>${emotion}</span>` : "–"}</span>
       <span class="intensity">${part === "" ? "–" : html`<svg viewBox="0 0 1 1" preserveAspectRatio="none" aria-hidden="true"><rect class="rail"
         width="1" height="1"></rect><rect class="level" width=${part} height="1"></rect></svg>${part}`}</span>
       <span class="behavior">${behavior || "–"}</span>

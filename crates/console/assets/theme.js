@@ -32,13 +32,20 @@ const NAMES = [
 export function readTheme(isOnPaper = false) {
   const place = document.body.appendChild(document.createElement("div"));
   place.className = isOnPaper ? "on-paper" : "";
+  place.style.setProperty("forced-color-adjust", "none");
   const style = getComputedStyle(place);
-  const entries = NAMES.map(([key, name]) => [key, style.getPropertyValue(name).trim()]);
+  const entries = NAMES.map(([key, name]) => {
+    const value = style.getPropertyValue(name).trim();
+    // A color of the system has a name, which canvases off the screen do not know.
+    if (!/^[A-Z][A-Za-z]+$/.test(value)) return [key, value];
+    place.style.color = value;
+    return [key, style.color];
+  });
   place.remove();
   return Object.fromEntries([...entries, ["isOnPaper", isOnPaper]]);
 }
 
 /** @param {() => void} listener */
 export function onThemeChange(listener) {
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", listener);
+  for (const what of ["prefers-color-scheme: dark", "forced-colors: active"]) matchMedia(`(${what})`).addEventListener("change", listener);
 }

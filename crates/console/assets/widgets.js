@@ -2,7 +2,7 @@
 // The widgets of a robot's panel. Everything that a robot sends is untrusted: text is rendered as text, SVG as an image.
 
 import { drawFace } from "./face.js";
-import { stateColors } from "./palette.js";
+import { badgeStyle } from "./palette.js";
 import { short } from "./units.js";
 import { html, nothing, svg } from "./vendor/lit-html.js";
 
@@ -69,8 +69,7 @@ function text({ label, text }) {
 function badge({ label, text, tone: word }) {
   if (label !== "emotion" && label !== "behavior") return html`<span class="badge ${tone(word)}">${text}</span>`;
 
-  const { fill, ink } = stateColors(label, String(text));
-  return html`<span class="badge state" .style=${`background:${fill};color:${ink}`}>${text}</span>`;
+  return html`<span class="badge state" .style=${badgeStyle(label, String(text))}>${text}</span>`;
 }
 
 /** @param {Tone} word */
