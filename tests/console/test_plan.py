@@ -123,6 +123,44 @@ def test_words_of_commands_avoid_each_other(launch, open_page):
     # Far enough from each other they stand where they would alone.
     assert page.evaluate(place, [["hurry", 100, 100], ["refill", 160, 100], ["hurry", 100, 160]]) == [84, 84, 144]
 
+    # They do not cover the letters of robots, unless there are robots wherever words could stand.
+    beside = (
+        "(robots) => import('./assets/draw.js').then(({freeLine}) =>"
+        " freeLine([], 'hurry', 100, 100, robots.map(([x, y]) => ({x, y, width: 34, height: 34}))))"
+    )
+    assert page.evaluate(beside, [[100, 130]]) == 84
+    assert page.evaluate(beside, [[100, 85], [400, 120]]) == 120
+    assert page.evaluate(beside, [[100, y] for y in range(40, 160, 10)]) == 84
+
+
+def test_words_of_commands_and_cuts_are_within_the_plan(launch, open_page):
+    page = open_page(launch().address)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    words = page.evaluate(
+        """async () => {
+            const [draw, {Camera}, {readTheme}] = await Promise.all(['draw', 'camera', 'theme'].map((name) => import(`./assets/${name}.js`)));
+            const camera = new Camera();
+            camera.fit([10, 10], 300, 300);
+            const written = [];
+            const envelopes = [];
+            const calls = {fillText: written, rect: envelopes};
+            const context = new Proxy({}, {get: (_, name) => (...all) => void calls[name]?.push(all), set: () => true});
+            const flight = {text: 'bring the pencils to the hall', fate: 'sent', progress: 0, fallen: 0, landed: 0};
+            const taken = {words: [], robots: []}, pen = {context, camera, theme: readTheme()};
+            draw.cut(pen, {x: 0, y: 5}, {x: 1, y: 5}, 'Butler → Leguin', taken.words);
+            for (const x of [0, 10]) draw.flight(pen, flight, {x, y: 5}, {x: 5, y: 5}, taken, true);
+            const {words} = structuredClone(taken);
+            draw.flight(pen, {...flight, progress: 0.85}, {x: 0, y: 5}, {x: 9, y: 5}, taken, true);
+            return [written.slice(0, 3), words, envelopes];
+        }"""
+    )
+    written, taken, envelopes = words
+    # A command that waits at its target does not cover its letters.
+    assert envelopes[-1][0] + 9 == pytest.approx(26 + 248 * 0.9 - 30, abs=0.01)
+    half = len("bring the pencils to the hall") * 7 / 2
+    assert [x for _, x, _ in written[1:]] == [half + 4, 300 - half - 4]
+    assert len(taken) == 3 and len({one["y"] for one in taken}) == 3
+
 
 def test_a_robot_has_the_color_of_its_place_in_the_roster(launch, open_page):
     """The order in which a page happens to ask is of no importance."""

@@ -268,8 +268,9 @@ export function course({ context, theme }, { presence, blocked, direction_rad, s
  * @param {Place} from
  * @param {Place} to
  * @param {string} label
+ * @param {Area[]} taken where words stand
  */
-export function cut({ context, camera, theme }, from, to, label) {
+export function cut({ context, camera, theme }, from, to, label, taken) {
   const x1 = camera.x(from.x);
   const y1 = camera.y(from.y);
   const x2 = camera.x(to.x);
@@ -290,29 +291,41 @@ export function cut({ context, camera, theme }, from, to, label) {
   context.fill();
   ring(context, x, y, 9, theme.bad, 1.75);
   cross(context, x, y, 4.5, theme.bad);
-  if (label) text(context, theme, label, x, y + 20, theme.bad);
+  if (!label) return;
+  text(context, theme, label, x, y + 20, theme.bad);
+  taken.push({ x, y: y + 20, width: widthOf(label), height: LINE_PX });
 }
 
+/** An area that is taken, by its middle. @typedef {{x: number, y: number, width: number, height: number}} Area */
 /** Where the words of a command may stand, beside its envelope: the first of these that is free. Below the last one there are none. */
 const WORDS_PX = [-16, -31, 20, -46, 35];
+/** How far from the middle of a robot an envelope is beside it. */
+const BESIDE_PX = 30;
 /** Height of a line of words, and about the width of a letter. */
 const LINE_PX = 15;
 const LETTER_PX = 7;
 
+/** About the width of words. @param {string} words */
+function widthOf(words) {
+  return words.slice(0, 60).length * LETTER_PX;
+}
+
 /**
- * Where words are to stand that overlap none that stand already; `null` if there is no such place.
- * @param {{x: number, y: number, width: number}[]} taken
+ * Where words are to stand that overlap none that stand already, and no robot if that can be helped; `null` if there is no such place.
+ * @param {Area[]} taken by words; the new ones are added
  * @param {string} words
  * @param {number} x
  * @param {number} y of the envelope
+ * @param {Area[]} robots
  * @returns {number | null}
  */
-export function freeLine(taken, words, x, y) {
-  const width = words.slice(0, 60).length * LETTER_PX;
-  const isFree = (/** @type {number} */ line) =>
-    taken.every((other) => Math.abs(other.y - line) >= LINE_PX || Math.abs(other.x - x) >= (other.width + width) / 2);
-  const line = WORDS_PX.map((offset) => y + offset).find(isFree) ?? null;
-  if (line !== null) taken.push({ x, y: line, width });
+export function freeLine(taken, words, x, y, robots = []) {
+  const width = widthOf(words);
+  const isFree = (/** @type {Area[]} */ areas, /** @type {number} */ line) =>
+    areas.every((area) => Math.abs(area.y - line) >= (area.height + LINE_PX) / 2 || Math.abs(area.x - x) >= (area.width + width) / 2);
+  const free = WORDS_PX.map((offset) => y + offset).filter((line) => isFree(taken, line));
+  const line = free.find((line) => isFree(robots, line)) ?? free[0] ?? null;
+  if (line !== null) taken.push({ x, y: line, width, height: LINE_PX });
   return line;
 }
 
@@ -322,7 +335,7 @@ export function freeLine(taken, words, x, y) {
  * @param {import("./flights.js").Airborne} flight
  * @param {Place} from
  * @param {Place} to
- * @param {{x: number, y: number, width: number}[]} taken where words of other commands stand
+ * @param {{words: Area[], robots: Area[]}} taken where words and robots are
  * @param {boolean} isCalm whether it neither falls nor spreads when it arrives
  */
 export function flight({ context, camera, theme }, flight, from, to, taken, isCalm) {
@@ -331,7 +344,9 @@ export function flight({ context, camera, theme }, flight, from, to, taken, isCa
   const x2 = camera.x(to.x);
   const y2 = camera.y(to.y);
   const isLost = flight.fate === "dropped";
-  const eased = flight.progress * flight.progress * (3 - 2 * flight.progress);
+  // It waits beside its target, whose letters can be read.
+  const most = flight.fate === "sent" ? Math.max(0.5, 1 - BESIDE_PX / Math.hypot(x2 - x1, y2 - y1)) : 1;
+  const eased = Math.min(most, flight.progress * flight.progress * (3 - 2 * flight.progress));
   const x = x1 + (x2 - x1) * eased;
   const y = y1 + (y2 - y1) * eased + (isCalm ? 0 : 60 * flight.fallen * flight.fallen);
   const color = isLost && flight.fallen > 0 ? theme.bad : theme.accent;
@@ -347,8 +362,11 @@ export function flight({ context, camera, theme }, flight, from, to, taken, isCa
   if (flight.landed > 0) ring(context, x2, y2, 14 + (isCalm ? 6 : 18 * flight.landed), color, 2);
   else envelope(context, x, y, color, theme.field);
   if (isLost && flight.fallen > 0) cross(context, x, y, 9, color);
-  const line_px = flight.text ? freeLine(taken, flight.text, x, y) : null;
-  if (line_px !== null) text(context, theme, flight.text, x, line_px, color);
+  // Not beyond the edges.
+  const half = widthOf(flight.text) / 2 + 4;
+  const middle_px = Math.max(half, Math.min(camera.width_px - half, x));
+  const line_px = flight.text ? freeLine(taken.words, flight.text, middle_px, y, taken.robots) : null;
+  if (line_px !== null) text(context, theme, flight.text, middle_px, line_px, color);
   context.globalAlpha = 1;
 }
 

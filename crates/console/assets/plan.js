@@ -189,11 +189,13 @@ export class Plan {
   paintMoving(pen, frame, drawRobot) {
     const { motion } = this;
     if (this.hasTrails) this.paintTrails(pen, frame);
+    /** @type {{words: draw.Area[], robots: draw.Area[]}} */
+    const taken = { words: [], robots: [] };
 
     for (const { from, to, label } of cutPairs(frame.cuts ?? [])) {
       const a = motion.robotsNow.get(from);
       const b = motion.robotsNow.get(to);
-      if (a && b) draw.cut(pen, a, b, label);
+      if (a && b) draw.cut(pen, a, b, label, taken.words);
     }
 
     const late = new Set(this.store.awaiting().map((awaited) => awaited.name));
@@ -201,12 +203,13 @@ export class Plan {
     for (const robot of frame.robots) {
       const marks = { isLate: late.has(robot.name), isChosen: robot.name === this.chosen };
       const look = draw.lookOf(robot, pen.camera, frame.body_m, marks);
-      drawRobot(pen, robot, look, motion.robotsNow.get(robot.name) ?? robot.location);
+      const place = motion.robotsNow.get(robot.name) ?? robot.location;
+      const side = 2 * look.radius;
+      taken.robots.push({ x: pen.camera.x(place.x), y: pen.camera.y(place.y), width: side, height: side });
+      drawRobot(pen, robot, look, place);
     }
 
     // The newest first: where there is no place for all words, they are those that stay.
-    /** @type {{x: number, y: number, width: number}[]} */
-    const taken = [];
     for (const flight of [...this.flights.airborne.values()].reverse()) {
       // A sender that is not on the field, such as the operator, is drawn above it.
       const outside = { x: frame.field_m[0] / 2, y: frame.field_m[1] };
