@@ -114,3 +114,21 @@ def test_another_run_at_the_same_address_has_the_same_panes(processes, open_page
     page.goto(console("two"))
     expect(page.get_by_test_id("run")).to_have_text("two")
     eventually("the same panes", lambda: has(page, chosen))
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_phone_on_its_side_shows_the_whole_plan(launch, open_page, screenshots, scheme):
+    page = open_page(launch().address, width=844, height=390, scheme=scheme)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    for tab in ("log", "charts", "diagram", "setup", "experiment"):
+        page.get_by_test_id(f"tab-{tab}").click()
+        page.evaluate("scrollTo(0, 0)")
+        assert page.evaluate("document.documentElement.scrollWidth") <= 844
+        bar, plan, timeline = (page.locator(one).bounding_box() for one in ("#bar", ".plan-view", "#timeline"))
+        assert bar["y"] + bar["height"] <= plan["y"] and plan["y"] + plan["height"] <= timeline["y"], (bar, plan, timeline)
+        assert plan["height"] >= 200
+        page.screenshot(path=screenshots / f"{tab}-844x390-{scheme}.png")
+    for name in ("init", "start", "pause", "step", "stop"):
+        box = page.get_by_test_id(f"btn-{name}").bounding_box()
+        assert box["x"] >= 0 and box["x"] + box["width"] <= 844
+        expect(page.get_by_test_id(f"btn-{name}")).to_have_accessible_name(name.capitalize())
