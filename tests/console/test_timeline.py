@@ -8,7 +8,7 @@ from collections import Counter
 import pytest
 from playwright.sync_api import expect
 
-from lab import PATIENCE_S, eventually, newest, scrub, start_console, until
+from lab import PATIENCE_S, eventually, newest, reaches, scrub, start_console, until
 
 pytestmark = pytest.mark.thorough
 
@@ -253,6 +253,60 @@ def test_charts_and_bands_zoom_together(launch, open_page, screenshots):
     page.mouse.click(box["x"] + 76 + (box["width"] - 100) * 0.4, box["y"] + 20)
     expect(page.get_by_test_id("tick")).to_have_text("24")
     assert abs(window(page)[0] - 10) < 0.1
+
+
+def test_the_time_line_of_a_very_long_run_is_zoomed(launch, open_page, screenshots):
+    run = launch(options=("--speed", "max", "--duration", "18000 s"))
+    page = open_page(run.address, 1280, 720)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    last = 700
+    run.control("step", str(last))
+    expect(page.get_by_test_id("tick")).to_have_text(str(last))
+    reaches(page, last)
+    lane, seen, scrub_bar = (page.get_by_test_id(name) for name in ("timeline", "timeline-run", "scrub"))
+    width = lambda: seen.bounding_box()["width"]
+    before = width()
+    assert before < lane.bounding_box()["width"] * (last + 1) / 36_000 + 2
+    expect(page.get_by_test_id("timeline-whole")).to_have_count(0)
+
+    # By the wheel, around what is pointed at.
+    box = lane.bounding_box()
+    x, y = box["x"] + before / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    pointed = page.locator(".lane .crosshair").get_attribute("data-words")
+    for _ in range(3):
+        page.mouse.wheel(0, -300)
+    eventually("a shorter time", lambda: width() > 6 * before)
+    expect(page.get_by_test_id("timeline-whole")).to_be_visible()
+    page.mouse.move(x + 1, y)
+    page.mouse.move(x, y)
+    now = page.locator(".lane .crosshair").get_attribute("data-words")
+    assert abs(float(now.split()[0]) - float(pointed.split()[0])) < 20
+    # Strips, marks and the handle are where their ticks are.
+    page.mouse.click(x, y)
+    eventually("the tick", lambda: abs(tick(page) / 2 - float(now.split()[0])) <= 3)
+    rights = page.get_by_test_id("strips").locator("rect").evaluate_all("(all) => all.map((one) => one.getBoundingClientRect().right)")
+    run_box = seen.bounding_box()
+    assert max(rights) == pytest.approx(run_box["x"] + run_box["width"], abs=3)
+    page.screenshot(path=screenshots / "timeline-zoomed-1280x720.png")
+
+    page.mouse.dblclick(x, y)
+    eventually("the whole run", lambda: abs(width() - before) < 1)
+    expect(page.get_by_test_id("timeline-whole")).to_have_count(0)
+    # By keys, around what is shown.
+    page.mouse.move(640, 200)
+    scrub_bar.focus()
+    shown = tick(page)
+    for _ in range(4):
+        page.keyboard.press("+")
+    eventually("a shorter time", lambda: width() > 6 * before)
+    least, most = (int(scrub_bar.get_attribute(name)) for name in ("min", "max"))
+    assert least <= shown <= most and most - least == pytest.approx(36_000 / 16, abs=2)
+    page.keyboard.press("-")
+    eventually("a longer time", lambda: width() < 6 * before)
+    page.keyboard.press("0")
+    eventually("the whole run", lambda: abs(width() - before) < 1)
+    assert tick(page) == shown
 
 
 def test_a_page_that_is_opened_late_has_everything(launch, open_page):

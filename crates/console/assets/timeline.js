@@ -1,15 +1,22 @@
 // @ts-check
 // The time line at the bottom of the page: the epoch that is shown, from 0 to its planned end, with the emotions of the robots
-// and marks of what stands out. A place on it is always the same tick, and its controls never move.
+// and marks of what stands out. A place on it is always the same tick, unless a person has a part of it shown, and its controls
+// never move.
 
 import { visible } from "./bands.js";
 import { ICONS } from "./icons.js";
 import { stateClass } from "./palette.js";
 import { initials } from "./roster.js";
 import { seconds } from "./units.js";
+import { TimeWindow, timeView, zoomByWheel } from "./window.js";
 import { html, nothing, render, svg } from "./vendor/lit-html.js";
 
 /** @typedef {import("./recording.js").Player} Player */
+
+/** All of the lane is time. */
+const SIDES = { left_px: 0, right_px: 0 };
+/** Length of the part that is shown after a press of a key, of that before. @type {Record<string, number>} */
+const ZOOMS = { "+": 0.5, "=": 0.5, "-": 2, 0: 1e9 };
 
 /** Least distance between two marks. */
 const MARK_PX = 7;
@@ -25,7 +32,7 @@ export class TimelineView {
   /**
    * @param {HTMLElement} place
    * @param {Player} player
-   * @param {import("./window.js").TimeWindow} shown
+   * @param {TimeWindow} shown by charts and bands
    * @param {import("./crosshair.js").Crosshair} crosshair
    * @param {{chosen: () => string | null, isShown: (robot: string) => boolean}} choice which robots have strips if there are many
    */
@@ -34,6 +41,8 @@ export class TimelineView {
     this.player = player;
     this.shown = shown;
     this.choice = choice;
+    /** The part of the time line that is shown. */
+    this.range = new TimeWindow(() => [0, player.end * player.tick_s]);
     /** What the strips show, to draw nothing twice. */
     this.drawn = "";
     /** The history that they are of. @type {import("./history.js").History | null} */
@@ -65,16 +74,21 @@ export class TimelineView {
     this.input.addEventListener("change", () => (this.isHeld = false));
     for (const end of /** @type {const} */ (["pointerup", "pointercancel"])) window.addEventListener(end, () => (this.isHeld = false));
 
-    const { lane } = this;
-    crosshair.join({
-      place: lane,
-      tickAt: ({ clientX }) => {
-        const box = lane.getBoundingClientRect();
-        return Math.round(Math.min(1, Math.max(0, (clientX - box.left) / box.width)) * player.end);
-      },
-      xOf: (tick) => (tick <= player.end ? (lane.clientWidth * tick) / player.end : null),
-      hasCursor: false,
+    const { lane, range } = this;
+    crosshair.join({ ...timeView(lane, range, SIDES, () => player.tick_s), hasCursor: false });
+    zoomByWheel(lane, range, SIDES);
+    lane.addEventListener("dblclick", () => range.reset());
+    this.input.addEventListener("keydown", ({ key, ctrlKey, metaKey }) => {
+      if (key in ZOOMS && !ctrlKey && !metaKey) range.zoom(ZOOMS[key], (crosshair.tick ?? player.tick) * player.tick_s);
     });
+  }
+
+  /** The ticks at both ends. @returns {[number, number]} */
+  ends() {
+    const { end, tick_s } = this.player;
+    if (this.range.isWhole) return [0, end];
+    const [from, to] = this.range.range_s().map((time_s) => time_s / tick_s);
+    return [from, to];
   }
 
   /** Shows the tick of the slider, or the nearest one that there is. */
@@ -95,8 +109,11 @@ export class TimelineView {
     this.lane.style.height = `${Math.min(STRIPS_PX, STRIP_PX * this.robots().length)}px`;
     render(this.drawMarks(), this.marks);
     render(this.drawParts(), this.parts);
-    this.input.max = String(end);
+    const [from, to] = this.ends();
+    this.input.min = String(Math.round(from));
+    this.input.max = String(Math.round(to));
     if (!this.isHeld) this.input.value = String(Math.max(player.first, tick));
+    this.input.classList.toggle("beyond", tick < Math.round(from) || tick > Math.round(to));
     this.input.setAttribute("aria-valuetext", `tick ${tick}, ${seconds(tick * tick_s, tick_s)}; the run is at tick ${player.last} of ${end}`);
   }
 
@@ -122,6 +139,7 @@ export class TimelineView {
         </div>
         <p class="when" data-testid="when">${this.when()}</p>
         ${note(player)}
+        ${this.range.isWhole ? nothing : html`<button type="button" class="whole" data-testid="timeline-whole" title="double click, or 0" @click=${() => this.range.reset()}>Whole run</button>`}
         ${epochs(player)}`,
       this.bar,
     );
@@ -143,8 +161,9 @@ export class TimelineView {
   /** What can be shown of the epoch, and what charts and bands show of it. */
   drawParts() {
     const { first, last, end, tick_s } = this.player;
+    const [begin, stop] = this.ends();
     const place = (/** @type {number} */ from, /** @type {number} */ to) => {
-      const [left, right] = [from, to].map((tick) => Math.min(1, Math.max(0, tick / end)));
+      const [left, right] = [from, to].map((tick) => Math.min(1, Math.max(0, (tick - begin) / (stop - begin))));
       return `left:${100 * left}%;width:${100 * (right - left)}%`;
     };
     const [from, to] = this.shown.range_s().map((time_s) => time_s / tick_s);
@@ -158,7 +177,7 @@ export class TimelineView {
   drawMarks() {
     const { player } = this;
     const places = Math.max(1, Math.floor(this.marks.clientWidth / MARK_PX));
-    return player.store.marks.of(player.epoch, 0, player.end, places).map(
+    return player.store.marks.of(player.epoch, ...this.ends(), places).map(
       ({ kind, tick, at, words }) => html`<button type="button" class="mark ${kind}" data-testid="mark-${kind}" data-tick=${tick}
         title=${words} aria-label=${words} tabindex="-1" .style=${`left:${100 * at}%`} @click=${() => player.seekIn(player.epoch, tick)}></button>`,
     );
@@ -181,17 +200,17 @@ export class TimelineView {
     if (width === 0) return;
 
     const robots = this.robots();
-    const drawn = [history.changes, width, player.end, ...robots].join("\n");
+    const [from_s, to_s] = this.ends().map((tick) => tick * player.tick_s);
+    const drawn = [history.changes, width, from_s, to_s, ...robots].join("\n");
     if (drawn === this.drawn && history === this.drawnOf) return;
     this.drawn = drawn;
     this.drawnOf = history;
 
-    const end_s = player.end * player.tick_s;
-    const x = (/** @type {number} */ time_s) => (width * time_s) / end_s;
+    const x = (/** @type {number} */ time_s) => (width * (time_s - from_s)) / (to_s - from_s);
     const rows = robots.map((robot, row) =>
-      visible(history.states.get(robot)?.emotion ?? [], 0, end_s, x, 1).map(
-        ({ state, from_s, to_s }) => svg`<rect class=${stateClass("emotion", state)} data-robot=${robot} data-state=${state}
-          x=${x(from_s)} y=${row + 0.06} width=${Math.max(1, x(to_s) - x(from_s))} height="0.88"></rect>`,
+      visible(history.states.get(robot)?.emotion ?? [], from_s, to_s, x, 1).map(
+        (span) => svg`<rect class=${stateClass("emotion", span.state)} data-robot=${robot} data-state=${span.state}
+          x=${x(span.from_s)} y=${row + 0.06} width=${Math.max(1, x(span.to_s) - x(span.from_s))} height="0.88"></rect>`,
       ),
     );
     strips.setAttribute("viewBox", `0 0 ${width} ${Math.max(1, robots.length)}`);

@@ -83,22 +83,7 @@ export class TimeWindow {
  */
 export function steer(element, shown, { seek, ...sides }) {
   element.classList.add("steered");
-  element.addEventListener(
-    "wheel",
-    (event) => {
-      // What scrolls keeps doing so, unless the wheel is turned for zooming.
-      const isScrolled = element.scrollHeight > element.clientHeight + 1 && !event.ctrlKey;
-      const [from_s, to_s] = shown.range_s();
-      const along = event.shiftKey ? event.deltaY : event.deltaX;
-      const isAlong = event.shiftKey || Math.abs(event.deltaX) > Math.abs(event.deltaY);
-      if (isScrolled && !isAlong) return;
-      event.preventDefault();
-      if (isAlong) shown.move(((to_s - from_s) * along) / 600);
-      else shown.zoom(Math.exp(Math.min(1, Math.max(-1, event.deltaY / 300))), timeAt(element, shown, sides, event.clientX));
-    },
-    { passive: false },
-  );
-
+  zoomByWheel(element, shown, sides);
   const box = document.createElement("div");
   box.className = "selection";
   /** Where a press began. @type {{id: number, x_px: number, time_s: number} | null} */
@@ -144,6 +129,30 @@ export function steer(element, shown, { seek, ...sides }) {
     if (shown.isWhole) seek(time_s);
     else waiting = window.setTimeout(() => seek(time_s), DOUBLE_MS);
   };
+}
+
+/**
+ * The wheel makes the window shorter or longer around the time at the pointer, and moves it.
+ * @param {HTMLElement} element
+ * @param {TimeWindow} shown
+ * @param {{left_px: number, right_px: number}} sides how much of the element is not time
+ */
+export function zoomByWheel(element, shown, sides) {
+  element.addEventListener(
+    "wheel",
+    (event) => {
+      // What scrolls keeps doing so, unless the wheel is turned for zooming.
+      const isScrolled = element.scrollHeight > element.clientHeight + 1 && getComputedStyle(element).overflowY !== "visible" && !event.ctrlKey;
+      const [from_s, to_s] = shown.range_s();
+      const along = event.shiftKey ? event.deltaY : event.deltaX;
+      const isAlong = event.shiftKey || Math.abs(event.deltaX) > Math.abs(event.deltaY);
+      if (isScrolled && !isAlong) return;
+      event.preventDefault();
+      if (isAlong) shown.move(((to_s - from_s) * along) / 600);
+      else shown.zoom(Math.exp(Math.min(1, Math.max(-1, event.deltaY / 300))), timeAt(element, shown, sides, event.clientX));
+    },
+    { passive: false },
+  );
 }
 
 /**
