@@ -256,7 +256,7 @@ impl Bus {
     }
 
     /// Declares a queryable: calls `handle` for each query on `keys`, on the thread that reads the link. `handle` must not
-    /// block.
+    /// block. A queryable of a single key has that key also for a query with wildcards ([`Query::key`]).
     ///
     /// # Errors
     /// [`BusError::Use`] if the session is closed or the key expression is not legal.
@@ -265,10 +265,14 @@ impl Bus {
         keys: &str,
         handle: impl Fn(Query) + Send + Sync + 'static,
     ) -> Result<Declared, BusError> {
+        let own: Option<Arc<str>> = (!keys.contains('*')).then(|| keys.into());
         let declared = self
             .session
             .declare_queryable(keys)
-            .callback(move |query: zenoh::query::Query| handle(Query { query }))
+            .callback(move |query: zenoh::query::Query| {
+                let own = own.clone();
+                handle(Query { query, own });
+            })
             .wait();
         let declared = used("serve", keys, declared)?;
         Ok(Declared::new(declared))
@@ -492,13 +496,20 @@ impl Reply {
 #[derive(Debug)]
 pub struct Query {
     query: zenoh::query::Query,
+    /// The key of the queryable, if it is a single one.
+    own: Option<Arc<str>>,
 }
 
 impl Query {
-    /// The key of the query.
+    /// The key that is asked for here: that of the queryable, or of the query if the queryable has several. A get with
+    /// wildcards reaches several queryables. Their replies are told apart by their keys, and the middleware's default
+    /// consolidation keeps one reply of each key.
     #[must_use]
     pub fn key(&self) -> &str {
-        self.query.key_expr().as_str()
+        match &self.own {
+            Some(own) => own,
+            None => self.query.key_expr().as_str(),
+        }
     }
 
     /// The parameter called `name`, as in `?tick=12;epoch=1`.

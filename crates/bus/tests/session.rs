@@ -130,6 +130,27 @@ fn a_query_has_a_reply_or_ends_without_one() {
 }
 
 #[test]
+fn a_query_with_a_wildcard_is_answered_on_the_key_of_each_queryable() {
+    let star = Star::new("wildcard");
+    let a = star.client();
+    let b = star.client();
+    let _queryables = ["where/a", "where/b"].map(|key| {
+        b.queryable(key, |query| query.reply(query.key(), Vec::new()))
+            .unwrap()
+    });
+    let (seen, _tokens) = tokens(&a, "alive/b");
+    let _token = b.token("alive/b").unwrap();
+    assert_eq!(next(&seen), "+alive/b");
+
+    for asked in ["where/*", "*/*", "where/**"] {
+        let replies = a.get_all(asked, "", PATIENCE).unwrap();
+        let mut keys: Vec<String> = replies.into_iter().map(|reply| reply.key).collect();
+        keys.sort();
+        assert_eq!(keys, ["where/a", "where/b"], "{asked}");
+    }
+}
+
+#[test]
 fn a_publisher_knows_whether_it_has_subscribers() {
     let star = Star::new("matching");
     let a = star.client();

@@ -145,7 +145,13 @@ impl Keys {
     /// Queryable at the robot: `what` is one of [`QUERIES`] or [`STATE`].
     #[must_use]
     pub fn query(&self, robot: &RobotName, what: &str) -> String {
-        format!("{}/robot/{robot}/{what}", self.root)
+        self.robot(robot.as_str(), what)
+    }
+
+    /// The same of all robots: a get there has a reply of each one, on its own key.
+    #[must_use]
+    pub fn queries(&self, what: &str) -> String {
+        self.robot("*", what)
     }
 
     /// Robot to observers: what it chooses to display.

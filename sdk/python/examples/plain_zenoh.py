@@ -145,7 +145,7 @@ class Link:
         self.declared: list[object] = [
             self.session.declare_subscriber(f"cars/{self.run}/clock", self.handing_over("clock")),
             self.session.declare_subscriber(f"{own}/news", self.handing_over("news")),
-            *(self.session.declare_queryable(f"{own}/{what}", self.answer) for what in ("state", *QUERIES)),
+            *(self.declare_queryable(f"{own}/{what}", what) for what in ("state", *QUERIES)),
             self.session.liveliness().declare_subscriber(f"{alive}/sim", self.on_simulator, history=True),
         ]
         block = zenoh.CongestionControl.BLOCK  # wire.qos
@@ -184,13 +184,13 @@ class Link:
         """The simulator's token came or went."""
         self.inbox.put(("simulator", b"here" if sample.kind == zenoh.SampleKind.PUT else b"gone"))
 
-    def answer(self, query: zenoh.Query) -> None:
+    def declare_queryable(self, key: str, what: str) -> object:
+        """query.once: replies on its own key, also to a get with a wildcard."""
+        return self.session.declare_queryable(key, lambda query: self.answer(query, key, what))
+
+    def answer(self, query: zenoh.Query, key: str, what: str) -> None:
         """query.at-once: answered on zenoh's thread, also while the robot computes. query.once: then released."""
         with query:
-            what = str(query.key_expr).rsplit("/", 1)[-1]
-            if what not in ("state", *QUERIES):
-                query.reply_err("ask one robot one thing")
-                return
             with self.lock:
                 found = self.asked_for(query.parameters.get("tick"), query.parameters.get("epoch"))
             if found is None:
@@ -198,7 +198,7 @@ class Link:
                 return
             field = {"speed": "speed_mps", "direction": "direction_rad"}.get(what, what)
             one = {"performative": "tell", "epoch": found["epoch"], "tick": found["tick"], "value": found.get(field)}
-            query.reply(query.key_expr, json.dumps(found if what == "state" else one))
+            query.reply(key, json.dumps(found if what == "state" else one))
 
     def asked_for(self, tick: str | None, epoch: str | None) -> Json | None:
         """The state that answers a query; with ``tick=T`` it is that of T - 1."""

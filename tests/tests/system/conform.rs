@@ -124,7 +124,7 @@ fn the_robots_of_the_project_conform_with_default_parameters() {
 }
 
 /// Further ways to break a rule, after the one that is named like the rule.
-const OTHERWISE: [&str; 49] = [
+const OTHERWISE: [&str; 50] = [
     "join.request:instance",
     "join.ready-last:first",
     "join.ready-last:queryables",
@@ -150,6 +150,7 @@ const OTHERWISE: [&str; 49] = [
     "query.once:holds",
     "query.once:percept",
     "query.once:others",
+    "query.once:wildcard",
     "clock.duplicate:commands",
     "clock.duplicate:order",
     "clock.duplicate:bytes",

@@ -822,6 +822,15 @@ fn queries_answer_with_the_tick_before() {
         assert_eq!((&answer["value"], &answer["tick"]), (&expected, &json!(7)));
     }
 
+    // Together, each on its own key.
+    for what in ["emotion_state", "state"] {
+        let replies = bus.get_all(&keys.queries(what), "", PATIENCE).unwrap();
+        let mut answered: Vec<String> = replies.into_iter().map(|reply| reply.key).collect();
+        answered.sort();
+        let own = ["Butler", "Leguin"].map(|robot| keys.query(&name(robot), what));
+        assert_eq!(answered, own);
+    }
+
     lab.ok(&["ctl", "stop", "--run", "wire-query"]);
     launch.finish();
 }

@@ -495,6 +495,7 @@ pub(super) fn once(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     play(&mut harness, &PlayScript::quiet(3), &mut Straight)?;
     for what in QUERIES.iter().chain([&STATE]) {
         in_each_attempt(|scale| demand_one_reply(&harness, what, ALL_REPLIES * scale))?;
+        in_each_attempt(|scale| demand_own_key(&harness, what, ALL_REPLIES * scale))?;
     }
 
     let subject = kit.subject();
@@ -545,6 +546,29 @@ fn demand_one_reply(
         ));
     }
     Ok(())
+}
+
+/// Queried together with all other robots, it replies on its own key, by which the replies are told apart.
+fn demand_own_key(
+    harness: &Harness<'_>,
+    what: &str,
+    patience: Duration,
+) -> Result<(), RuleFailure> {
+    let own = harness.keys.query(&harness.kit.subject(), what);
+    let asked = harness.keys.queries(what);
+    let replies = harness
+        .kit
+        .bus
+        .get_all(&asked, "tick=4;epoch=1", patience)?;
+
+    if replies.iter().filter(|reply| reply.key == own).count() == 1 {
+        return Ok(());
+    }
+    let keys: Vec<&str> = replies.iter().map(|reply| reply.key.as_str()).collect();
+    Err(RuleFailure::new(
+        format!("one reply on {own} to a get on {asked}"),
+        format!("replies on {}", keys.join(", ")),
+    ))
 }
 
 /// Queried for what does not exist, it gives no answer and goes on.

@@ -104,9 +104,14 @@ impl Shared {
             Ok(state) => {
                 let answer = state.answer(Keys::last_chunk(query.key()));
                 let bytes = answer.map_or_else(|| encode(&state), |answer| encode(&answer));
-                query.reply(query.key(), bytes.clone());
+                let mut key = query.key().to_owned();
+                if self.wrong.is("query.once:wildcard") {
+                    let own = Keys::robot_of(&key).unwrap_or_default();
+                    key = key.replace(&format!("/{own}/"), "/*/");
+                }
+                query.reply(&key, bytes.clone());
                 if self.wrong.is("query.once") {
-                    query.reply(query.key(), bytes);
+                    query.reply(&key, bytes);
                 }
             }
             Err(reason) => query.reply_err(&reason.to_string()),
