@@ -11,7 +11,8 @@ use crate::error::{BadParameters, ParametersCheck};
 /// tick 0. Everything a robot perceives is in [`Cars`]; everything it does is in the [`Action`] that it returns and in
 /// the commands it sent on the way. Its state between ticks is its own.
 ///
-/// A robot in the form of the paper's interface of thirteen methods is a [`CarsRobotInterface`](crate::CarsRobotInterface).
+/// A robot with emotions implements [`CarsRobotInterface`](crate::CarsRobotInterface) as well, in which emotion and behavior
+/// have a method each, and its `tick` is [`control_cycle`](crate::control_cycle).
 pub trait Robot: Send {
     /// Returns to the initial state. Called before tick 0, at every start of a new epoch, and in the middle of an epoch
     /// when the robot takes part again after it was lost, in the same process or in another one.

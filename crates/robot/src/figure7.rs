@@ -1,20 +1,25 @@
-//! The interface of the paper's Figure 7, as an adapter over [`Robot`].
+//! The paper's interface of a robot (Figure 7), and its control cycle (Figure 5).
 
 use protocol::RobotName;
-use protocol::messages::{Panel, Point, StateVariables};
+use protocol::messages::{Point, StateVariables};
 
 use crate::cars::Cars;
-use crate::cri::{Action, Robot};
+use crate::cri::Action;
 use crate::error::BadParameters;
 
-/// The paper's `CARSRobotInterface` (Figure 7) under Rust's names. `getName` is [`Cars::name`], because the scenario
-/// names the robots. [`Paper`] makes a [`Robot`] of it.
-pub trait CarsRobotInterface: Send {
-    /// `initRobot`: returns to the initial state. See [`Robot::init`].
+/// The paper's `CARSRobotInterface`: the fourteen methods of its Figure 7 under Rust's names, with [`Cars`] in the place of the
+/// time. Emotion and behavior have a generator each, the paper's "requirement for the external interface".
+///
+/// [`control_cycle`] is the [`Robot::tick`](crate::Robot::tick) of such a robot.
+pub trait CarsRobotInterface {
+    /// `initRobot`: returns to the initial state. See [`Robot::init`](crate::Robot::init).
     ///
     /// # Errors
     /// [`BadParameters`] if the robot cannot work with the parameters of the scenario.
     fn init_robot(&mut self, cars: &mut Cars<'_>) -> Result<(), BadParameters>;
+
+    /// `getName`: its name, by which the scenario and the other robots call it: [`Cars::name`].
+    fn name(&self) -> &str;
 
     /// `setCurrentLocation`: where the robot stands now, meters.
     fn set_current_location(&mut self, cars: &mut Cars<'_>, location: Point);
@@ -46,59 +51,38 @@ pub trait CarsRobotInterface: Send {
     /// `getStateVariables`: the variables that it publishes.
     fn state_variables(&self) -> StateVariables;
 
-    /// `getEmotionState`: name of the emotion.
+    /// `getEmotionState`: name of the emotion; another robot gets it by [`Cars::get_robot_emotion_state`].
     fn emotion_state(&self) -> &str;
 
     /// `getBehaviorState`: name of the behavior.
     fn behavior_state(&self) -> &str;
-
-    /// `paintComponent`: what the console shows of the robot. By default nothing.
-    fn panel(&self) -> Panel {
-        Panel::default()
-    }
-
-    /// Not in the paper: see [`Robot::resume`].
-    fn resume(&mut self, _cars: &mut Cars<'_>, _last: &StateVariables) {}
 }
 
-/// A [`Robot`] made of the paper's interface. It calls the methods in the order of the paper's Figure 5; at tick 0,
-/// where there is nothing to update yet, only those that do not update.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Paper<R>(pub R);
-
-impl<R: CarsRobotInterface> Robot for Paper<R> {
-    fn init(&mut self, cars: &mut Cars<'_>) -> Result<(), BadParameters> {
-        self.0.init_robot(cars)
+/// One tick of a robot with the paper's interface, in the order of the paper's Figure 5. At tick 0, where there is nothing to
+/// update yet, only the methods that do not update are called.
+pub fn control_cycle(robot: &mut impl CarsRobotInterface, cars: &mut Cars<'_>) -> Action {
+    let location = cars.location();
+    robot.set_current_location(cars, location);
+    for command in cars.commands() {
+        robot.set_command(cars, &command.from, &command.text);
     }
 
-    fn tick(&mut self, cars: &mut Cars<'_>) -> Action {
-        let location = cars.location();
-        self.0.set_current_location(cars, location);
-        for command in cars.commands() {
-            self.0.set_command(cars, &command.from, &command.text);
-        }
-
-        if cars.tick() > 0 {
-            self.0.update_state_variables(cars);
-            self.0.update_emotion_state(cars);
-            self.0.update_behavior_state(cars);
-        }
-
-        Action {
-            proposal: self.0.project_location(cars),
-            speed_mps: self.0.speed(),
-            direction_rad: self.0.direction(),
-            emotion_state: self.0.emotion_state().to_owned(),
-            behavior_state: self.0.behavior_state().to_owned(),
-            state_variables: self.0.state_variables(),
-        }
+    if cars.tick() > 0 {
+        robot.update_state_variables(cars);
+        robot.update_emotion_state(cars);
+        robot.update_behavior_state(cars);
     }
 
-    fn resume(&mut self, cars: &mut Cars<'_>, last: &StateVariables) {
-        self.0.resume(cars, last);
+    let proposal = robot.project_location(cars);
+    if robot.name() != cars.name().as_str() {
+        cars.give_up(format!("it calls itself {:?}", robot.name()));
     }
-
-    fn panel(&self) -> Panel {
-        self.0.panel()
+    Action {
+        proposal,
+        speed_mps: robot.speed(),
+        direction_rad: robot.direction(),
+        emotion_state: robot.emotion_state().to_owned(),
+        behavior_state: robot.behavior_state().to_owned(),
+        state_variables: robot.state_variables(),
     }
 }

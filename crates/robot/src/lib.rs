@@ -31,8 +31,8 @@
 //! }
 //! ```
 //!
-//! A robot that is written against the interface of the paper's Figure 7 implements [`CarsRobotInterface`] instead, and
-//! [`Paper`] makes a [`Robot`] of it.
+//! A robot with emotions has the interface of the paper's Figure 7, [`CarsRobotInterface`], with a generator each for emotion
+//! and behavior; its `tick` is [`control_cycle`].
 //!
 //! A robot perceives the world only through [`Cars`]: this crate does not depend on the environment.
 
@@ -50,7 +50,7 @@ pub use cars::{CallError, Cars, ReceivedCommand};
 pub use cri::{Action, Robot};
 pub use entry::{RobotArgs, main};
 pub use error::{BadParameters, ParametersCheck, RobotError, read_parameters};
-pub use figure7::{CarsRobotInterface, Paper};
+pub use figure7::{CarsRobotInterface, control_cycle};
 pub use host::{Host, HostError, HostOptions, Stopper};
 pub use local::LocalHost;
 pub use network::{PeerNetwork, Undelivered};

@@ -2,7 +2,7 @@
 
 use affect::akr::Appraisal;
 use affect::{AffectFrame, EmotionLabel, Feeling, Schemata, StandardEmotion};
-use robot::Action;
+use robot::{Action, StateVariables};
 
 /// The frame of a feeling; `None` for a robot without emotions.
 pub(crate) fn of(
@@ -15,20 +15,33 @@ pub(crate) fn of(
     Schemata::standard().frame(name, feeling.urgency, appraisal.clone())
 }
 
-/// The action of a robot with this frame: its emotion, and state variables under the names of `affect::frame`, so that
-/// peers can query them and `cars export --emotionml` finds them.
+/// The action of a robot with this frame: its emotion, and the state variables of [`publish_variables`].
 #[must_use]
 pub fn publish(frame: Option<AffectFrame<'_>>, action: Action) -> Action {
+    let mut action = match &frame {
+        Some(frame) => action.emotion(frame.name()),
+        None => action,
+    };
+    action.state_variables = publish_variables(frame, action.state_variables);
+    action
+}
+
+/// The state variables of a robot, and those of its frame under the names of `affect::frame`, so that peers can query them and
+/// `cars export --emotionml` finds them.
+#[must_use]
+pub fn publish_variables(
+    frame: Option<AffectFrame<'_>>,
+    mut variables: StateVariables,
+) -> StateVariables {
     let Some(frame) = frame else {
-        return action;
+        return variables;
     };
 
-    let mut action = action.emotion(frame.name());
     for (name, number) in frame.numbers() {
-        action = action.variable(name, number);
+        variables.insert(name, number.into());
     }
     for (name, text) in frame.texts() {
-        action = action.variable(name, text);
+        variables.insert(name, text.into());
     }
-    action
+    variables
 }

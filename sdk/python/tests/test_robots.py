@@ -167,6 +167,15 @@ def test_figure_7_is_called_in_the_order_of_figure_5(scenario: Path) -> None:
     assert run.states[run.states.robot == "A"].direction_rad.tolist()[0] == 0.123457
 
 
+def test_a_robot_that_goes_by_another_name_leaves_the_run(scenario: Path) -> None:
+    class Imposter(Order):
+        def name(self) -> str:
+            return "B"
+
+    with pytest.raises(ValueError, match="A calls itself 'B'"):
+        cars.run(scenario, robots={"A": Imposter, "B": Still})
+
+
 def raising(method: str, error: str) -> type[Robot]:
     """A class of robots one of whose methods raises something."""
 

@@ -14,8 +14,8 @@ use affect::{
     Urgency,
 };
 use robot::{
-    Action, BadParameters, Cars, Panel, ParametersCheck, Point, PublicState, Robot, StateVariables,
-    Widget, read_parameters,
+    Action, BadParameters, Cars, CarsRobotInterface, Panel, ParametersCheck, Point, PublicState,
+    Robot, RobotName, StateVariables, Widget, control_cycle, read_parameters,
 };
 use serde::{Deserialize, Serialize};
 
@@ -27,7 +27,7 @@ use crate::closing::Closing;
 use crate::commands::{GO_HOME, HURRY, REFILL, shortened};
 use crate::drive::StraightDrive;
 use crate::emotion::SwitchableGenerator;
-use crate::frame::{self, publish};
+use crate::frame::{self, publish_variables};
 use crate::panel;
 use crate::policy::{Policy, Urge};
 use crate::published::text;
@@ -48,6 +48,8 @@ pub struct Butler {
     bsg: BehaviorGenerator<ButlerBehavior, ButlerContext, ButlerAct>,
     deliberator: Deliberator,
     state: ButlerMemory,
+    /// His motion in this tick.
+    motion: Action,
 }
 
 /// Everything that changes in Butler: restored from it, he continues identically.
@@ -71,8 +73,8 @@ impl Default for Butler {
     }
 }
 
-impl Robot for Butler {
-    fn init(&mut self, cars: &mut Cars<'_>) -> Result<(), BadParameters> {
+impl CarsRobotInterface for Butler {
+    fn init_robot(&mut self, cars: &mut Cars<'_>) -> Result<(), BadParameters> {
         *self = Self::new(cars.parameters()?).map_err(|reason| cars.bad_parameters(reason))?;
         self.state.begin(&self.parameters, cars);
 
@@ -86,28 +88,85 @@ impl Robot for Butler {
         Ok(())
     }
 
+    fn set_current_location(&mut self, _: &mut Cars<'_>, location: Point) {
+        self.state.at = location;
+    }
+
+    fn set_command(&mut self, cars: &mut Cars<'_>, from: &RobotName, command: &str) {
+        let text = shortened(command);
+        cars.log(format!("takes no commands, not even {text:?} from {from}"));
+    }
+
+    fn update_state_variables(&mut self, cars: &mut Cars<'_>) {
+        let tick_s = cars.tick_s();
+        self.bsg.advance(tick_s);
+        self.state.advance(tick_s);
+        self.serve(tick_s);
+        self.observe_refiller(cars);
+        self.measure(cars);
+        self.believe(cars);
+    }
+
+    fn update_emotion_state(&mut self, cars: &mut Cars<'_>) {
+        self.emotion
+            .update(&self.state.measures, self.bsg.current(), cars);
+        self.state.appraisal = self.appraisal(cars);
+        // A plan is a matter of what he feels.
+        if self.deliberator.plans() && self.parameters.policy() == Policy::Emotion {
+            self.plan(cars);
+        }
+        self.state.record(self.feeling());
+    }
+
+    fn update_behavior_state(&mut self, cars: &mut Cars<'_>) {
+        let context = self.context(cars);
+        for act in self.bsg.update(&context).actions {
+            self.perform(act, cars);
+        }
+    }
+
+    fn project_location(&mut self, cars: &mut Cars<'_>) -> Point {
+        self.motion = self.drive(cars);
+        self.motion.proposal
+    }
+
+    fn name(&self) -> &str {
+        &self.state.name
+    }
+
+    fn current_location(&self) -> Point {
+        self.state.at
+    }
+
+    fn speed(&self) -> f64 {
+        self.motion.speed_mps
+    }
+
+    fn direction(&self) -> f64 {
+        self.motion.direction_rad
+    }
+
+    fn state_variables(&self) -> StateVariables {
+        let variables = self.state.published(self.behavior());
+        publish_variables(self.frame(), variables)
+    }
+
+    fn emotion_state(&self) -> &str {
+        self.emotion.name()
+    }
+
+    fn behavior_state(&self) -> &str {
+        self.behavior().name()
+    }
+}
+
+impl Robot for Butler {
+    fn init(&mut self, cars: &mut Cars<'_>) -> Result<(), BadParameters> {
+        self.init_robot(cars)
+    }
+
     fn tick(&mut self, cars: &mut Cars<'_>) -> Action {
-        for command in cars.commands() {
-            let text = shortened(&command.text);
-            let from = &command.from;
-            cars.log(format!("takes no commands, not even {text:?} from {from}"));
-        }
-
-        // No time has passed at tick 0.
-        if cars.tick() > 0 {
-            self.update_progress(cars);
-            self.update_emotion(cars);
-            self.update_behavior(cars);
-        }
-
-        let motion = self.drive(cars);
-        let action = Action {
-            emotion_state: self.emotion.name().to_owned(),
-            behavior_state: self.behavior().name().to_owned(),
-            state_variables: self.state.published(self.behavior()),
-            ..motion
-        };
-        publish(self.frame(), action)
+        control_cycle(self, cars)
     }
 
     fn resume(&mut self, cars: &mut Cars<'_>, last: &StateVariables) {
@@ -175,6 +234,7 @@ impl Butler {
         let esg = DynamicGenerator::new(dynamics, appraise);
 
         Ok(Self {
+            motion: Action::default(),
             emotion: SwitchableGenerator::new(parameters.affect, parameters.script.clone(), esg),
             bsg: BehaviorGenerator::new(TABLE, ButlerBehavior::Serve),
             deliberator,
@@ -220,36 +280,6 @@ impl Butler {
         self.bsg.restore(saved.behavior);
         self.state = saved.state;
         Ok(())
-    }
-
-    fn update_progress(&mut self, cars: &mut Cars<'_>) {
-        let tick_s = cars.tick_s();
-        self.bsg.advance(tick_s);
-        self.state.advance(tick_s);
-        self.serve(tick_s);
-        self.observe_refiller(cars);
-        self.measure(cars);
-        self.believe(cars);
-    }
-
-    /// The emotion state generator.
-    fn update_emotion(&mut self, cars: &Cars<'_>) {
-        self.emotion
-            .update(&self.state.measures, self.bsg.current(), cars);
-        self.state.appraisal = self.appraisal(cars);
-        // A plan is a matter of what he feels.
-        if self.deliberator.plans() && self.parameters.policy() == Policy::Emotion {
-            self.plan(cars);
-        }
-        self.state.record(self.feeling());
-    }
-
-    /// The behavior state generator.
-    fn update_behavior(&mut self, cars: &mut Cars<'_>) {
-        let context = self.context(cars);
-        for act in self.bsg.update(&context).actions {
-            self.perform(act, cars);
-        }
     }
 
     /// Lets guests take treats, at exponentially distributed intervals.

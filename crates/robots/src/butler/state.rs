@@ -23,6 +23,10 @@ use crate::published::{count, flag, location, number, saturated, text};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ButlerMemory {
+    /// His name.
+    pub(super) name: String,
+    /// Where he stands.
+    pub(super) at: Point,
     pub(super) start: Point,
     /// The location of the refiller's table, from an earlier incarnation.
     pub(super) table: Option<Point>,
@@ -75,6 +79,8 @@ pub(super) struct ButlerMemory {
 impl ButlerMemory {
     pub(super) fn new(parameters: &ButlerParameters) -> Result<Self, ParameterError> {
         Ok(Self {
+            name: String::new(),
+            at: Point::default(),
             start: Point::default(),
             table: None,
             drive: Drive::default(),
@@ -112,8 +118,10 @@ impl ButlerMemory {
         })
     }
 
-    /// Sets what depends on the run: his start, and his random streams.
+    /// Sets what depends on the run: his name, his start, and his random streams.
     pub(super) fn begin(&mut self, parameters: &ButlerParameters, cars: &mut Cars<'_>) {
+        self.name = cars.name().to_string();
+        self.at = cars.location();
         self.start = cars.welcome().location;
 
         self.taps = Chance::split(cars.random());

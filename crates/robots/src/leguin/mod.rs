@@ -11,8 +11,8 @@ use affect::behavior::{BehaviorGenerator, BehaviorState};
 use affect::levels::{SensoryMotor, SensoryMotorParameters};
 use affect::{AffectFrame, Circumstances, Feeling, RuleGenerator, StandardEmotion};
 use robot::{
-    Action, BadParameters, Cars, Panel, ParametersCheck, Point, ReceivedCommand, Robot,
-    StateVariables, Widget, read_parameters,
+    Action, BadParameters, Cars, CarsRobotInterface, Panel, ParametersCheck, Point, Robot,
+    RobotName, StateVariables, Widget, control_cycle, read_parameters,
 };
 use serde::{Deserialize, Serialize};
 
@@ -25,7 +25,7 @@ use crate::closing::Closing;
 use crate::commands::{GO_HOME, HURRY, REFILL, shortened};
 use crate::drive::StraightDrive;
 use crate::emotion::SwitchableGenerator;
-use crate::frame::{self, publish};
+use crate::frame::{self, publish_variables};
 use crate::panel;
 use crate::policy::Policy;
 use crate::published::{flag, text};
@@ -45,6 +45,8 @@ pub struct Leguin {
     bsg: BehaviorGenerator<LeguinBehavior, LeguinContext, LeguinAct>,
     haste: SensoryMotor,
     state: LeguinMemory,
+    /// Her motion in this tick.
+    motion: Action,
 }
 
 /// Everything that changes in Leguin: restored from it, she continues identically.
@@ -68,35 +70,102 @@ impl Default for Leguin {
     }
 }
 
-impl Robot for Leguin {
-    fn init(&mut self, cars: &mut Cars<'_>) -> Result<(), BadParameters> {
+impl CarsRobotInterface for Leguin {
+    fn init_robot(&mut self, cars: &mut Cars<'_>) -> Result<(), BadParameters> {
         *self = Self::new(cars.parameters()?).map_err(|reason| cars.bad_parameters(reason))?;
         self.state.begin(&self.parameters, cars);
         Ok(())
     }
 
-    fn tick(&mut self, cars: &mut Cars<'_>) -> Action {
-        self.state.at = cars.location();
-        for command in cars.commands() {
-            self.obey(command, cars);
-        }
+    fn set_current_location(&mut self, _: &mut Cars<'_>, location: Point) {
+        self.state.at = location;
+    }
 
-        // No time has passed at tick 0.
-        if cars.tick() > 0 {
-            self.update_progress(cars);
-            self.update_emotion(cars);
-            self.update_behavior(cars);
-        }
-
-        let motion = self.drive(cars);
+    fn set_command(&mut self, cars: &mut Cars<'_>, from: &RobotName, command: &str) {
         let behavior = self.behavior();
-        let action = Action {
-            emotion_state: self.emotion.name().to_owned(),
-            behavior_state: behavior.name().to_owned(),
-            state_variables: self.state.published(behavior, self.goal()),
-            ..motion
-        };
-        publish(self.frame(), action)
+        let state = &mut self.state;
+        match (command, behavior) {
+            // A call to come is obsolete once she is there.
+            (REFILL | HURRY, LeguinBehavior::Exchange) | (REFILL, LeguinBehavior::Refill) => {}
+            (REFILL, _) => state.pending = state.pending.or(Some(Errand::Refill)),
+            (HURRY, _) => state.pending = Some(Errand::Hurry),
+            // The waiter may complete the exchange a tick before her.
+            (GO_HOME, LeguinBehavior::Exchange | LeguinBehavior::AwaitGoHome) => {
+                state.sent_home = true;
+            }
+            (GO_HOME, _) => {}
+            _ => {
+                let text = shortened(command);
+                cars.log(format!("does not understand {text:?} from {from}"));
+            }
+        }
+    }
+
+    fn update_state_variables(&mut self, cars: &mut Cars<'_>) {
+        let behavior = self.behavior();
+        let tick_s = cars.tick_s();
+        self.bsg.advance(tick_s);
+        self.state.advance(behavior, tick_s);
+        self.observe_waiter(cars);
+        self.observe_way(tick_s);
+        self.measure(behavior);
+    }
+
+    fn update_emotion_state(&mut self, cars: &mut Cars<'_>) {
+        self.emotion
+            .update(&self.state.measures, self.bsg.current(), cars);
+        self.state.appraisal = self.appraisal();
+    }
+
+    fn update_behavior_state(&mut self, cars: &mut Cars<'_>) {
+        let context = self.context(cars);
+        for act in self.bsg.update(&context).actions {
+            self.perform(act, cars);
+        }
+    }
+
+    fn project_location(&mut self, cars: &mut Cars<'_>) -> Point {
+        self.motion = self.drive(cars);
+        self.motion.proposal
+    }
+
+    fn name(&self) -> &str {
+        &self.state.name
+    }
+
+    fn current_location(&self) -> Point {
+        self.state.at
+    }
+
+    fn speed(&self) -> f64 {
+        self.motion.speed_mps
+    }
+
+    fn direction(&self) -> f64 {
+        self.motion.direction_rad
+    }
+
+    fn state_variables(&self) -> StateVariables {
+        let variables = self.state.published(self.behavior(), self.goal());
+        publish_variables(self.frame(), variables)
+    }
+
+    fn emotion_state(&self) -> &str {
+        self.emotion.name()
+    }
+
+    fn behavior_state(&self) -> &str {
+        self.behavior().name()
+    }
+}
+
+impl Robot for Leguin {
+    fn init(&mut self, cars: &mut Cars<'_>) -> Result<(), BadParameters> {
+        self.init_robot(cars)
+    }
+
+    fn tick(&mut self, cars: &mut Cars<'_>) -> Action {
+        control_cycle(self, cars)
     }
 
     fn resume(&mut self, cars: &mut Cars<'_>, last: &StateVariables) {
@@ -153,6 +222,7 @@ impl Leguin {
         .map_err(|error| error.to_string())?;
 
         Ok(Self {
+            motion: Action::default(),
             emotion: SwitchableGenerator::new(parameters.affect, parameters.script.clone(), esg),
             bsg: BehaviorGenerator::new(TABLE, LeguinBehavior::Wait),
             haste,
@@ -200,35 +270,7 @@ impl Leguin {
         Ok(())
     }
 
-    fn obey(&mut self, command: &ReceivedCommand, cars: &mut Cars<'_>) {
-        let behavior = self.behavior();
-        let state = &mut self.state;
-        match (command.text.as_str(), behavior) {
-            // A call to come is obsolete once she is there.
-            (REFILL | HURRY, LeguinBehavior::Exchange) | (REFILL, LeguinBehavior::Refill) => {}
-            (REFILL, _) => state.pending = state.pending.or(Some(Errand::Refill)),
-            (HURRY, _) => state.pending = Some(Errand::Hurry),
-            // The waiter may complete the exchange a tick before her.
-            (GO_HOME, LeguinBehavior::Exchange | LeguinBehavior::AwaitGoHome) => {
-                state.sent_home = true;
-            }
-            (GO_HOME, _) => {}
-            _ => {
-                let text = shortened(&command.text);
-                let from = &command.from;
-                cars.log(format!("does not understand {text:?} from {from}"));
-            }
-        }
-    }
-
-    fn update_progress(&mut self, cars: &mut Cars<'_>) {
-        let behavior = self.behavior();
-        let tick_s = cars.tick_s();
-        self.bsg.advance(tick_s);
-        self.state.advance(behavior, tick_s);
-        self.observe_waiter(cars);
-        self.observe_way(tick_s);
-
+    fn measure(&mut self, behavior: LeguinBehavior) {
         let parameters = &self.parameters;
         let gain = parameters.gain();
         let blocked = if behavior == LeguinBehavior::Refill {
@@ -267,21 +309,6 @@ impl Leguin {
         }
     }
 
-    /// The emotion state generator.
-    fn update_emotion(&mut self, cars: &Cars<'_>) {
-        self.emotion
-            .update(&self.state.measures, self.bsg.current(), cars);
-        self.state.appraisal = self.appraisal();
-    }
-
-    /// The behavior state generator.
-    fn update_behavior(&mut self, cars: &mut Cars<'_>) {
-        let context = self.context(cars);
-        for act in self.bsg.update(&context).actions {
-            self.perform(act, cars);
-        }
-    }
-
     fn observe_waiter(&mut self, cars: &mut Cars<'_>) {
         let state = &mut self.state;
         if let Some(waiter) = state.waiter.observe(cars).state {
@@ -292,12 +319,12 @@ impl Leguin {
 
     /// Whether the waiter wants treats from her. If he cannot be queried she assumes that he does, unless he is known to
     /// call for another robot: Vonda does not step in for Leguin.
-    fn is_needed(&self, cars: &Cars<'_>) -> bool {
+    fn is_needed(&self) -> bool {
         let state = &self.state;
         let calls_another = state
             .waiter_calls
             .as_deref()
-            .is_some_and(|name| name != cars.name().as_str());
+            .is_some_and(|name| *name != state.name);
         !calls_another
             && (state.waiter_needs || state.waiter.is_unknown(self.parameters.query_stale_s))
     }
@@ -320,7 +347,7 @@ impl Leguin {
             gives_up: self.gives_up(),
             is_happy: parameters.schematic.is_on() && self.emotion.is_happy(),
             pending: state.pending,
-            waiter_is_needy_here: self.is_needed(cars) && waiter_is_here,
+            waiter_is_needy_here: self.is_needed() && waiter_is_here,
             exchange_is_over: self.bsg.has_lasted(parameters.exchange_s),
             sent_home: state.sent_home,
             is_home: self.is_home(),

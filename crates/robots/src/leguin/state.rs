@@ -18,6 +18,8 @@ use crate::published::{count, flag, location, text};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct LeguinMemory {
+    /// Her name.
+    pub(super) name: String,
     /// Where she stands.
     pub(super) at: Point,
     /// Her place at the table.
@@ -47,6 +49,7 @@ pub(super) struct LeguinMemory {
 impl LeguinMemory {
     pub(super) fn new(parameters: &LeguinParameters) -> Self {
         Self {
+            name: String::new(),
             at: Point::default(),
             home: Point::default(),
             drive: Drive::default(),
@@ -67,9 +70,10 @@ impl LeguinMemory {
         }
     }
 
-    /// Sets what depends on the run: her start, which is her home, and her random streams.
+    /// Sets what depends on the run: her name, her start, which is her home, and her random streams.
     pub(super) fn begin(&mut self, parameters: &LeguinParameters, cars: &mut Cars<'_>) {
         let start = cars.welcome().location;
+        self.name = cars.name().to_string();
         self.at = start;
         self.home = start;
 

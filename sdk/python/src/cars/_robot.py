@@ -84,16 +84,22 @@ class Robot(ABC):
 
 
 class CarsRobotInterface(Robot):
-    """The paper's ``CARSRobotInterface`` (Figure 7); ``getName`` is ``cars.name``, because the scenario names the robots.
+    """The paper's ``CARSRobotInterface``: the fourteen methods of its Figure 7, with a generator each for emotion and behavior.
 
     In each tick the methods are called in the order of the paper's Figure 5: where it stands now, the commands that arrived, its
     variables, its emotion, its behavior, where it wants to be next. What the getters return after that is what the others
     learn during the next tick.
     """
 
+    _name = ""
+
     @abstractmethod
     def init_robot(self, cars: Cars) -> None:
         """Back to the initial state (``initRobot``): see :meth:`Robot.init`."""
+
+    def name(self) -> str:
+        """Its name, by which the scenario and the other robots call it (``getName``); nothing before the first :meth:`init`."""
+        return self._name
 
     @abstractmethod
     def set_current_location(self, cars: Cars, location: Point) -> None:
@@ -145,6 +151,7 @@ class CarsRobotInterface(Robot):
 
     def init(self, cars: Cars) -> None:
         """Calls :meth:`init_robot`."""
+        self._name = cars.name
         self.init_robot(cars)
 
     def tick(self, cars: Cars) -> Action:
@@ -157,8 +164,11 @@ class CarsRobotInterface(Robot):
             self.update_state_variables(cars)
             self.update_emotion_state(cars)
             self.update_behavior_state(cars)
+        proposal = self.project_location(cars)
+        if self.name() != cars.name:
+            raise ValueError(f"{cars.name} calls itself {self.name()!r}")
         return Action(
-            self.project_location(cars),
+            proposal,
             self.speed(),
             self.direction(),
             self.emotion_state(),
