@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use protocol::keys::{QUERIES, STATE};
 use system_tests::{Lab, programs, root, subcommands_in};
 
 /// Pages that are not in the book.
@@ -145,6 +146,30 @@ fn the_page_of_commands_names_them_all() {
     let page = read(&docs().join("commands.md"));
     for name in subcommands_in(&help) {
         assert!(page.contains(&format!("`cars {name}")), "{name}");
+    }
+}
+
+/// The page of the paper's interface has its methods as they are called in Rust and in Python, and the keys of the queries.
+#[test]
+fn the_page_of_the_interface_has_its_methods_and_keys() {
+    let page = read(&docs().join("interface.md"));
+    let rust = read(&root().join("crates/robot/src/figure7.rs"));
+    let (_, methods) = rust.split_once("pub trait CarsRobotInterface").unwrap();
+    let methods = methods.split("\n    fn ").skip(1);
+    let methods: Vec<&str> = methods.filter_map(|rest| rest.split('(').next()).collect();
+    assert_eq!(methods.len(), 14);
+
+    let python = read(&root().join("sdk/python/src/cars/_robot.py"));
+    let (_, python) = python.split_once("class CarsRobotInterface").unwrap();
+    for method in methods {
+        assert!(page.contains(&format!("| `{method}(")), "{method}");
+        assert!(python.contains(&format!("def {method}(self")), "{method}");
+    }
+    for what in QUERIES.iter().chain([&STATE]) {
+        assert!(
+            page.contains(&format!("get at `robot/OF/{what}`")),
+            "{what}"
+        );
     }
 }
 
