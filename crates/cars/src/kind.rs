@@ -87,7 +87,7 @@ fn is_toml(path: &Path) -> bool {
         .is_some_and(|extension| extension == "toml")
 }
 
-/// Whether each line is one word, as the classes of a roster are. TOML has no such lines but the heads of tables.
+/// Whether each line is of words, as the classes and names of a roster are. TOML has no such lines but the heads of tables.
 fn is_roster(text: &str) -> bool {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let lines = text.lines().map(str::trim);

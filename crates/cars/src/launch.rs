@@ -28,7 +28,8 @@ pub(crate) struct LaunchArgs {
     /// record, and compared with it.
     #[arg(long, value_name = "RUN", conflicts_with_all = ["file", "roster", "run", "replace", "seed", "duration", "set", "export"])]
     resume: Option<PathBuf>,
-    /// A list of robots instead of a launch file, one class a line, as in CARSConfig.txt of the first CARS.
+    /// A list of robots instead of a launch file, one class a line, as in CARSConfig.txt of the first CARS, and behind it a name
+    /// where it differs.
     #[arg(long, value_name = "FILE", conflicts_with = "file")]
     roster: Option<PathBuf>,
     #[command(flatten)]

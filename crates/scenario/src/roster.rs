@@ -1,5 +1,7 @@
-//! Rosters in the format of the first CARS (`CARSConfig.txt`): one robot class a line. All other settings are those of the
-//! paper's experiment.
+//! Rosters in the format of the first CARS (`CARSConfig.txt`): one robot class a line. A robot that has another name than its class
+//! has it behind the class: `Leguin Laila`. All other settings are those of the paper's experiment.
+
+use std::collections::BTreeSet;
 
 use config::diagnostic::{FileError, Source};
 use protocol::RobotName;
@@ -11,29 +13,42 @@ const MAX_ROBOTS: usize = 100;
 /// others at the food table, and default parameters. Blank lines and lines that begin with `#` are skipped.
 ///
 /// # Errors
-/// [`FileError`] at the first line that is not a class name, or if there are too many robots.
+/// [`FileError`] at the first line that is no class, or no class and a name, or has the name of an earlier line, or is one too many.
 pub fn scenario_of(roster: &Source) -> Result<Source, FileError> {
     let mut text =
         String::from("[guests]\ncount = 100\n\n[[obstacle]]\nat = [\"2 ft\", \"2 ft\"]\n");
     let mut offset = 0;
-    let mut count = 0;
+    let mut names = BTreeSet::new();
     for line in roster.text.split_inclusive('\n') {
         let span = Some(offset..offset + line.trim_end().len());
         offset += line.len();
-        let class = line.trim();
-        if class.is_empty() || class.starts_with('#') {
+        let line = line.trim();
+        if line.is_empty() || line.starts_with('#') {
             continue;
         }
 
-        if count == MAX_ROBOTS {
+        if names.len() == MAX_ROBOTS {
             let text = "more than 100 robots: write a scenario file";
             return Err(FileError::at(roster, span, text));
         }
-        let name = RobotName::new(class)
-            .map_err(|error| FileError::at(roster, span, &error.to_string()))?;
-        let (x, y) = place(count);
-        text += &format!("\n[[robot]]\nname = \"{name}\"\nat = [\"{x} ft\", \"{y} ft\"]\n");
-        count += 1;
+        let (class, name) = match line.split_once(char::is_whitespace) {
+            Some((class, name)) => (class, name.trim_start()),
+            None => (line, line),
+        };
+        let read = |text| {
+            RobotName::new(text)
+                .map_err(|error| FileError::at(roster, span.clone(), &error.to_string()))
+        };
+        let (class, name) = (read(class)?, read(name)?);
+        let (x, y) = place(names.len());
+        text += &format!(
+            "\n[[robot]]\nname = \"{name}\"\nclass = \"{class}\"\nat = [\"{x} ft\", \"{y} ft\"]\n"
+        );
+        if let Some(name) = names.replace(name) {
+            let text = format!("a second robot called {name}");
+            let help = format!("give it a name of its own, behind its class: {class} NAME");
+            return Err(FileError::at(roster, span, &text).with_help(help));
+        }
     }
 
     Ok(Source {

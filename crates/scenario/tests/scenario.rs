@@ -260,12 +260,41 @@ fn a_plain_roster_is_the_experiment_of_the_paper() {
     assert_eq!(names, ["Butler", "Leguin", "Vonda"]);
     assert_eq!(scenario.guests.count, 100);
 
-    let bad = Source {
-        name: "CARSConfig.txt".into(),
-        text: "Butler\nLe guin\n".into(),
+    let refused = |text: &str| {
+        let bad = Source {
+            name: "CARSConfig.txt".into(),
+            text: text.into(),
+        };
+        shown(&scenario::roster::scenario_of(&bad).unwrap_err())
     };
-    let error = shown(&scenario::roster::scenario_of(&bad).unwrap_err());
-    assert!(error.contains("2 │ Le guin"), "{error}");
+    let error = refused("Butler\nLe/guin\n");
+    assert!(error.contains("2 │ Le/guin"), "{error}");
+    let error = refused("Butler\nLeguin Laila the second\n");
+    assert!(error.contains("2 │ Leguin Laila the second"), "{error}");
+    let error = refused("Butler\nLeguin\nLeguin\n");
+    assert!(error.contains("Leguin NAME"), "{error}");
+}
+
+#[test]
+fn robots_of_one_class_have_different_names() {
+    let source = Source {
+        name: "CARSConfig.txt".into(),
+        text: "Butler  Alfred\nLeguin\nLeguin\tLaila\n".into(),
+    };
+    let text = scenario::roster::scenario_of(&source).unwrap();
+    let scenario = Scenario::parse(&text, Path::new(".")).unwrap();
+    let robots = scenario.robots.iter();
+    let robots: Vec<(&str, &str)> = robots
+        .map(|(name, robot)| (name.as_str(), robot.class.as_str()))
+        .collect();
+    assert_eq!(
+        robots,
+        [
+            ("Alfred", "Butler"),
+            ("Laila", "Leguin"),
+            ("Leguin", "Leguin")
+        ]
+    );
 }
 
 const TWO_ROBOTS: &str = "[[robot]]\nname = \"A\"\nat = [\"3 m\", \"3 m\"]\nparams = { wait = \"5 s\" }\n\

@@ -126,6 +126,51 @@ fn a_plain_roster_plays() {
     assert_eq!(lab.summary("roster")["ticks"], 60);
 }
 
+/// Alfred is a Butler, and calls Laila, a Leguin, although there is another Leguin.
+#[test]
+fn robots_of_one_class_play_under_names_of_their_own() {
+    let lab = Lab::new();
+    let roster = lab.write("CARSConfig.txt", "Butler Alfred\nLeguin\nLeguin Laila\n");
+    let set = [
+        "robot.Alfred.params.refiller=Laila",
+        "robot.Laila.params.waiter=Alfred",
+        "robot.Leguin.params.waiter=Alfred",
+    ];
+    let mut args = vec!["launch", "--roster", roster.to_str().unwrap()];
+    args.extend(["--run", "names", "--duration", "200 s", "--speed", "max"]);
+    args.extend(set.iter().flat_map(|set| ["--set", set]));
+    let printed = lab.ok(&args);
+
+    for shown in ["Alfred", "Laila", "Leguin"] {
+        assert!(printed.contains(shown), "{shown} in\n{printed}");
+        assert!(
+            lab.file("names", "logs")
+                .join(format!("{shown}.log"))
+                .exists()
+        );
+    }
+    let robots = &lab.summary("names")["robots"];
+    assert!(robots["Alfred"]["state_variables"]["exchanges"].as_f64() >= Some(1.0));
+    assert!(robots["Laila"]["state_variables"]["trips"].as_f64() >= Some(1.0));
+    assert_eq!(robots["Leguin"]["state_variables"]["trips"], 0.0);
+
+    // The same in one process, from the scenario in the record.
+    let scenario = lab.file("names", "scenario.toml");
+    lab.ok(&["run", scenario.to_str().unwrap(), "--run", "alone"]);
+    let events = |run| std::fs::read(lab.file(run, "events.jsonl")).unwrap();
+    assert!(events("names") == events("alone"), "they differ");
+
+    let page = lab.file("names", "report.html");
+    lab.ok(&["report", "names", "-o", page.to_str().unwrap()]);
+    let page = std::fs::read_to_string(page).unwrap();
+    assert!(page.contains("Alfred") && page.contains("Laila"));
+    assert_eq!(
+        page.matches("Butler").count(),
+        1,
+        "in the scenario, as a class"
+    );
+}
+
 #[test]
 fn a_dry_run_says_what_it_would_start_and_starts_nothing() {
     let lab = Lab::new();
