@@ -7,6 +7,8 @@ from playwright.sync_api import expect
 
 from lab import ROOT, Crowd, eventually, reaches, scrub, until
 
+pytestmark = pytest.mark.thorough
+
 TICK = "window.carsConsole.frame()?.tick"
 
 
@@ -58,7 +60,6 @@ def test_five_pixels_are_the_ticks_that_five_pixels_stand_for(launch, open_page)
     assert abs(tick(page) - (200 - 5 * ticks_per_px)) <= 1 + ticks_per_px, tick(page)
 
 
-@pytest.mark.thorough
 def test_a_place_of_the_time_line_is_the_same_tick_while_the_run_goes_on(launch, open_page):
     run, page = open_at(launch, open_page, 200, 1280, 720)
     box, end = lane(page)
@@ -81,7 +82,6 @@ def test_a_place_of_the_time_line_is_the_same_tick_while_the_run_goes_on(launch,
     expect(page.locator("body")).to_have_attribute("data-time", "live")
 
 
-@pytest.mark.thorough
 def test_the_time_line_is_moved_by_keys(launch, open_page):
     _, page = open_at(launch, open_page, 40)
     reaches(page, 0)
@@ -113,7 +113,7 @@ def boxes(page):
 FURTHER = [(1440, 900), (390, 844), (844, 390)]
 
 
-@pytest.mark.parametrize("width, height", [(1280, 720), *(pytest.param(*size, marks=pytest.mark.thorough) for size in FURTHER)])
+@pytest.mark.parametrize("width, height", [(1280, 720), *FURTHER])
 def test_no_control_moves(launch, open_page, width, height):
     run = launch(options=("--speed", "20", "--stay", "--duration", "150 s"))
     page = open_page(run.address, width, height)
@@ -144,7 +144,6 @@ def test_no_control_moves(launch, open_page, width, height):
     assert boxes(page) == ready, "ended"
 
 
-@pytest.mark.thorough
 def test_strips_have_the_colors_of_the_bands(launch, open_page):
     _, page = open_at(launch, open_page, 300)
     page.get_by_test_id("tab-charts").click()
@@ -167,7 +166,6 @@ def test_strips_have_the_colors_of_the_bands(launch, open_page):
     assert abs(right - box["x"] - box["width"] * 300 / end) < 3
 
 
-@pytest.mark.thorough
 def test_the_strips_of_many_robots_are_few(launch, open_page):
     run = launch(kind=Crowd, robots=24, guests=20)
     run.control("step", "20")
@@ -192,7 +190,6 @@ def crosshairs(page):
     )
 
 
-@pytest.mark.thorough
 def test_one_crosshair_in_all_views(launch, open_page):
     _, page = open_at(launch, open_page, 100, 1440, 1000)
     page.get_by_test_id("tab-charts").click()
@@ -293,7 +290,6 @@ def test_init_asks_and_goes_live(launch, open_page):
     expect(question).to_be_hidden()
 
 
-@pytest.mark.thorough
 def test_start_and_step_go_live(launch, open_page):
     _, page = open_at(launch, open_page, 50)
     seek(page, 20)
@@ -305,7 +301,6 @@ def test_start_and_step_go_live(launch, open_page):
     expect(page.locator("body")).to_have_attribute("data-time", "live")
 
 
-@pytest.mark.thorough
 def test_load_and_apply_ask_and_go_live(launch, open_page):
     run, page = open_at(launch, open_page, 50)
     page.get_by_test_id("tab-setup").click()
@@ -355,7 +350,6 @@ def test_what_was_not_seen_is_a_gap(launch, open_page):
         assert not any(first <= begin and end <= last for first, last in spans(page)), f"a band covers {begin} s to {end} s"
 
 
-@pytest.mark.thorough
 def test_what_has_not_been_read_is_a_gap(launch, open_page):
     """A page that comes late reads what is recorded. Until it has, there is nothing between that and what the page sees."""
     run = launch()
@@ -378,7 +372,6 @@ def test_what_has_not_been_read_is_a_gap(launch, open_page):
     eventually("all of it", lambda: spans(page)[0][0] == 0 and spans(page)[-1][1] == 150)
 
 
-@pytest.mark.thorough
 def test_the_diagram_marks_the_shown_tick_or_none(launch, open_page):
     _, page = open_at(launch, open_page, 100)
     page.get_by_test_id("tab-diagram").click()
