@@ -46,6 +46,14 @@ def reaches(page, tick):
     until(page, f"Number({run}?.first ?? Infinity) <= {tick} && {tick} <= Number({run}?.last ?? -1)")
 
 
+def download(page, button, place):
+    """Presses a button that saves a file, and keeps the file at a place. Returns the name that the page gives it."""
+    with page.expect_download() as event:
+        page.get_by_test_id(button).click()
+    event.value.save_as(place)
+    return event.value.suggested_filename
+
+
 def scrub(page, tick):
     """Moves the time line to a tick."""
     reaches(page, tick)

@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 import pytest
 from playwright.sync_api import expect
 
-from lab import PATIENCE_S, eventually, start_console, until
+from lab import PATIENCE_S, download, eventually, start_console, until
 
 pytestmark = pytest.mark.thorough
 
@@ -66,11 +66,8 @@ def test_a_diagram_is_saved_light_and_of_a_stated_size(recorded, open_page, scre
     page = open_page(recorded[0], scheme=scheme, width=width)
     open_diagram(page)
     assert "180 mm" in page.get_by_test_id("diagram-save").get_attribute("title")
-    with page.expect_download() as download:
-        page.get_by_test_id("diagram-save").click()
-    assert download.value.suggested_filename == "console-test-ticks-0-119.svg"
     kept = screenshots / f"diagram-saved-{width}.svg"
-    download.value.save_as(kept)
+    assert download(page, "diagram-save", kept) == "console-test-ticks-0-119.svg"
 
     text = kept.read_text()
     root = ElementTree.fromstring(text)

@@ -3,7 +3,7 @@
 import pytest
 from playwright.sync_api import expect
 
-from lab import ROOT, eventually
+from lab import ROOT, download, eventually
 
 pytestmark = pytest.mark.thorough
 
@@ -240,10 +240,8 @@ def test_what_was_typed_in_feet_is_saved_in_feet(launch, open_page, tmp_path):
     page.get_by_test_id("setup-field-height").fill("53")
     page.get_by_test_id("setup-apply").click()
     eventually("the epoch", lambda: run.status()["epoch"] == 2 and run.status()["phase"] == "ready")
-    with page.expect_download() as download:
-        page.get_by_test_id("setup-save").click()
     saved = tmp_path / "saved.toml"
-    download.value.save_as(saved)
+    download(page, "setup-save", saved)
     assert '"61.7 ft", "53 ft"' in saved.read_text()
 
     # It is the same scenario.

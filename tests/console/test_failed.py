@@ -7,7 +7,7 @@ import subprocess
 import pytest
 from playwright.sync_api import expect
 
-from lab import BIN, eventually
+from lab import BIN, download, eventually
 
 pytestmark = pytest.mark.thorough
 
@@ -135,10 +135,8 @@ def test_a_scenario_that_a_robot_refuses_is_not_loaded(launch, open_page, tmp_pa
     page = open_page(run.address)
     ready(page)
     page.get_by_test_id("tab-setup").click()
-    with page.expect_download() as download:
-        page.get_by_test_id("setup-save").click()
     saved = tmp_path / "saved.toml"
-    download.value.save_as(saved)
+    download(page, "setup-save", saved)
     text = saved.read_text()
     now = 'policy = "emotion"'
     assert now in text

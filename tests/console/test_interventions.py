@@ -3,7 +3,7 @@
 import pytest
 from playwright.sync_api import expect
 
-from lab import eventually
+from lab import download, eventually
 
 pytestmark = pytest.mark.thorough
 
@@ -214,9 +214,7 @@ def test_a_run_by_hand_is_saved_as_a_scenario(launch, open_page, tmp_path):
     page.get_by_test_id("do-lose").click()
     expect(page.get_by_test_id("message")).to_contain_text("with the next tick")
     step(page, 1)
-    with page.expect_download() as download:
-        page.get_by_test_id("experiment-save").click()
     saved = tmp_path / "saved.toml"
-    download.value.save_as(saved)
+    download(page, "experiment-save", saved)
     assert "[[change]]" in saved.read_text()
     assert "network.lose" in saved.read_text()

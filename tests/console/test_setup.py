@@ -5,7 +5,7 @@ import json
 import pytest
 from playwright.sync_api import expect
 
-from lab import FITS, eventually, until
+from lab import FITS, download, eventually, until
 
 pytestmark = pytest.mark.thorough
 
@@ -177,10 +177,8 @@ def test_a_set_up_is_saved_and_loaded(launch, open_page, tmp_path):
     page = open_page(run.address)
     set_up(page)
 
-    with page.expect_download() as download:
-        page.get_by_test_id("setup-save").click()
     saved = tmp_path / "saved.toml"
-    download.value.save_as(saved)
+    download(page, "setup-save", saved)
     assert "seed = 11" in saved.read_text()
 
     changed = tmp_path / "changed.toml"

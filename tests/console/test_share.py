@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 import pytest
 from playwright.sync_api import expect
 
-from lab import PATIENCE_S, ROOT, eventually, start_console, until
+from lab import PATIENCE_S, ROOT, download, eventually, start_console, until
 
 pytestmark = pytest.mark.thorough
 
@@ -69,11 +69,8 @@ def test_the_plan_is_saved_as_a_light_picture_of_a_stated_size(launch, open_page
     page = open_page(launch().address, width=width, scheme=scheme)
     expect(page.get_by_test_id("tick")).to_have_text("0")
     assert "180 mm at 300 dpi" in page.get_by_test_id("picture").get_attribute("title")
-    with page.expect_download() as download:
-        page.get_by_test_id("picture").click()
-    assert download.value.suggested_filename == "console-test-tick-0.png"
     kept = screenshots / f"plan-{width}-{scheme}.png"
-    download.value.save_as(kept)
+    assert download(page, "picture", kept) == "console-test-tick-0.png"
     png = kept.read_bytes()
     assert png[:8] == b"\x89PNG\r\n\x1a\n"
     assert int.from_bytes(png[16:20], "big") == round(180 / 25.4 * 300)
@@ -129,11 +126,8 @@ def test_the_plan_is_saved_as_a_drawing(launch, open_page, tmp_path, screenshots
     expect(page.get_by_test_id("panel-Butler").get_by_test_id("face")).to_be_visible()
     until(page, "window.carsConsole.frame()?.tick === 3")
 
-    with page.expect_download() as download:
-        page.get_by_test_id("vector").click()
-    assert download.value.suggested_filename == "console-test-tick-3.svg"
     kept = screenshots / f"plan-{scheme}.svg"
-    download.value.save_as(kept)
+    assert download(page, "vector", kept) == "console-test-tick-3.svg"
 
     document = ElementTree.parse(kept).getroot()
     words = [text.text for text in document.iter(f"{SVG}text")]
