@@ -28,7 +28,7 @@ def test_a_panel_has_content_before_the_first_tick(launch, open_page, screenshot
         expect(panel.locator("tr", has_text="class")).to_contain_text(robot["name"])
         expect(panel.locator(".pair", has_text="emotion").locator(".badge")).to_have_text(robot["emotion_state"] or "none yet")
         expect(panel.locator(".pair", has_text="behavior").locator(".badge")).to_have_text(robot["behavior_state"] or "none yet")
-        expect(panel.locator(".where")).to_contain_text("m/s")
+        expect(panel.locator(".where")).to_contain_text("ft/s")
         expect(panel.locator(".text")).to_contain_text("last commands")
     page.screenshot(path=screenshots / "panels-tick-0.png")
 

@@ -20,6 +20,19 @@ def recorded(launch, tmp_path):
     return start_console(run.processes, "--recording", run.run_folder)
 
 
+def test_the_unit_is_the_scenarios_until_one_is_chosen(recorded, open_page):
+    page = open_page(recorded)
+    where = page.get_by_test_id("panel-Butler").locator(".where")
+    expect(page.get_by_test_id("units")).to_have_value("ft")
+    expect(where).to_contain_text("ft/s")
+
+    page.get_by_test_id("units").select_option("m")
+    expect(where).to_contain_text("m/s")
+    page.reload()
+    expect(page.get_by_test_id("units")).to_have_value("m")
+    expect(where).to_contain_text("m/s")
+
+
 def test_a_recording_is_scrubbed_and_played(recorded, open_page, screenshots):
     page = open_page(recorded)
     expect(page.get_by_test_id("scrub")).to_be_visible()

@@ -452,6 +452,8 @@ box("keys").addEventListener("click", () => element("help", HTMLDialogElement).s
 
 const unitChoice = element("units", HTMLSelectElement);
 unitChoice.value = units.unit;
+units.listeners.push(() => (unitChoice.value = units.unit));
+store.on("frame", () => units.suggest(store.frame?.display_unit ?? "m"));
 unitChoice.addEventListener("change", () => units.choose(unitChoice.value === "ft" ? "ft" : "m"));
 const trails = element("trails", HTMLInputElement);
 trails.addEventListener("change", () => {

@@ -18,7 +18,7 @@ import { hasGuessedNames, orderNames } from "./palette.js";
  * An epoch that is recorded; `ticks` is its last tick so far, `number` tells it from a recording that took its place, and
  * `epochs` are all that have one.
  * @typedef {{run: string, epoch: number, seed: number, tick_s: number, duration_s: number, field_m: [number, number],
- *   body_m: number, obstacles: [number, number][], ticks: number, is_finished: boolean, number: number, epochs: number[]}} Recorded
+ *   body_m: number, display_unit: "m" | "ft", obstacles: [number, number][], ticks: number, is_finished: boolean, number: number, epochs: number[]}} Recorded
  */
 /**
  * @typedef {{tick: number, robots: RobotFrame[], guests_mm: number[], cuts: Cut[], awaiting: Awaited[],

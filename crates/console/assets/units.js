@@ -59,19 +59,32 @@ export function inUnit(text, { unit, unit_m }) {
   });
 }
 
-/** The chosen unit, kept in the browser's local storage if that is allowed. */
+/** The unit of the scenario, or the chosen one, kept in the browser's local storage if that is allowed. */
 export class Units {
   constructor() {
+    const chosen = kept("cars-units");
+    this.isChosen = chosen === "ft" || chosen === "m";
     /** @type {Unit} */
-    this.unit = kept("cars-units") === "ft" ? "ft" : "m";
+    this.unit = chosen === "ft" ? "ft" : "m";
     /** @type {(() => void)[]} */
     this.listeners = [];
   }
 
   /** @param {Unit} unit */
   choose(unit) {
-    this.unit = unit;
+    this.isChosen = true;
     keep("cars-units", unit);
+    this.show(unit);
+  }
+
+  /** The unit of the scenario that is shown, which holds where nobody has chosen. @param {Unit} unit */
+  suggest(unit) {
+    if (!this.isChosen && unit !== this.unit) this.show(unit);
+  }
+
+  /** @param {Unit} unit */
+  show(unit) {
+    this.unit = unit;
     this.listeners.forEach((listener) => listener());
   }
 

@@ -414,7 +414,7 @@ impl NewLines {
 
 #[cfg(test)]
 mod tests {
-    use protocol::messages::{Fate, LogKind, Phase, Widget};
+    use protocol::messages::{DisplayUnit, Fate, LogKind, Phase, Widget};
     use serde_json::Value;
 
     use super::*;
@@ -447,6 +447,7 @@ mod tests {
             awaiting: Vec::new(),
             field_m: [10.0, 10.0],
             body_m: 1.0,
+            display_unit: DisplayUnit::default(),
             robots: Vec::new(),
             guests: vec![[1.0, 2.0]],
             obstacles: Vec::new(),

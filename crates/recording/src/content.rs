@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use protocol::messages::{Awaited, Cut, LogRecord, Panel, Point, Report, Standing};
+use protocol::messages::{Awaited, Cut, DisplayUnit, LogRecord, Panel, Point, Report, Standing};
 use protocol::{Epoch, Event, Message, RobotName, RunName, Tick};
 use schemars::JsonSchema;
 use serde::de::{Error, IgnoredAny};
@@ -32,6 +32,9 @@ pub struct Header {
     pub field_m: [f64; 2],
     /// Side of every body, meters.
     pub body_m: f64,
+    /// In what people are shown lengths and speeds.
+    #[serde(default)]
+    pub display_unit: DisplayUnit,
     /// Centers of the fixed obstacles, meters.
     pub obstacles: Vec<[f64; 2]>,
     /// The robots of the scenario, by name.

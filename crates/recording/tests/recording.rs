@@ -9,8 +9,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use protocol::messages::{
-    Awaited, Cut, End, LogKind, LogRecord, Panel, Performative, Point, Reason, Report, Variable,
-    Widget,
+    Awaited, Cut, DisplayUnit, End, LogKind, LogRecord, Panel, Performative, Point, Reason, Report,
+    Variable, Widget,
 };
 use protocol::{Event, RobotName, RunName, Tick};
 use recording::content::Missed;
@@ -38,6 +38,7 @@ fn header() -> Header {
         duration_s: 300.0,
         field_m: [30.0, 20.0],
         body_m: 0.5,
+        display_unit: DisplayUnit::Feet,
         obstacles: vec![[1.0, 2.0]],
         robots: vec![name("Butler"), name("Leguin")],
     }

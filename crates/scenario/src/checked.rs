@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use observe::Expectation;
-use protocol::messages::{Parameters, Point};
+use protocol::messages::{DisplayUnit, Parameters, Point};
 use protocol::{RobotName, Tick};
 use serde::{Deserialize, Serialize};
 use world::{Field, Guests, Hall};
@@ -44,6 +44,8 @@ pub struct Scenario {
     pub field_m: [f64; 2],
     /// Side of every body, meters.
     pub body_m: f64,
+    /// In what people are shown lengths and speeds.
+    pub display_unit: DisplayUnit,
     /// Highest speed, m/s. A faster move is refused.
     pub max_speed_mps: f64,
     /// Distance within which robots sense other bodies, meters.

@@ -17,7 +17,7 @@ use config::overrides::merge;
 use config::units::{Length, Speed, Time, quantity};
 use config::{FileError, FixedList, Source, seed, shipped};
 use observe::Expectation;
-use protocol::messages::{OnLate, Parameters, Point};
+use protocol::messages::{DisplayUnit, OnLate, Parameters, Point};
 use protocol::{RobotName, Tick};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
@@ -76,6 +76,7 @@ pub(super) struct ScenarioFile {
 struct FieldTable {
     size: Option<FixedList<Length, 2>>,
     body: Option<Length>,
+    display_unit: Option<DisplayUnit>,
     max_speed: Option<Speed>,
 }
 
@@ -205,6 +206,7 @@ impl ScenarioFile {
         let size = field.and_then(|field| field.size).unwrap_or(FIELD);
         let body = field.and_then(|field| field.body).unwrap_or(BODY);
         let max_speed = field.and_then(|field| field.max_speed);
+        let display_unit = field.and_then(|field| field.display_unit);
 
         let robots = robots(self.robots, source, folder)?;
         let record = record(self.record, source)?;
@@ -218,6 +220,7 @@ impl ScenarioFile {
             ticks,
             field_m: size.0.map(|length| length.0),
             body_m: body.0,
+            display_unit: display_unit.unwrap_or_default(),
             max_speed_mps: max_speed.unwrap_or(MAX_SPEED).0,
             sensing_range_m,
             guests,
@@ -536,6 +539,7 @@ impl From<&checked::Scenario> for ScenarioFile {
         let field = FieldTable {
             size: Some(FixedList(scenario.field_m.map(Length))),
             body: Some(Length(scenario.body_m)),
+            display_unit: Some(scenario.display_unit),
             max_speed: Some(Speed(scenario.max_speed_mps)),
         };
         let record = RecordTable {

@@ -4,6 +4,7 @@
 
 use std::path::Path;
 
+use protocol::messages::DisplayUnit;
 use scenario::Scenario;
 use scenario::diagnostic::{FileError, Source};
 use scenario::{Changes, OnLate};
@@ -40,6 +41,26 @@ fn a_field_without_a_size_has_that_of_the_paper() {
     let scenario = parse("[field]\nmax_speed = \"5 ft/s\"\n").unwrap();
     assert_eq!(scenario.field_m, [15.24, 15.24]);
     assert_eq!(scenario.max_speed_mps, 1.524);
+}
+
+#[test]
+fn the_unit_for_people_changes_nothing_else_and_is_kept() {
+    let text = "[field]\nsize = [\"50 ft\", \"50 ft\"]\n";
+    let meters = parse(text).unwrap();
+    let feet = parse(&format!("{text}display_unit = \"ft\"\n")).unwrap();
+    assert_eq!(meters.display_unit, DisplayUnit::Meters);
+    assert_eq!(feet.display_unit, DisplayUnit::Feet);
+    assert_eq!(feet.field_m, meters.field_m);
+    assert_eq!(
+        parse(&feet.to_toml().unwrap()).unwrap().display_unit,
+        DisplayUnit::Feet
+    );
+
+    let error = shown(&parse("[field]\ndisplay_unit = \"feet\"\n").unwrap_err());
+    assert!(
+        error.contains("hall.toml:2") && error.contains("`m` or `ft`"),
+        "{error}"
+    );
 }
 
 #[test]

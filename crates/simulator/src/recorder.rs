@@ -564,6 +564,7 @@ pub fn header(run: &RunName, simulation: &Simulation) -> Header {
         duration_s: scenario.duration_s(),
         field_m: scenario.field_m,
         body_m: scenario.body_m,
+        display_unit: scenario.display_unit,
         obstacles: scenario.obstacles.iter().map(|at| [at.x, at.y]).collect(),
         robots: simulation.names().to_vec(),
     }

@@ -338,6 +338,10 @@ export type Tone = "good" | "neutral" | "warning" | "bad";
  */
 export type Face = "happy" | "sad" | "surprised" | "disgusted" | "angry" | "fearful" | "neutral";
 /**
+ * A unit of length in which people are shown a run. All messages and records are in meters.
+ */
+export type DisplayUnit = "m" | "ft";
+/**
  * Whether a run has done what is expected of it. The worse is the greater: a run passes if one expectation does and no other one
  * fails or is undecided.
  */
@@ -605,6 +609,10 @@ export interface WorldFrame {
    * Pairs of robots between which the medium lets nothing through now.
    */
   cuts?: Cut[];
+  /**
+   * In what people are shown lengths and speeds, unless they choose another unit.
+   */
+  display_unit?: DisplayUnit & string;
   /**
    * Simulated time at which the run ends, seconds.
    */

@@ -41,6 +41,9 @@ pub struct WorldFrame {
     pub field_m: [f64; 2],
     /// Side of every body, meters.
     pub body_m: f64,
+    /// In what people are shown lengths and speeds, unless they choose another unit.
+    #[serde(default)]
+    pub display_unit: DisplayUnit,
     /// The robots, by name.
     pub robots: Vec<RobotFrame>,
     /// Centers of the guests, meters.
@@ -59,6 +62,18 @@ pub struct WorldFrame {
     /// How the expectations of the scenario stand, in its order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub expectations: Vec<Standing>,
+}
+
+/// A unit of length in which people are shown a run. All messages and records are in meters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+pub enum DisplayUnit {
+    /// Meters.
+    #[default]
+    #[serde(rename = "m")]
+    Meters,
+    /// International feet, 0.3048 m.
+    #[serde(rename = "ft")]
+    Feet,
 }
 
 /// Most commands that one frame shows.

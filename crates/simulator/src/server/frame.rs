@@ -1,7 +1,7 @@
 //! The field of a run in progress, as observers see it.
 
 use protocol::RobotName;
-use protocol::messages::{Presence, RobotFrame, Status, WorldFrame};
+use protocol::messages::{DisplayUnit, Presence, RobotFrame, Status, WorldFrame};
 
 use crate::simulation::Simulation;
 
@@ -46,6 +46,7 @@ pub(super) fn frame(
         cuts: simulation.cuts(),
         faults: simulation.held_processes(&late),
         expectations: simulation.standings(),
+        display_unit: scenario.display_unit,
         ..empty_frame(status, scenario.field_m, scenario.body_m)
     }
 }
@@ -66,6 +67,7 @@ pub(super) fn empty_frame(status: &Status, field_m: [f64; 2], body_m: f64) -> Wo
         awaiting: status.awaiting.clone(),
         field_m,
         body_m,
+        display_unit: DisplayUnit::default(),
         robots: Vec::new(),
         guests: Vec::new(),
         obstacles: Vec::new(),

@@ -150,6 +150,7 @@ impl Player {
             obstacles: header.obstacles.clone(),
             cuts: frame.cuts.clone(),
             expectations: frame.standings(self.events()),
+            display_unit: header.display_unit,
             ..empty_frame(status, header.field_m, header.body_m)
         }
     }
