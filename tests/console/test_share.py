@@ -134,7 +134,7 @@ def test_the_plan_is_saved_as_a_drawing(launch, open_page, tmp_path, screenshots
     for word in ("Butler", "Leguin", "Bu", "Le", "SERVE", "guest", "obstacle", "blocked", "command", "lost command", "cut off"):
         assert word in words, words
     frame = page.evaluate("window.carsConsole.frame()")
-    for word in ("console-test", "1.5 s of 600.0 s, tick 3", f"seed {frame['seed']}", "2 m", *(robot["emotion_state"] for robot in frame["robots"])):
+    for word in ("console-test", "1.5 s of 600.0 s, tick 3", f"seed {frame['seed']}", "5 ft", *(robot["emotion_state"] for robot in frame["robots"])):
         assert word in words, (word, words)
     assert document.get("width") == "180mm" and document.get("height").endswith("mm")
     assert len([path for path in document.iter(f"{SVG}g") if path.get("transform")]) == 2, "a face for each robot"

@@ -88,7 +88,14 @@ impl Crowd {
     }
 
     /// Moves every guest by one step, in index order. A guest whose course is over draws a new one first.
-    pub(crate) fn advance(&mut self, bodies: &mut Bodies, rng: &mut impl Rng) {
+    ///
+    /// `directions` are those of guests that react; guests without an entry walk on.
+    pub(crate) fn advance(
+        &mut self,
+        bodies: &mut Bodies,
+        directions: &[Option<Point>],
+        rng: &mut impl Rng,
+    ) {
         let guests = self.courses.iter_mut().zip(&mut self.blockers);
 
         for (index, (course, blocker)) in guests.enumerate() {
@@ -97,7 +104,11 @@ impl Crowd {
             }
 
             course.ticks_left -= 1;
-            *blocker = bodies.advance_guest(index, course.step_m).err();
+            let step_m = match directions.get(index) {
+                Some(Some(direction)) => *direction * (course.speed_mps * self.tick_s),
+                _ => course.step_m,
+            };
+            *blocker = bodies.advance_guest(index, step_m).err();
         }
     }
 }

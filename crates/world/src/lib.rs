@@ -5,8 +5,8 @@
 //! the proposals passed to [`World::advance`]. The same three inputs give bit-identical positions on every machine.
 //!
 //! The rules are those of the paper (CARS, 2002, section "Obstacles"). Every body occupies a square of the same
-//! size. Guests walk in a straight line for a while, then choose a new one. A body whose proposed location
-//! collides is not advanced. How a robot reacts to a collision is up to the robot and not part of this crate.
+//! size. Guests walk in a straight line for a while, then choose a new one, unless they react to a robot
+//! ([`Reaction`], chosen here). A body whose proposed location collides is not advanced. How a robot reacts to a collision is up to the robot and not part of this crate.
 //!
 //! # One tick
 //!
@@ -64,6 +64,7 @@ mod hall;
 mod motion;
 mod placing;
 mod point;
+mod reactions;
 mod triangular;
 
 pub use bodies::{Blocker, Body, Near};
@@ -72,4 +73,5 @@ pub use guests::Course;
 pub use hall::{BODIES_MAX, BODY_MIN_M, Field, Guests, Hall, SIDE_MAX_M, TOLERANCE_M};
 pub use motion::{MoveOutcome, World};
 pub use point::Point;
+pub use reactions::{Reaction, Response};
 pub use triangular::Triangular;

@@ -6,6 +6,7 @@ use crate::guests::{Course, Crowd};
 use crate::hall::{Field, Hall, TOLERANCE_M};
 use crate::placing::place;
 use crate::point::Point;
+use crate::reactions::{Reaction, directions};
 use rand::Rng;
 
 /// The outcome of a robot's proposal.
@@ -63,30 +64,65 @@ impl<R: Rng> World<R> {
         })
     }
 
+    /// Advances the world by one tick, in which no guest reacts to a robot. See [`World::advance_with`].
+    ///
+    /// # Panics
+    ///
+    /// Panics unless there is exactly one proposal for each robot.
+    pub fn advance(&mut self, proposals: &[Option<Point>]) -> Vec<MoveOutcome> {
+        self.advance_with(proposals, &[])
+    }
+
     /// Advances the world by one tick and returns one verdict for each robot.
     ///
     /// Robots attempt to move to their proposed locations in index order; then guests attempt the next step of
     /// their courses in index order. A proposal of `None` keeps the robot in place. A body can take a location that
     /// another one leaves in the same tick, provided that the other one moves first.
     ///
+    /// Guests react to robots where these stand after their moves.
+    ///
     /// # Panics
     ///
-    /// Panics unless there is exactly one proposal for each robot.
-    pub fn advance(&mut self, proposals: &[Option<Point>]) -> Vec<MoveOutcome> {
+    /// Panics unless there is exactly one proposal for each robot, and on a reaction to a robot that does not exist.
+    pub fn advance_with(
+        &mut self,
+        proposals: &[Option<Point>],
+        reactions: &[Reaction],
+    ) -> Vec<MoveOutcome> {
         assert_eq!(
             proposals.len(),
             self.robots().len(),
             "there is one proposal for each robot"
         );
 
+        // A robot that is blocked means to move all the same, so where it heads is known before the moves only.
+        let headings = match reactions {
+            [] => Vec::new(),
+            _ => self.headings(proposals),
+        };
         let mut verdicts = Vec::with_capacity(proposals.len());
         for (index, &proposal) in proposals.iter().enumerate() {
             verdicts.push(self.advance_robot(index, proposal));
         }
 
-        self.crowd.advance(&mut self.bodies, &mut self.rng);
+        let directions = match reactions {
+            [] => Vec::new(),
+            _ => directions(&self.bodies, reactions, &headings),
+        };
+        self.crowd
+            .advance(&mut self.bodies, &directions, &mut self.rng);
 
         verdicts
+    }
+
+    /// The displacement that each robot proposes; none where it proposes no place.
+    fn headings(&self, proposals: &[Option<Point>]) -> Vec<Point> {
+        let robots = self.robots().iter().zip(proposals);
+        let headings = robots.map(|(&at, to)| {
+            to.filter(|to| to.is_finite())
+                .map_or_else(Point::default, |to| to - at)
+        });
+        headings.collect()
     }
 
     fn advance_robot(&mut self, index: usize, proposal: Option<Point>) -> MoveOutcome {

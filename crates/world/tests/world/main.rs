@@ -10,3 +10,4 @@ mod halls;
 mod motion;
 mod near;
 mod placing;
+mod reactions;
