@@ -314,6 +314,9 @@ function drawBar() {
     ? `The simulator is disconnected. This is its last frame. If it was killed, this goes on after the last recorded tick: cars launch --resume ${store.run}`
     : "The console is not reachable. This is the last frame.";
 
+  for (const mood of /** @type {const} */ (["waiting", "annoyed"])) {
+    box(`${mood}-guests`).hidden = !store.frame?.guest_moods?.[mood]?.length;
+  }
   document.title = store.run ? `${store.run} · CARS` : "CARS";
 }
 

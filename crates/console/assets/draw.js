@@ -23,6 +23,8 @@ const SMALLEST_ROBOT_PX = 9;
 const RING_PX = 4.5;
 /** Dashes of the ring of an emotion whose areas are hatched, by their hatching. */
 const DASHES = [[], [7, 3], [3, 3], [2, 2, 8, 2]];
+/** Moods of guests that are drawn. */
+const MOODS = /** @type {const} */ (["waiting", "annoyed"]);
 /** Smaller guests would not be seen. */
 const SMALLEST_GUEST_PX = 0.75;
 /** Guests with a larger radius are pale, with an edge, so that robots stand out among them. */
@@ -131,6 +133,44 @@ export function guestCircles({ context, theme }, at, radius) {
     context.fill();
     context.stroke();
   });
+}
+
+/**
+ * The moods of guests, as faces on their circles: who waits has a straight mouth, who is annoyed a frown and a ring.
+ * @param {Pen} pen
+ * @param {Float64Array} places_m x and y in turn, of all guests
+ * @param {import("./types/messages.js").WorldFrame["guest_moods"]} moods
+ * @param {number} radius
+ */
+export function guestMoods(pen, places_m, moods, radius) {
+  const { camera } = pen;
+  for (const mood of MOODS) {
+    for (const guest of moods?.[mood] ?? []) {
+      const at = guestsAt(camera, places_m.subarray(2 * guest, 2 * guest + 2), radius);
+      if (at.length) guestMood(pen, mood, at[0], at[1], radius);
+    }
+  }
+}
+
+/** @type {(pen: Omit<Pen, "camera">, mood: "waiting" | "annoyed", x: number, y: number, radius: number) => void} */
+export function guestMood({ context, theme }, mood, x, y, radius) {
+  const color = mood === "annoyed" ? theme.bad : theme.warning;
+  if (mood === "annoyed" || isPlain(radius)) ring(context, x, y, radius, color, 1.5);
+  if (isPlain(radius)) return;
+
+  for (const side of [-1, 1]) disk(context, x + 0.35 * side * radius, y - 0.2 * radius, Math.max(1, 0.12 * radius), color);
+  context.strokeStyle = color;
+  context.lineWidth = 1.5;
+  context.beginPath();
+  if (mood === "annoyed") {
+    context.moveTo(x - 0.4 * radius, y + 0.55 * radius);
+    context.lineTo(x, y + 0.3 * radius);
+    context.lineTo(x + 0.4 * radius, y + 0.55 * radius);
+  } else {
+    context.moveTo(x - 0.4 * radius, y + 0.4 * radius);
+    context.lineTo(x + 0.4 * radius, y + 0.4 * radius);
+  }
+  context.stroke();
 }
 
 /** @type {(context: Paper, at: number[], radius: number, paint: () => void) => void} */

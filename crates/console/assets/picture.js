@@ -14,6 +14,7 @@ import { Vector } from "./vector.js";
 /** @typedef {import("./types/messages.js").Face} Face */
 /** @typedef {import("./widgets.js").Panel} Panel */
 /** @typedef {import("./types/messages.js").RobotFrame} RobotFrame */
+/** @typedef {import("./types/messages.js").WorldFrame} WorldFrame */
 /** @typedef {import("./theme.js").Theme} Theme */
 
 /** Of the whole figure, the width of two columns of a paper, and pixels per inch of a PNG. */
@@ -66,7 +67,7 @@ export function picture(plan, panels) {
     y += 28;
   }
 
-  y = legend(side, words, theme, robots, plan.hasTrails, y + 6);
+  y = legend(side, words, theme, frame, plan.hasTrails, y + 6);
   const width = camera.width_px + SIDE_PX;
   const height = Math.max(camera.height_px, y + 6);
   const whole = new Vector();
@@ -192,9 +193,10 @@ function faceStyles({ skin, ink }) {
 
 /**
  * The signs of the plan, drawn by what draws them there.
- * @type {(paper: Vector, words: Words, theme: Theme, robots: RobotFrame[], hasTrails: boolean, y: number) => number} where it ends
+ * @type {(paper: Vector, words: Words, theme: Theme, frame: WorldFrame | null, hasTrails: boolean, y: number) => number} where it ends
  */
-function legend(paper, words, theme, robots, hasTrails, y) {
+function legend(paper, words, theme, frame, hasTrails, y) {
+  const { robots = [], guest_moods: moods } = frame ?? {};
   const x = PAD_PX + 12;
   /** @type {(draw: (y: number) => void, label: string) => void} */
   const row = (sign, label) => {
@@ -214,6 +216,13 @@ function legend(paper, words, theme, robots, hasTrails, y) {
     words.muted(`${emotion.slice(0, 22)}${robots.length > MOST_ROBOTS ? ` (${count})` : ""}`, x + 40, y - SIGN_PX);
   }
   row((at) => draw.guestCircles({ context: paper, theme }, [x, at], 6), "guest");
+  for (const [mood, label] of /** @type {["waiting" | "annoyed", string][]} */ ([["waiting", "guest that waits"], ["annoyed", "annoyed guest"]])) {
+    if (!moods?.[mood]?.length) continue;
+    row((at) => {
+      draw.guestCircles({ context: paper, theme }, [x, at], 6);
+      draw.guestMood({ context: paper, theme }, mood, x, at, 6);
+    }, label);
+  }
   row((at) => {
     paper.fillStyle = theme.obstacle;
     paper.fillRect(x - 5.5, at - 5.5, 11, 11);

@@ -188,6 +188,7 @@ export class Plan {
    */
   paintMoving(pen, frame, drawRobot) {
     const { motion } = this;
+    draw.guestMoods(pen, motion.now_m, frame.guest_moods, draw.guestRadius(pen.camera, frame.body_m));
     if (this.hasTrails) this.paintTrails(pen, frame);
     /** @type {{words: draw.Area[], robots: draw.Area[]}} */
     const taken = { words: [], robots: [] };

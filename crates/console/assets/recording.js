@@ -21,7 +21,7 @@ import { hasGuessedNames, orderNames } from "./palette.js";
  *   body_m: number, display_unit: "m" | "ft", obstacles: [number, number][], ticks: number, is_finished: boolean, number: number, epochs: number[]}} Recorded
  */
 /**
- * @typedef {{tick: number, robots: RobotFrame[], guests_mm: number[], cuts: Cut[], awaiting: Awaited[],
+ * @typedef {{tick: number, robots: RobotFrame[], guests_mm: number[], guest_moods: WorldFrame["guest_moods"], cuts: Cut[], awaiting: Awaited[],
  *   expectations: Standing[]}} RecordedTick
  */
 /** A panel and its tick. @typedef {{tick: number, robot: string, panel: Panel}} RecordedPanel */
@@ -503,6 +503,7 @@ export class Player {
       phase: live ? live.phase : this.isPlaying ? "running" : record.tick >= this.last ? "ended" : "paused",
       awaiting: record.awaiting,
       guests,
+      guest_moods: record.guest_moods,
       flights,
       cuts: record.cuts,
       expectations: record.expectations,

@@ -298,6 +298,7 @@ fn add_tick(
         ("tick", &to_json(&tick)),
         ("robots", &robots.into_json()),
         ("guests_mm", &to_json(&recorded.frame.guests_mm)),
+        ("guest_moods", &to_json(&recorded.frame.guest_moods)),
         ("cuts", &to_json(&recorded.frame.cuts)),
         (
             "expectations",

@@ -95,6 +95,7 @@ impl Hosts {
             | Event::Missed { .. }
             | Event::DoneLate { .. }
             | Event::Blocked { .. }
+            | Event::Guest { .. }
             | Event::CommandDropped { .. }
             | Event::CommandDelayed { .. }
             | Event::CommandDuplicated { .. }

@@ -23,8 +23,8 @@ pub const FILES: [&str; 3] = ["events.csv", "states.csv", "variables.csv"];
 const WHEN: &str = "epoch tick time_s";
 /// A row for each event.
 const EVENTS: &str = "event robot generation x_m y_m blocked_by blocked_by_robot state_before state_after from_robot \
-                      to_robot seq performative command because until_tick cuts_commands cuts_queries fault begins set \
-                      by_hand expectation verdict text seed version protocol tick_s reason digest";
+                      to_robot seq performative command because until_tick cuts_commands cuts_queries fault begins guest mood \
+                      set by_hand expectation verdict text seed version protocol tick_s reason digest";
 /// A row for each robot in each tick.
 const STATES: &str = "robot generation x_m y_m speed_mps direction_rad emotion behavior blocked missed commands \
                       proposal_x_m proposal_y_m";
@@ -397,6 +397,9 @@ fn event_cells(event: &Event) -> Vec<Column<'_>> {
             ("robot", robot.as_str().into()),
             ("text", text.as_str().into()),
         ],
+        Event::Guest { guest, mood } => {
+            vec![("guest", (*guest).into()), ("mood", json_name(mood))]
+        }
         Event::Judged {
             expectation,
             verdict,

@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::messages::is_false;
 use crate::messages::{
-    End, Fate, FaultKind, Flight, LogKind, LogRecord, Performative, Point, Reason, Verdict,
+    End, Fate, FaultKind, Flight, GuestMood, LogKind, LogRecord, Performative, Point, Reason,
+    Verdict,
 };
 use crate::name::RobotName;
 use crate::plain::escape_line;
@@ -200,6 +201,13 @@ pub enum Event {
         /// The line.
         text: String,
     },
+    /// A guest is in another mood. All are content at the beginning.
+    Guest {
+        /// Which, counted from 0.
+        guest: u32,
+        /// Its mood now.
+        mood: GuestMood,
+    },
     /// The simulator refuses what a robot does. It says so once for each reason, and how often at the end of the run.
     Warned {
         /// Who.
@@ -359,6 +367,7 @@ impl Event {
             Self::Fault { .. } => "fault",
             Self::Changed { .. } => "changed",
             Self::Say { .. } => "say",
+            Self::Guest { .. } => "guest",
             Self::Warned { .. } => "warned",
             Self::Judged { .. } => "judged",
             Self::Tick { .. } => "tick",
@@ -565,6 +574,7 @@ impl Event {
             Self::DoneLate { .. }
             | Self::Blocked { .. }
             | Self::QueryLost { .. }
+            | Self::Guest { .. }
             | Self::Tick { .. } => None,
         }
     }

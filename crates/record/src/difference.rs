@@ -261,6 +261,7 @@ fn is_environment(event: &Event) -> bool {
             | Event::Behavior { .. }
             | Event::CommandSent { .. }
             | Event::Say { .. }
+            | Event::Guest { .. }
             | Event::Missed { .. }
             | Event::DoneLate { .. }
             | Event::Judged { .. }

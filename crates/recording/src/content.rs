@@ -2,7 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use protocol::messages::{Awaited, Cut, DisplayUnit, LogRecord, Panel, Point, Report, Standing};
+use protocol::messages::{
+    Awaited, Cut, DisplayUnit, GuestMood, LogRecord, Panel, Point, Report, Standing,
+};
 use protocol::{Epoch, Event, Message, RobotName, RunName, Tick};
 use schemars::JsonSchema;
 use serde::de::{Error, IgnoredAny};
@@ -246,6 +248,9 @@ pub struct Frame {
     pub robots: Vec<PlacedRobot>,
     /// Centers of the guests in whole millimeters, x and y in turn.
     pub guests_mm: Vec<i64>,
+    /// Guests that are not content, by their index, by mood.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub guest_moods: BTreeMap<GuestMood, Vec<u32>>,
     /// Pairs of robots between which the medium lets nothing through.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub cuts: Vec<Cut>,

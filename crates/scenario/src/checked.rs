@@ -10,6 +10,7 @@ use world::{Field, Guests, Hall};
 
 use super::change::{Change, Parent};
 use super::fault::Fault;
+use super::guests::GuestRules;
 use super::lateness::Lateness;
 use super::network::Network;
 
@@ -52,6 +53,8 @@ pub struct Scenario {
     pub sensing_range_m: f64,
     /// The moving obstacles.
     pub guests: Guests,
+    /// What they do beside walking.
+    pub guest_rules: GuestRules,
     /// Centers of the fixed obstacles, meters.
     pub obstacles: Vec<Point>,
     /// The robots by name.

@@ -5,6 +5,7 @@ pub mod change;
 mod checked;
 pub mod fault;
 pub mod files;
+pub mod guests;
 mod lateness;
 pub mod network;
 mod over_time;
@@ -28,6 +29,7 @@ pub use change::{Change, Parent};
 pub use checked::{DEFAULT_SEED, MAX_GUESTS, RecordContents, RobotSpec, Scenario, SyncPoint};
 pub use checked::{to_wire, to_world};
 pub use fault::{Fault, FaultEnd};
+pub use guests::GuestRules;
 pub use lateness::Lateness;
 pub use network::Network;
 

@@ -3,6 +3,7 @@
 pub(super) mod change;
 mod expect;
 pub(super) mod fault;
+mod guests;
 mod network;
 mod range;
 mod times;
@@ -25,6 +26,7 @@ use world::Triangular;
 
 use change::{ChangeTable, ParentTable};
 use fault::FaultTable;
+use guests::GuestsTable;
 use network::NetworkTable;
 use range::Range;
 use times::Times;
@@ -88,14 +90,6 @@ struct SensingTable {
 
 #[derive(Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-struct GuestsTable {
-    count: Spanned<usize>,
-    speed: Option<Spanned<Range<Speed>>>,
-    duration: Option<Spanned<Range<Time>>>,
-}
-
-#[derive(Debug, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
 struct RecordTable {
     log: Option<bool>,
     log_name: Option<Spanned<String>>,
@@ -122,18 +116,6 @@ struct RawRobot {
     params: toml::Table,
 }
 
-/// Speed of strolling guests [I]. The paper names the distributions but no numbers.
-const GUEST_SPEED: Range<Speed> = Range {
-    min: Speed(0.06096),
-    mode: Speed(0.3048),
-    max: Speed(0.6096),
-};
-/// Duration of a guest's straight walk [I].
-const GUEST_DURATION: Range<Time> = Range {
-    min: Time(2.0),
-    mode: Time(5.0),
-    max: Time(10.0),
-};
 /// Length of a tick [I].
 const TICK: Time = Time(0.5);
 /// Duration of a run [I].
@@ -196,7 +178,9 @@ impl ScenarioFile {
         let lateness = self.lateness(source)?;
         let sensing_range = self.sensing.as_ref().map(|table| &table.range);
         let sensing_range_m = positive(source, sensing_range, SENSING_RANGE, "the range")?.0;
-        let guests = self.guests(source)?;
+        let guests = self.guests.as_ref().map(Spanned::get_ref);
+        let guest_rules = guests::rules(guests, tick_s, source)?;
+        let guests = guests::walks(guests, source)?;
         let places = FilePlaces::of(&self);
         let obstacles = self.obstacles.iter();
         let obstacles = obstacles.map(|obstacle| point(*obstacle.at.get_ref()));
@@ -224,6 +208,7 @@ impl ScenarioFile {
             max_speed_mps: max_speed.unwrap_or(MAX_SPEED).0,
             sensing_range_m,
             guests,
+            guest_rules,
             obstacles,
             lateness,
             robots,
@@ -298,24 +283,6 @@ impl ScenarioFile {
             own,
             deadline_s: positive(source, deadline, DEADLINE, "the deadline")?.0,
             lose_after: positive(source, self.lose_after.as_ref(), LOSE_AFTER, "lose_after")?,
-        })
-    }
-
-    fn guests(&self, source: &Source) -> Result<world::Guests, FileError> {
-        let guests = self.guests.as_ref().map(Spanned::get_ref);
-        let speed = guests.and_then(|guests| guests.speed.as_ref());
-        let duration = guests.and_then(|guests| guests.duration.as_ref());
-        let mut count = 0;
-        if let Some(guests) = guests {
-            count = *guests.count.get_ref();
-            checked::check_guests(count)
-                .map_err(|reason| FileError::at(source, Some(guests.count.span()), &reason))?;
-        }
-
-        Ok(world::Guests {
-            count,
-            speed_mps: triangular(source, speed, GUEST_SPEED)?,
-            duration_s: triangular(source, duration, GUEST_DURATION)?,
         })
     }
 }
@@ -573,7 +540,11 @@ impl From<&checked::Scenario> for ScenarioFile {
             sensing: Some(SensingTable {
                 range: unplaced(Length(scenario.sensing_range_m)),
             }),
-            guests: Some(unplaced(GuestsTable::from(&scenario.guests))),
+            guests: Some(unplaced(GuestsTable::of(
+                &scenario.guests,
+                &scenario.guest_rules,
+                tick_s,
+            ))),
             network: NetworkTable::of(&scenario.network, tick_s),
             record: Some(record),
             faults: faults.collect(),
@@ -582,29 +553,6 @@ impl From<&checked::Scenario> for ScenarioFile {
             parent: scenario.parent.as_ref().map(ParentTable::from),
             obstacles: obstacles.collect(),
             robots: robots.collect(),
-        }
-    }
-}
-
-impl From<&world::Guests> for GuestsTable {
-    fn from(guests: &world::Guests) -> Self {
-        let speed = &guests.speed_mps;
-        let speed = Range {
-            min: Speed(speed.min()),
-            mode: Speed(speed.mode()),
-            max: Speed(speed.max()),
-        };
-        let duration = &guests.duration_s;
-        let duration = Range {
-            min: Time(duration.min()),
-            mode: Time(duration.mode()),
-            max: Time(duration.max()),
-        };
-
-        Self {
-            count: unplaced(guests.count),
-            speed: Some(unplaced(speed)),
-            duration: Some(unplaced(duration)),
         }
     }
 }

@@ -7,7 +7,7 @@ use std::path::Path;
 use protocol::messages::DisplayUnit;
 use scenario::Scenario;
 use scenario::diagnostic::{FileError, Source};
-use scenario::{Changes, OnLate};
+use scenario::{Changes, GuestRules, OnLate};
 
 fn parse(text: &str) -> Result<Scenario, FileError> {
     Scenario::parse(
@@ -61,6 +61,56 @@ fn the_unit_for_people_changes_nothing_else_and_is_kept() {
         error.contains("hall.toml:2") && error.contains("`m` or `ft`"),
         "{error}"
     );
+}
+
+#[test]
+fn rules_for_guests_have_defaults_and_are_kept() {
+    let walking = parse("[guests]\ncount = 5\n").unwrap();
+    assert_eq!(walking.guest_rules, GuestRules::default());
+
+    let text = "tick = \"0.1 s\"\n[guests]\ncount = 5\n[guests.faces]\nrange = \"4 ft\"\nmake_way = [\"angry\", \"fearful\"]\n\
+                approach = [\"happy\"]\n[guests.requests]\npatience = \"1.1 s\"\n";
+    let scenario = parse(text).unwrap();
+    let faces = scenario.guest_rules.faces.clone().unwrap();
+    assert_eq!(faces.range_m, 1.2192);
+    assert_eq!(
+        faces.make_way,
+        ["angry", "fearful"].map(str::to_owned).into()
+    );
+    let requests = scenario.guest_rules.requests.clone().unwrap();
+    assert_eq!((requests.range_m, requests.patience), (1.8288, 11));
+    let written = parse(&scenario.to_toml().unwrap()).unwrap();
+    assert_eq!(written.guest_rules, scenario.guest_rules);
+
+    for (wrong, reason) in [
+        (
+            "[guests.faces]\nmake_way = [\"sad\"]\napproach = [\"sad\"]\n",
+            "make way for a face \"sad\"",
+        ),
+        ("[guests.faces]\nrange = \"0 m\"\n", "more than zero"),
+        ("[guests.requests]\npatience = \"0 s\"\n", "more than zero"),
+        ("[guests.requests]\nlimit = 3\n", "unknown field `limit`"),
+    ] {
+        let error = shown(&parse(&format!("[guests]\ncount = 5\n{wrong}")).unwrap_err());
+        assert!(
+            error.contains("hall.toml:") && error.contains(reason),
+            "{error}"
+        );
+    }
+    let list = |count: usize| {
+        (0..count)
+            .map(|face| format!("\"f{face}\""))
+            .collect::<Vec<_>>()
+            .join(",")
+    };
+    let with = |count| {
+        parse(&format!(
+            "[guests]\ncount = 5\n[guests.faces]\napproach = [{}]\n",
+            list(count)
+        ))
+    };
+    assert!(with(64).is_ok());
+    assert!(shown(&with(65).unwrap_err()).contains("more than 64 faces"));
 }
 
 #[test]

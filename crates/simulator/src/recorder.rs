@@ -600,6 +600,7 @@ fn set_frame(frame: &mut Frame, simulation: &Simulation, record: &TickRecord) {
         frame.guests_mm.push((guest.y * 1000.0).round() as i64);
     }
 
+    frame.guest_moods = simulation.guest_moods();
     frame.tick = record.tick;
     frame.cuts = simulation.cuts();
     frame.unreachable.clone_from(simulation.unreachable());

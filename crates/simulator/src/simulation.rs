@@ -8,17 +8,19 @@ use observe::{Monitors, Observation, RobotState};
 use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::event::{Blocker, Cause, WaitedFor};
 use protocol::messages::{
-    CommandText, Correction, Cut, Delivery, End, FaultKind, HeldProcess, Intervention, NEWS_FLAGS,
-    OnLate, Parameters, ParametersOffer, Performative, Point, ProcessOrder, PublicState, Report,
-    SensedBody, SensedKind, SensedRobot, Standing, StateVariables, TickUpdate, Welcome,
+    CommandText, Correction, Cut, Delivery, End, FaultKind, GuestMood, HeldProcess, Intervention,
+    NEWS_FLAGS, OnLate, Parameters, ParametersOffer, Performative, Point, ProcessOrder,
+    PublicState, Report, SensedBody, SensedKind, SensedRobot, Standing, StateVariables, TickUpdate,
+    Welcome,
 };
 use protocol::random::{Stream, stream};
 use protocol::{
     Epoch, Event, Generation, Line, PROTOCOL_VERSION, RobotName, RunName, Seq, Tick, encode,
 };
-use world::{Body, HallError, MoveOutcome, World};
+use world::{Body, HallError, MoveOutcome, Reaction, World};
 
 use crate::digest::{Digest, TickDigest};
+use crate::guests::GuestState;
 use crate::medium::{Arrival, Medium, SentCommand};
 use scenario::{Change, FaultEnd, Lateness, Override, Scenario, to_wire, to_world};
 
@@ -69,6 +71,7 @@ pub struct Simulation {
     /// Tick of the bodies' locations: the last complete tick or the one in progress.
     now: Tick,
     world: World<Stream>,
+    guests: GuestState,
     medium: Medium,
     /// Robots with the bodies around them in their news.
     with_bodies: BTreeSet<RobotName>,
@@ -137,6 +140,7 @@ impl Simulation {
             blocked: vec![false; names.len()],
             tick: 0,
             now: 0,
+            guests: GuestState::new(scenario.guest_rules.clone(), scenario.guests.count),
             world,
             medium,
             names,
@@ -224,8 +228,9 @@ impl Simulation {
         self.events = std::mem::take(&mut self.between);
         self.change_scenario();
 
-        // Robots move by what they proposed in the tick before, guests by their own stream.
-        let verdicts = self.world.advance(&self.proposals());
+        // Robots move by what they proposed in the tick before, guests by their own stream, and by the faces of that tick.
+        let reactions = self.reactions();
+        let verdicts = self.world.advance_with(&self.proposals(), &reactions);
         self.note_moves(&verdicts);
 
         let decision = self.medium.decide(self.now);
@@ -398,6 +403,7 @@ impl Simulation {
             digest.place(body.x, body.y);
         }
         self.note_reports(outcome.reports, &mut digest);
+        self.note_guests();
 
         self.tick = self.now;
         self.stood_at = self.world.robots().iter().copied().map(to_wire).collect();
@@ -536,6 +542,36 @@ impl Simulation {
             proposals.push(report.map(|report| to_world(report.proposal)));
         }
         proposals
+    }
+
+    /// What guests do in the tick at the robots' faces.
+    fn reactions(&self) -> Vec<Reaction> {
+        let mut reactions = Vec::new();
+        for (index, name) in self.names.iter().enumerate() {
+            // Who has not reported shows nothing.
+            if let Some(report) = self
+                .reports
+                .get(name)
+                .filter(|_| !self.silent.contains(name))
+            {
+                reactions.extend(self.guests.reaction(index, report));
+            }
+        }
+        reactions
+    }
+
+    /// Guests get what they asked for, or wait for it.
+    fn note_guests(&mut self) {
+        let named = self.names.iter().enumerate();
+        let reported = named.filter_map(|(index, name)| {
+            let report = self
+                .reports
+                .get(name)
+                .filter(|report| report.tick == self.now)?;
+            Some((index, name, &**report))
+        });
+        let changes = self.guests.take(self.now, reported, &self.world);
+        self.events.extend(changes);
     }
 
     fn note_moves(&mut self, verdicts: &[MoveOutcome]) {
@@ -1013,6 +1049,12 @@ impl Simulation {
     pub fn location(&self, name: &RobotName) -> Option<Point> {
         let index = self.index(name)?;
         Some(to_wire(self.world.robots()[index]))
+    }
+
+    /// Guests that are not content, by their index, by mood.
+    #[must_use]
+    pub fn guest_moods(&self) -> BTreeMap<GuestMood, Vec<u32>> {
+        self.guests.moods()
     }
 
     /// Whether a robot's last move was blocked.

@@ -106,6 +106,7 @@ impl Counts {
             | Event::Fault { .. }
             | Event::Changed { .. }
             | Event::Say { .. }
+            | Event::Guest { .. }
             | Event::Warned { .. }
             | Event::Judged { .. }
             | Event::Tick { .. }

@@ -164,6 +164,7 @@ impl Timeline {
             | Event::DoneLate { .. }
             | Event::Blocked { .. }
             | Event::Say { .. }
+            | Event::Guest { .. }
             | Event::Warned { .. }
             | Event::Judged { .. }
             | Event::Tick { .. }

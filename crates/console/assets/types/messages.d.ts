@@ -641,6 +641,12 @@ export interface WorldFrame {
    */
   flights?: Flight[];
   /**
+   * Guests that are not content, by their index, by mood.
+   */
+  guest_moods?: {
+    [k: string]: number[];
+  };
+  /**
    * Centers of the guests, meters.
    */
   guests: [number, number][];

@@ -21,8 +21,8 @@ pub use limits::{MAX_ENTRIES, MAX_LINE_BYTES, MAX_TEXT_BYTES};
 pub use log::{LogKind, LogRecord};
 pub use numbers::{Epoch, Generation, Seq, Tick};
 pub use observe::{
-    Cut, DisplayUnit, Face, Fate, Flight, HeldProcess, MAX_FLIGHTS, MAX_WIDGETS, Panel, RobotFrame,
-    Standing, TickPanel, Tone, Verdict, Widget, WorldFrame,
+    Cut, DisplayUnit, Face, Fate, Flight, GuestMood, HeldProcess, MAX_FLIGHTS, MAX_WIDGETS, Panel,
+    RobotFrame, Standing, TickPanel, Tone, Verdict, Widget, WorldFrame,
 };
 pub use performative::Performative;
 pub use point::Point;

@@ -1,5 +1,7 @@
 //! Simulator and robots to observers: the picture, the log, the panels. Nothing here takes part in a tick.
 
+use std::collections::BTreeMap;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -48,6 +50,9 @@ pub struct WorldFrame {
     pub robots: Vec<RobotFrame>,
     /// Centers of the guests, meters.
     pub guests: Vec<[f64; 2]>,
+    /// Guests that are not content, by their index, by mood.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub guest_moods: BTreeMap<GuestMood, Vec<u32>>,
     /// Centers of the fixed obstacles, meters.
     pub obstacles: Vec<[f64; 2]>,
     /// Commands that were sent, or whose fate was decided, since the frame before; the newest [`MAX_FLIGHTS`] of them.
@@ -62,6 +67,20 @@ pub struct WorldFrame {
     /// How the expectations of the scenario stand, in its order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub expectations: Vec<Standing>,
+}
+
+/// How a guest feels about what it asked for.
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum GuestMood {
+    /// It has not asked for anything, or got it.
+    Content,
+    /// It asked in vain.
+    Waiting,
+    /// It has waited for longer than its patience lasts.
+    Annoyed,
 }
 
 /// A unit of length in which people are shown a run. All messages and records are in meters.

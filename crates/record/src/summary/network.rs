@@ -87,6 +87,7 @@ impl NetworkSummary {
             | Event::Behavior { .. }
             | Event::Blocked { .. }
             | Event::Say { .. }
+            | Event::Guest { .. }
             | Event::Warned { .. }
             | Event::CommandSent { .. }
             | Event::CommandDelayed { .. }

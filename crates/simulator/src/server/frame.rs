@@ -1,5 +1,7 @@
 //! The field of a run in progress, as observers see it.
 
+use std::collections::BTreeMap;
+
 use protocol::RobotName;
 use protocol::messages::{DisplayUnit, Presence, RobotFrame, Status, WorldFrame};
 
@@ -43,6 +45,7 @@ pub(super) fn frame(
             .iter()
             .map(|obstacle| [obstacle.x, obstacle.y])
             .collect(),
+        guest_moods: simulation.guest_moods(),
         cuts: simulation.cuts(),
         faults: simulation.held_processes(&late),
         expectations: simulation.standings(),
@@ -70,6 +73,7 @@ pub(super) fn empty_frame(status: &Status, field_m: [f64; 2], body_m: f64) -> Wo
         display_unit: DisplayUnit::default(),
         robots: Vec::new(),
         guests: Vec::new(),
+        guest_moods: BTreeMap::new(),
         obstacles: Vec::new(),
         flights: Vec::new(),
         cuts: Vec::new(),

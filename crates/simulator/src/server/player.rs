@@ -147,6 +147,7 @@ impl Player {
         WorldFrame {
             robots: self.shown.robots.clone(),
             guests,
+            guest_moods: frame.guest_moods.clone(),
             obstacles: header.obstacles.clone(),
             cuts: frame.cuts.clone(),
             expectations: frame.standings(self.events()),
