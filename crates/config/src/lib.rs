@@ -1,6 +1,7 @@
 //! Shared parts of scenario, launch and experiment files: quantities with units, errors with file, line and caret, seeds,
 //! speeds, overrides of single values, lists of fixed lengths, and the files that come with the programs.
 
+pub mod bulk;
 pub mod diagnostic;
 mod fixed_list;
 pub mod overrides;

@@ -1,6 +1,14 @@
 //! `--set path=value`: changes to a file from the command line.
 
+use protocol::pattern::{is_pattern, overlap};
+
+use crate::bulk;
 use crate::diagnostic::{FileError, Source};
+
+/// The list of the robots in a scenario file.
+const ROBOTS: &str = "robot";
+/// How many robots an element of it is.
+const COUNT: &str = "count";
 
 /// Changes of a scenario file by the command line.
 #[derive(Debug, Clone, Default)]
@@ -24,7 +32,8 @@ impl std::str::FromStr for Override {
     type Err = String;
 
     /// Parses `path=value`. The parts of the path are joined by `.`; an element of a list is named by its `name` or its index
-    /// from 0, as in `robot.Butler.params.refiller=Vonda`. A value that is not TOML is a text.
+    /// from 0, as in `robot.Butler.params.refiller=Vonda`, and several by a pattern, as in `robot.S*.on_late=abort`. A value
+    /// that is not TOML is a text.
     fn from_str(text: &str) -> Result<Self, String> {
         let (path, value) = text
             .split_once('=')
@@ -54,10 +63,10 @@ fn parse_value(text: &str) -> toml::Value {
     value.unwrap_or_else(|| toml::Value::String(text.trim().to_owned()))
 }
 
-/// Whether a part of a path is a bare key of TOML. All keys of our files and all names of robots are.
+/// Whether a part of a path is a bare key of TOML, or a pattern of such keys. All keys of our files and all names of robots are.
 fn is_key(part: &str) -> bool {
     part.chars()
-        .all(|c| c.is_ascii_alphanumeric() || matches!(c, '_' | '-'))
+        .all(|c| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '*'))
 }
 
 fn is_index(part: &str) -> bool {
@@ -84,7 +93,10 @@ impl Changes {
     /// [`FileError`] if the file is not TOML, or has no place for a change.
     pub fn apply(&self, source: &Source) -> Result<Source, FileError> {
         let mut root: toml::Table = source.parse()?;
-        for change in &self.set {
+        // First how many robots there are, and then what single ones of them are given.
+        let (counts, others): (Vec<_>, Vec<_>) =
+            self.set.iter().partition(|change| change.is_count());
+        for change in counts.into_iter().chain(others) {
             root = change
                 .apply(root)
                 .map_err(|reason| FileError::new(format!("cannot set {reason}")))?;
@@ -130,11 +142,11 @@ impl Override {
     }
 
     /// Whether both set the same value, or one sets a part of what the other sets. A list's element that one names and the
-    /// other numbers counts as the same, because only the file decides that.
+    /// other numbers counts as the same, because only the file decides that, and so do patterns that can match the same name.
     #[must_use]
     pub fn overlaps(&self, other: &Self) -> bool {
         let mut parts = self.path.iter().zip(&other.path);
-        parts.all(|(own, others)| own == others || is_index(own) != is_index(others))
+        parts.all(|(own, others)| overlap(own, others) || is_index(own) != is_index(others))
     }
 
     /// Whether its value is a table that replaces single keys of the one that is there: so it is among the parameters of robots, which
@@ -142,8 +154,13 @@ impl Override {
     #[must_use]
     pub fn merges(&self) -> bool {
         let is_among_parameters =
-            self.top() == "robot" && self.path.get(2).is_some_and(|part| part == "params");
+            self.top() == ROBOTS && self.path.get(2).is_some_and(|part| part == "params");
         is_among_parameters && self.value.is_table()
+    }
+
+    /// Whether it sets how many robots there are of a kind.
+    fn is_count(&self) -> bool {
+        matches!(&self.path[..], [robots, _, count] if robots == ROBOTS && count == COUNT)
     }
 
     /// The content of a file with the change.
@@ -152,6 +169,12 @@ impl Override {
     /// The path, and why there is no place for it.
     pub fn apply(&self, table: toml::Table) -> Result<toml::Table, String> {
         let mut root = toml::Value::Table(table);
+        if let [list, robots, ..] = &self.path[..]
+            && list == ROBOTS
+            && let Some(list) = root.get_mut(list).and_then(toml::Value::as_array_mut)
+        {
+            bulk::separate(list, robots);
+        }
         set(&mut root, &self.path, &self.value, self.merges())
             .map_err(|reason| format!("{}: {reason}", self.path.join(".")))?;
         match root {
@@ -183,6 +206,11 @@ fn set(
     };
 
     let next = match at {
+        toml::Value::Table(_) if is_pattern(first) => {
+            return Err(format!(
+                "{first:?} is a pattern, which stands for elements of a list"
+            ));
+        }
         toml::Value::Table(table) if rest.is_empty() => {
             match (table.get_mut(first), value) {
                 (Some(toml::Value::Table(inner)), toml::Value::Table(by)) if merges => {
@@ -195,6 +223,12 @@ fn set(
         toml::Value::Table(table) => table
             .entry(first.clone())
             .or_insert_with(|| toml::Value::Table(toml::Table::new())),
+        toml::Value::Array(list) if is_pattern(first) => {
+            for element in matching(list, first)? {
+                set(element, rest, value, merges)?;
+            }
+            return Ok(());
+        }
         toml::Value::Array(list) => element(list, first)?,
         _ => {
             return Err(format!(
@@ -206,11 +240,28 @@ fn set(
     set(next, rest, value, merges)
 }
 
+/// The elements of a list whose names match a pattern.
+fn matching<'a>(
+    list: &'a mut [toml::Value],
+    pattern: &str,
+) -> Result<Vec<&'a mut toml::Value>, String> {
+    let len = list.len();
+    let found: Vec<_> = list
+        .iter_mut()
+        .filter(|element| bulk::matches(element, pattern))
+        .collect();
+    if found.is_empty() {
+        return Err(format!(
+            "none of the {len} elements has a name that matches {pattern:?}"
+        ));
+    }
+    Ok(found)
+}
+
 fn element<'a>(list: &'a mut [toml::Value], which: &str) -> Result<&'a mut toml::Value, String> {
-    let named = list.iter().position(|value| {
-        let name = value.get("name").and_then(toml::Value::as_str);
-        name == Some(which)
-    });
+    let named = list
+        .iter()
+        .position(|value| bulk::name(value) == Some(which));
     let index = named.or_else(|| which.parse().ok());
 
     let len = list.len();
@@ -255,6 +306,28 @@ mod tests {
     }
 
     #[test]
+    fn a_pattern_sets_the_value_of_each_element_that_it_matches() {
+        let file = "[guests]\ncount = 1\n[[robot]]\nname = \"S1\"\n[[robot]]\nname = \"S2\"\n[[robot]]\nname = \"T\"\n";
+        let change: Override = "robot.S*.params.k=2".parse().unwrap();
+        let changed = change.apply(file.parse().unwrap()).unwrap();
+        let given = |index: usize| changed["robot"][index].get("params").is_some();
+        assert_eq!([given(0), given(1), given(2)], [true, true, false]);
+
+        for (change, reason) in [
+            (
+                "robot.X*.params.k=2",
+                "none of the 3 elements has a name that matches \"X*\"",
+            ),
+            ("guests.c*=2", "\"c*\" is a pattern"),
+            ("g*.count=2", "\"g*\" is a pattern"),
+        ] {
+            let change: Override = change.parse().unwrap();
+            let error = change.apply(file.parse().unwrap()).unwrap_err();
+            assert!(error.contains(reason), "{error}");
+        }
+    }
+
+    #[test]
     fn changes_overlap_where_one_may_set_what_the_other_sets() {
         for (one, other, overlaps) in [
             ("guests.count=1", "guests.count=2", true),
@@ -263,6 +336,11 @@ mod tests {
             ("robot.Butler.params.x=1", "robot.0.params.x=1", true),
             ("robot.Butler.params.x=1", "robot.Leguin.params.x=1", false),
             ("robot.1.params.x=1", "robot.0.params.x=1", false),
+            ("robot.S*.params.x=1", "robot.S1.params.x=1", true),
+            ("robot.S*.params.x=1", "robot.0.params.x=1", true),
+            ("robot.S*.params.x=1", "robot.*1.params.x=1", true),
+            ("robot.S*.params.x=1", "robot.Butler.params.x=1", false),
+            ("robot.S*.params.x=1", "robot.S.count=1", false),
         ] {
             let one: Override = one.parse().unwrap();
             let other: Override = other.parse().unwrap();

@@ -611,9 +611,7 @@ impl Plan {
     ) -> Result<Scenario, FileError> {
         let known = self.cells[cell].scenario.get();
         if let Some(known) = known.filter(|_| set.is_empty()) {
-            let mut scenario = known.clone();
-            scenario.seed = seed;
-            return Ok(scenario);
+            return known.clone().with_seed(seed);
         }
 
         let written = &self.written.cells[cell];
@@ -777,9 +775,7 @@ fn scenario_of(request: &Request, condition: &Condition, arm: &Arm) -> Result<St
         }
     }
 
-    let mut table: toml::Table = toml::from_str(&scenario.to_toml()?).map_err(LabError::failed)?;
-    table.remove("seed");
-    toml::to_string(&table).map_err(LabError::failed)
+    Ok(scenario.to_toml_without_seed()?)
 }
 
 fn changes_of(settings: &[Setting]) -> Vec<Override> {

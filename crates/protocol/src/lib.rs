@@ -12,6 +12,7 @@ pub mod keys;
 pub mod messages;
 pub mod name;
 mod path;
+pub mod pattern;
 pub mod plain;
 pub mod random;
 pub mod time;
@@ -20,6 +21,7 @@ pub use codec::{FieldError, Malformed, Message, decode, encode};
 pub use event::{Event, Line};
 pub use messages::{Epoch, Generation, Seq, Tick};
 pub use name::{BadName, RobotName, RunName};
+pub use pattern::RobotPattern;
 
 /// Version of the contract. It is named where two sides first meet (join) and only a change that an old robot
 /// could not survive raises it: unknown fields are ignored, so a new optional field does not.

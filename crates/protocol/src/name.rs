@@ -37,6 +37,14 @@ pub struct BadName {
     reason: &'static str,
 }
 
+impl BadName {
+    /// The same of another text.
+    pub(crate) fn of(self, text: &str) -> Self {
+        let name = text.chars().take(MAX_NAME_LEN).collect();
+        Self { name, ..self }
+    }
+}
+
 fn checked(name: &str) -> Result<String, BadName> {
     let refuse = |reason| {
         Err(BadName {

@@ -131,6 +131,8 @@ pub struct RobotSpec {
     pub class: String,
     /// Initial location, meters.
     pub at: Point,
+    /// Whether the location follows from the seed.
+    pub is_at_random: bool,
     /// Parameters of the robot; lengths, speeds and times are SI numbers.
     pub parameters: Parameters,
 }

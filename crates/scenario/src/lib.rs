@@ -98,12 +98,30 @@ impl Scenario {
         source.parse::<raw::ScenarioFile>()?.check(source, None)
     }
 
-    /// The scenario as a file without defaults, which gives the same run.
+    /// The same scenario with another seed: robots at random places stand elsewhere.
+    ///
+    /// # Errors
+    /// [`FileError`] if a robot has no free place with this seed.
+    pub fn with_seed(mut self, seed: u64) -> Result<Self, FileError> {
+        self.seed = seed;
+        let placed = placing::place_at_random(&mut self);
+        placed.map_err(|error| FileError::new(format!("with the seed {seed}, {error}")))?;
+        Ok(self)
+    }
+
+    /// The scenario as a file without defaults, which gives the same run. Places that follow from the seed are written out.
     ///
     /// # Errors
     /// [`FileError`] if a parameter cannot be written as TOML (a JSON `null`).
     pub fn to_toml(&self) -> Result<String, FileError> {
-        toml::to_string(&raw::ScenarioFile::from(self))
-            .map_err(|error| FileError::new(error.to_string()))
+        raw::ScenarioFile::from(self).to_toml()
+    }
+
+    /// The scenario as a file for any seed: without the seed, and without the places that follow from it.
+    ///
+    /// # Errors
+    /// [`FileError`] as [`Self::to_toml`].
+    pub fn to_toml_without_seed(&self) -> Result<String, FileError> {
+        raw::ScenarioFile::from(self).without_seed().to_toml()
     }
 }

@@ -5,6 +5,7 @@ mod expect;
 pub(super) mod fault;
 mod guests;
 mod network;
+mod place;
 mod range;
 mod times;
 mod unplaced;
@@ -14,6 +15,7 @@ use std::collections::BTreeMap;
 use std::ops::Range as Span;
 use std::path::{Path, PathBuf};
 
+use config::bulk::member;
 use config::overrides::merge;
 use config::units::{Length, Speed, Time, quantity};
 use config::{FileError, FixedList, Source, seed, shipped};
@@ -28,6 +30,7 @@ use change::{ChangeTable, ParentTable};
 use fault::FaultTable;
 use guests::GuestsTable;
 use network::NetworkTable;
+use place::Place;
 use range::Range;
 use times::Times;
 use unplaced::unplaced;
@@ -104,12 +107,14 @@ struct Obstacle {
     at: Spanned<FixedList<Length, 2>>,
 }
 
-#[derive(Debug, Deserialize, Serialize)]
+#[derive(Debug, Clone, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct RawRobot {
     name: RobotName,
+    /// So many robots, whose names are this one and a number.
+    count: Option<usize>,
     class: Option<String>,
-    at: FixedList<Length, 2>,
+    at: Place,
     on_late: Option<OnLate>,
     params_from: Option<Spanned<PathBuf>>,
     #[serde(default)]
@@ -134,6 +139,19 @@ const LOSE_AFTER: u32 = 10;
 const SENSING_RANGE: Length = Length(1.8288);
 
 impl ScenarioFile {
+    pub(super) fn to_toml(&self) -> Result<String, FileError> {
+        toml::to_string(self).map_err(|error| FileError::new(error.to_string()))
+    }
+
+    /// Takes out the seed, and what follows from it.
+    pub(super) fn without_seed(mut self) -> Self {
+        self.seed = None;
+        for robot in &mut self.robots {
+            robot.as_mut().at.forget();
+        }
+        self
+    }
+
     /// Checks the scenario and fills in defaults. Files that it names are relative to `folder`; without one, which is for
     /// untrusted texts, it must not name files.
     pub(super) fn check(
@@ -167,11 +185,12 @@ impl ScenarioFile {
     /// Checks the scenario of a run in which tick `settled` is the next one: what was checked before the run began is not
     /// checked again.
     pub(super) fn check_from(
-        self,
+        mut self,
         source: &Source,
         folder: Option<&Path>,
         settled: Tick,
     ) -> Result<checked::Scenario, FileError> {
+        self.robots = single_robots(self.robots, source)?;
         let seed = self.seed(source)?;
         let tick_s = self.tick_s(source)?;
         let ticks = self.ticks(source, tick_s)?;
@@ -221,10 +240,12 @@ impl ScenarioFile {
         };
 
         // A hall that cannot be placed is refused before anything starts.
+        let refuse = |error: PlacingError| {
+            FileError::at(source, places.of_error(&error), &error.to_string())
+        };
+        placing::place_at_random(&mut scenario).map_err(refuse)?;
         if settled == 0 {
-            placing::check(&scenario).map_err(|error| {
-                FileError::at(source, places.of_error(&error), &error.to_string())
-            })?;
+            placing::check(&scenario).map_err(refuse)?;
         }
         scenario.changes = change::check(self.changes, &scenario, source, |changed, at| {
             changed.parse::<Self>()?.check_from(changed, folder, at)
@@ -349,6 +370,47 @@ fn record(raw: Option<RecordTable>, source: &Source) -> Result<RecordContents, F
     })
 }
 
+/// A table for each robot, in the place of those with a count.
+fn single_robots(
+    raw: Vec<Spanned<RawRobot>>,
+    source: &Source,
+) -> Result<Vec<Spanned<RawRobot>>, FileError> {
+    let mut robots = Vec::new();
+    for entry in raw {
+        let span = entry.span();
+        let refuse = |reason: &str| FileError::at(source, Some(span.clone()), reason);
+        let Some(count) = entry.get_ref().count else {
+            if robots.len() == MAX_ROBOTS {
+                return Err(refuse(&too_many_robots()));
+            }
+            robots.push(entry);
+            continue;
+        };
+        if count > MAX_ROBOTS - robots.len() {
+            return Err(refuse(&too_many_robots()));
+        }
+
+        let table = entry.into_inner();
+        for number in 1..=count {
+            let name = RobotName::new(&member(table.name.as_str(), number))
+                .map_err(|error| refuse(&error.to_string()))?;
+            let class = table.class.clone();
+            let robot = RawRobot {
+                count: None,
+                class: class.or_else(|| Some(table.name.to_string())),
+                name,
+                ..table.clone()
+            };
+            robots.push(Spanned::new(span.clone(), robot));
+        }
+    }
+    Ok(robots)
+}
+
+fn too_many_robots() -> String {
+    format!("more than {MAX_ROBOTS} robots")
+}
+
 fn robots(
     raw: Vec<Spanned<RawRobot>>,
     source: &Source,
@@ -361,9 +423,6 @@ fn robots(
         if robot.name.is_operator() {
             let reason = "the name `operator` is kept for commands from outside the roster";
             return Err(FileError::at(source, span, reason));
-        }
-        if robots.len() == MAX_ROBOTS {
-            return Err(FileError::at(source, span, "more than 1024 robots"));
         }
 
         let name = robot.name.clone();
@@ -387,7 +446,8 @@ fn spec(robot: RawRobot, source: &Source, folder: Option<&Path>) -> Result<Robot
     let class = robot.class;
     Ok(RobotSpec {
         class: class.unwrap_or_else(|| robot.name.as_str().to_owned()),
-        at: point(robot.at),
+        at: robot.at.point(),
+        is_at_random: robot.at == Place::Random,
         parameters: to_parameters(&parameters),
     })
 }
@@ -563,8 +623,9 @@ impl RawRobot {
         let params = parameters.filter_map(|(key, value)| Some((key.clone(), to_toml(value)?)));
         Self {
             name: name.clone(),
+            count: None,
             class: Some(spec.class.clone()),
-            at: lengths(spec.at),
+            at: Place::of(spec),
             on_late: lateness.own.get(name).copied(),
             params_from: None,
             params: params.collect(),

@@ -99,7 +99,10 @@ impl Scenario {
     fn place_robots(&mut self, setup: &Setup, errors: &mut Errors) {
         for (name, robot) in &mut self.robots {
             match setup.robots.get(name) {
-                Some(at) => robot.at = *at,
+                Some(at) => {
+                    robot.at = *at;
+                    robot.is_at_random = false;
+                }
                 None => errors.add(&format!("robots.{name}"), &"its location is missing"),
             }
         }

@@ -136,6 +136,209 @@ fn the_resolved_file_gives_the_same_scenario() {
     assert_eq!(resolved, second.to_toml().unwrap());
 }
 
+/// A scenario with robots in bulk that stand side by side, as changes place them.
+const BULK: &str = "[[robot]]\nname = \"Butler\"\nat = [\"5 m\", \"5 m\"]\n\
+                    [[robot]]\nname = \"S\"\ncount = 3\nat = \"random\"\non_late = \"continue\"\nparams = { k = 1 }\n";
+
+fn loaded(text: &str, set: &[&str]) -> Result<Scenario, FileError> {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("hall.toml");
+    std::fs::write(&file, text).unwrap();
+    let set = set.iter().map(|change| change.parse().unwrap()).collect();
+    let changes = Changes {
+        set,
+        ..Changes::default()
+    };
+    Scenario::load(&file, &changes)
+}
+
+#[test]
+fn a_table_with_a_count_is_as_many_robots() {
+    let scenario = parse(BULK).unwrap();
+    let names: Vec<String> = scenario.roster().iter().map(ToString::to_string).collect();
+    assert_eq!(names, ["Butler", "S1", "S2", "S3"]);
+    let s2 = "S2".parse().unwrap();
+    assert_eq!(scenario.robots[&s2].class, "S");
+    assert_eq!(scenario.robots[&s2].parameters["k"], 1);
+    assert_eq!(scenario.lateness.of(&s2), OnLate::Continue);
+
+    let classed = BULK.replace("count = 3", "count = 3\nclass = \"Leguin\"");
+    assert_eq!(parse(&classed).unwrap().robots[&s2].class, "Leguin");
+
+    // The most robots that there can be, and one more.
+    let many = |count: usize| {
+        parse(&format!(
+            "[field]\nsize = [\"100 m\", \"100 m\"]\n{}",
+            BULK.replace("count = 3", &format!("count = {count}"))
+        ))
+    };
+    assert_eq!(many(1023).unwrap().robots.len(), 1024);
+    assert_eq!(many(0).unwrap().robots.len(), 1);
+    let error = shown(&many(1024).unwrap_err());
+    assert!(error.contains("more than 1024 robots"), "{error}");
+
+    let long = BULK.replace("\"S\"", &format!("\"{}\"", "S".repeat(64)));
+    let error = shown(&parse(&long).unwrap_err());
+    assert!(error.contains("longer than 64 characters"), "{error}");
+    let negative = shown(&parse(&BULK.replace("count = 3", "count = -1")).unwrap_err());
+    assert!(negative.contains("count = -1"), "{negative}");
+    let taken = format!("{BULK}[[robot]]\nname = \"S2\"\nat = [\"9 m\", \"9 m\"]\n");
+    let error = shown(&parse(&taken).unwrap_err());
+    assert!(error.contains("a second robot called S2"), "{error}");
+}
+
+#[test]
+fn changes_name_robots_by_patterns() {
+    let k = |scenario: &Scenario, robot: &str| {
+        let parameters = &scenario.robots[robot].parameters;
+        parameters.get("k").and_then(serde_json::Value::as_i64)
+    };
+    let given = |set: &[&str]| {
+        let scenario = loaded(BULK, set).unwrap();
+        ["Butler", "S1", "S2", "S3"].map(|robot| k(&scenario, robot))
+    };
+    let one = Some(1);
+    assert_eq!(
+        given(&["robot.S*.params.k=2"]),
+        [None, Some(2), Some(2), Some(2)]
+    );
+    assert_eq!(
+        given(&["robot.S.params.k=2"]),
+        [None, Some(2), Some(2), Some(2)]
+    );
+    assert_eq!(given(&["robot.S2.params.k=2"]), [None, one, Some(2), one]);
+    assert_eq!(given(&["robot.*.params.k=2"]), [Some(2); 4]);
+    // How many they are is set first, wherever it stands.
+    let scenario = loaded(BULK, &["robot.S9.params.k=2", "robot.S.count=9"]).unwrap();
+    assert_eq!((k(&scenario, "S9"), k(&scenario, "S8")), (Some(2), one));
+
+    let error = shown(&loaded(BULK, &["robot.X*.params.k=2"]).unwrap_err());
+    assert!(error.contains("has a name that matches \"X*\""), "{error}");
+
+    let change = |path: &str| {
+        parse(&format!(
+            "[[change]]\nat = \"10 s\"\nset = [\"{path}.params.k=2\"]\n{BULK}"
+        ))
+    };
+    let scenario = change("robot.S*").unwrap();
+    let s3 = "S3".parse().unwrap();
+    assert_eq!(scenario.parameters_at(&s3, 19).unwrap()["k"], 1);
+    assert_eq!(scenario.parameters_at(&s3, 20).unwrap()["k"], 2);
+    let resolved = parse(&scenario.to_toml().unwrap()).unwrap();
+    assert_eq!(resolved.parameters_at(&s3, 20).unwrap()["k"], 2);
+    assert_eq!(resolved.to_toml().unwrap(), scenario.to_toml().unwrap());
+    let error = shown(&change("robot.S").unwrap_err());
+    assert!(
+        error.contains("none of the 4 elements is called or numbered \"S\""),
+        "{error}"
+    );
+}
+
+#[test]
+fn robots_stand_at_random_places_where_nothing_else_stands() {
+    let free = |a: protocol::messages::Point, b: protocol::messages::Point, body_m: f64| {
+        (a.x - b.x).abs() >= body_m - 1e-9 || (a.y - b.y).abs() >= body_m - 1e-9
+    };
+    let place = |seed: u64, count: usize, more: &str| {
+        let obstacle = "[[obstacle]]\nat = [\"3 m\", \"3 m\"]\n";
+        let bulk = BULK.replace("count = 3", &format!("count = {count}"));
+        parse(&format!("seed = {seed}\n{obstacle}{bulk}{more}")).unwrap()
+    };
+
+    for seed in 0..40 {
+        // The hall has room for 625 bodies in rows; 150 at random places hinder each other often.
+        let scenario = place(seed, 150, "");
+        let places: Vec<_> = scenario.robots.values().map(|robot| robot.at).collect();
+        let body_m = scenario.body_m;
+        for (index, at) in places.iter().enumerate() {
+            let half_m = body_m / 2.0 - 1e-9;
+            let is_inside = |x: f64| (half_m..=15.24 - half_m).contains(&x);
+            assert!(is_inside(at.x) && is_inside(at.y), "seed {seed}");
+            assert!(free(*at, scenario.obstacles[0], body_m), "seed {seed}");
+            for other in &places[..index] {
+                assert!(free(*at, *other, body_m), "seed {seed}: {at:?}, {other:?}");
+            }
+        }
+
+        // One more moves no other one, nor does a robot of another name that hinders none.
+        let more = place(seed, 151, "");
+        let mut moved = 0;
+        for (name, robot) in &scenario.robots {
+            moved += usize::from(more.robots[name].at != robot.at);
+        }
+        assert_eq!(moved, 0, "seed {seed}");
+        let another = place(seed, 3, "[[robot]]\nname = \"A\"\nat = \"random\"\n");
+        let alone = place(seed, 3, "");
+        let a = another.robots["A"].at;
+        for (name, robot) in &alone.robots {
+            let is_same = another.robots[name].at == robot.at;
+            assert!(is_same || !free(a, robot.at, body_m), "seed {seed}: {name}");
+        }
+    }
+
+    let scenario = place(7, 20, "");
+    assert_ne!(
+        scenario.to_toml().unwrap().replace("seed = 7", "seed = 8"),
+        place(8, 20, "").to_toml().unwrap(),
+        "another seed, other places"
+    );
+    assert_eq!(
+        scenario.clone().with_seed(8).unwrap().to_toml().unwrap(),
+        place(8, 20, "").to_toml().unwrap(),
+    );
+    let resolved = parse(&scenario.to_toml().unwrap()).unwrap();
+    assert_eq!(resolved.to_toml().unwrap(), scenario.to_toml().unwrap());
+}
+
+#[test]
+fn places_are_uniform() {
+    // A robot alone: its mean is that of the field within four standard errors, L / sqrt(12 n).
+    let mut scenario = parse("[[robot]]\nname = \"A\"\nat = \"random\"\n").unwrap();
+    let seeds = 2000;
+    let [mut x_m, mut y_m] = [0.0; 2];
+    for seed in 1..=seeds {
+        scenario = scenario.with_seed(seed).unwrap();
+        let at = scenario.robots.values().next().unwrap().at;
+        x_m += at.x / seeds as f64;
+        y_m += at.y / seeds as f64;
+    }
+    let error_m = 4.0 * (15.24 - 0.6096) / (12.0 * seeds as f64).sqrt();
+    assert!(
+        (x_m - 7.62).abs() < error_m && (y_m - 7.62).abs() < error_m,
+        "{x_m}, {y_m}"
+    );
+}
+
+#[test]
+fn robots_that_cannot_be_placed_are_refused() {
+    for (text, line, reason) in [
+        (
+            BULK.replace("count = 3", "count = 600"),
+            "[[robot]]",
+            "no free place for robot S",
+        ),
+        (
+            BULK.replace("at = \"random\"", "at = \"anywhere\""),
+            "at = \"anywhere\"",
+            "or \"random\"",
+        ),
+        (
+            BULK.replace("at = \"random\"", "at = [\"3 m\", \"3 m\"]"),
+            "[[robot]]",
+            "robot S2 at (3, 3) m overlaps robot S1",
+        ),
+        (
+            BULK.replace("at = [\"5 m\", \"5 m\"]", "at = [\"99 m\", \"5 m\"]"),
+            "[[robot]]",
+            "robot Butler at",
+        ),
+    ] {
+        let error = shown(&parse(&text).unwrap_err());
+        assert!(error.contains(line), "no {line:?} in\n{error}");
+        assert!(error.contains(reason), "no {reason:?} in\n{error}");
+    }
+}
+
 /// What is written, and what people are shown: the line, the place, and the reason.
 #[test]
 fn errors_show_line_place_and_reason() {

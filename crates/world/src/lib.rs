@@ -72,6 +72,7 @@ pub use error::{HallError, TriangularError};
 pub use guests::Course;
 pub use hall::{BODIES_MAX, BODY_MIN_M, Field, Guests, Hall, SIDE_MAX_M, TOLERANCE_M};
 pub use motion::{MoveOutcome, World};
+pub use placing::RobotPlacer;
 pub use point::Point;
 pub use reactions::{Reaction, Response};
 pub use triangular::Triangular;

@@ -6,11 +6,44 @@ use crate::hall::{Field, Hall, TOLERANCE_M};
 use crate::point::Point;
 use rand::{Rng, RngExt};
 
-/// Number of attempts to place a guest at random before giving up on rejection sampling.
+/// Number of attempts to place a body at random before giving up on rejection sampling.
 ///
 /// A thousand misses mean that about 99.5 % of the floor cannot take another body: at that share, the probability
 /// of so many misses is 1 %. Beyond that point, arranging the guests in rows is much faster.
 const TRIES: usize = 1000;
+
+/// Places robots at random in a hall before it becomes a [`World`](crate::World), each from a random stream of its own.
+#[derive(Clone, Debug)]
+pub struct RobotPlacer {
+    bodies: Bodies,
+}
+
+impl RobotPlacer {
+    /// How often a place is drawn before a robot has none.
+    pub const TRIES: usize = TRIES;
+
+    /// The obstacles of a hall and its robots, which are those with a given place; its guests are placed later.
+    ///
+    /// # Errors
+    ///
+    /// Returns the first [`HallError`] found, as [`World::new`](crate::World::new).
+    pub fn new(hall: &Hall) -> Result<Self, HallError> {
+        hall.check()?;
+
+        let mut bodies = Bodies::new(hall.field, hall.obstacles.len(), hall.robots.len(), 0);
+        place_obstacles(&mut bodies, &hall.obstacles)?;
+        place_robots(&mut bodies, &hall.robots)?;
+        Ok(Self { bodies })
+    }
+
+    /// Places one more robot, uniformly where it overlaps no other body: draws x, then y, for each attempt. `None` if all
+    /// [`Self::TRIES`] attempts overlap one.
+    pub fn place(&mut self, rng: &mut impl Rng) -> Option<Point> {
+        let at = random_free_place(&self.bodies, rng)?;
+        self.bodies.push(at);
+        Some(at)
+    }
+}
 
 /// Places all bodies of the hall. The guests' positions are drawn from `rng`.
 pub(crate) fn place(hall: &Hall, rng: &mut impl Rng) -> Result<Bodies, HallError> {

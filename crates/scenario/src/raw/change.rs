@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use config::bulk;
 use config::units::Time;
 use config::{FileError, Override, Source};
 use protocol::{RobotName, RunName, Tick};
@@ -56,6 +57,10 @@ pub(super) fn check(
     let mut content: toml::Table = source.parse()?;
     for table in NOT_CHANGED {
         content.remove(table);
+    }
+    // The record has each robot by itself, and the changes as they are: they name robots, or patterns.
+    if let Some(robots) = content.get_mut("robot").and_then(toml::Value::as_array_mut) {
+        bulk::separate_all(robots);
     }
 
     let mut changes = Vec::new();
