@@ -14,6 +14,14 @@ pub enum Valence {
 }
 
 impl Valence {
+    /// The name used in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Positive => "positive",
+            Self::Negative => "negative",
+        }
+    }
+
     /// +1 for positive, -1 for negative.
     pub fn sign(self) -> f64 {
         match self {

@@ -1,8 +1,9 @@
 //! The affect frame: one emotion of one robot at one moment, with all of its components.
 
 use crate::akr::{Affect, Appraisal};
+use crate::causal::Circumstances;
 use crate::scalar::{Intensity, Urgency};
-use crate::schema::{Circumstances, Schema, Schemata};
+use crate::schema::{Schema, Schemata};
 
 /// State variable with the signed valence, -1 to 1.
 pub const VALENCE: &str = "valence";
@@ -21,7 +22,7 @@ pub const AGENCY: &str = "agency";
 /// State variable with the name of the action tendency.
 pub const ACTION_TENDENCY: &str = "action_tendency";
 /// State variable with the name of the facial expression.
-pub const FACE: &str = "face";
+pub const FACIAL_EXPRESSION: &str = "facial_expression";
 
 /// An emotion with its components: what a robot feels, how it appraises its situation, what it is inclined to do, and
 /// what it shows.
@@ -105,7 +106,7 @@ impl AffectFrame<'_> {
 
     /// The cause of the emotion in words.
     pub fn why(&self, circumstances: &Circumstances<'_>) -> String {
-        self.schema.spoken(circumstances)
+        self.schema.causal_chain.filled(circumstances).spoken()
     }
 
     /// The state variables that are numbers.
@@ -125,7 +126,7 @@ impl AffectFrame<'_> {
         [
             (AGENCY, self.appraisal.agency().name()),
             (ACTION_TENDENCY, self.schema.action_tendency.name()),
-            (FACE, self.schema.facial_expression.name()),
+            (FACIAL_EXPRESSION, self.schema.facial_expression.name()),
         ]
     }
 }

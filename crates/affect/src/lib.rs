@@ -8,7 +8,8 @@
 //! | Task | Item |
 //! | --- | --- |
 //! | Describe a personality, appraise a situation | [`akr`] |
-//! | Describe an emotion with all its components, explain it in words, publish it | [`AffectFrame`], [`Schemata`] |
+//! | Describe the tree of personality, affect, moods and emotions, and explain an emotion in words | [`Schemata`], [`CausalChain`] |
+//! | Describe an emotion with all its components, publish it | [`AffectFrame`] |
 //! | Measure progress | [`progress`] |
 //! | Change a feeling over time with progress, events and beliefs | [`Dynamics`], [`Ladder`] |
 //! | Generate emotion from progress (ESG) | [`EmotionGenerator`] and its implementations |
@@ -81,13 +82,13 @@
 //!
 //! const SCHEMA: &str = r#"
 //!     [BORED]
+//!     parent = "negative emotion"
 //!     facial_expression = "sad"
-//!     valence = "negative"
 //!     action_tendency = "change-current-strategy"
 //!     causal_chain = [
-//!         "I want {g}",
-//!         "{a} did not come",
-//!         "because of this I want to be somewhere else",
+//!         "goal: I want {g}",
+//!         "belief: {a} did not come",
+//!         "effect: because of this I want to be somewhere else",
 //!     ]
 //! "#;
 //!
@@ -144,6 +145,7 @@
 mod affect;
 pub mod akr;
 pub mod behavior;
+mod causal;
 mod dynamics;
 pub mod frame;
 mod generator;
@@ -155,6 +157,7 @@ pub mod progress;
 mod scalar;
 mod schema;
 
+pub use causal::{CausalChain, Circumstances, Clause, ClauseError, ClauseKind};
 pub use dynamics::{Belief, Dynamics, EmotionState, ProgressEvent, StepInput, Stimulus};
 pub use frame::AffectFrame;
 pub use generator::{DynamicGenerator, EmotionGenerator, EmotionRow, RuleGenerator};
@@ -162,4 +165,4 @@ pub use label::{EmotionLabel, Feeling, StandardEmotion};
 pub use ladder::{BeliefEmotions, Ladder, Rung};
 pub use parameters::{DynamicsParameters, ParameterError, StateSet};
 pub use scalar::{Caution, Intensity, IntensityLabel, OutOfRange, Urgency};
-pub use schema::{Circumstances, Schema, SchemaError, Schemata};
+pub use schema::{Components, Node, Schema, SchemaError, Schemata};

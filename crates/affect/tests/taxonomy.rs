@@ -1,11 +1,13 @@
-//! The schemata of the standard emotions, what a schema may not contain, and personality.
+//! The taxonomy: what a node inherits, the schemata of the standard emotions, what a file may not contain, and personality.
 
 #![expect(
     clippy::unwrap_used,
     reason = "test helpers may panic; clippy.toml only exempts `#[test]` functions"
 )]
 
-use affect::akr::{Agency, Appraisal, Personality, Preference, TABLE_2, Valence};
+use affect::akr::{
+    Agency, Appraisal, Duration, Focality, Level, Personality, Preference, TABLE_2, Valence,
+};
 use affect::frame::{AGENCY, CERTAINTY, CONTROLLABILITY, GOAL_CONGRUENCE, INTENSITY, VALENCE};
 use affect::{
     AffectFrame, Circumstances, EmotionLabel, SchemaError, Schemata, StandardEmotion, Urgency,
@@ -32,7 +34,7 @@ fn t22_every_standard_emotion_has_a_schema() {
         let schema = schemata.get(name).unwrap();
         assert_eq!(schema.valence, label.valence(), "{name}");
 
-        let spoken = schema.spoken(&circumstances);
+        let spoken = schema.causal_chain.filled(&circumstances).spoken();
         assert!(spoken.ends_with('.') && !spoken.contains(['{', '}']));
     }
 }
@@ -100,7 +102,7 @@ fn a_personality_can_be_read_from_a_file() {
 
 fn spoken(emotion: &str, circumstances: &Circumstances<'_>) -> String {
     let schema = Schemata::standard().get(emotion).unwrap();
-    schema.spoken(circumstances)
+    schema.causal_chain.filled(circumstances).spoken()
 }
 
 #[test]
@@ -133,10 +135,10 @@ fn inserted_words_are_not_expanded_again() {
 fn own(from: &str, to: &str) -> Result<Schemata, SchemaError> {
     let text = r#"
         [AMAZED]
+        parent = "positive emotion"
         facial_expression = "surprised"
-        valence = "positive"
         action_tendency = "approach"
-        causal_chain = ["I did not know {n}"]
+        causal_chain = ["belief: I did not know {n}"]
     "#;
     assert!(text.contains(from));
 
@@ -146,8 +148,97 @@ fn own(from: &str, to: &str) -> Result<Schemata, SchemaError> {
 #[test]
 fn surprise_goes_with_either_valence() {
     assert!(own("", "").is_ok());
-    assert!(own("\"positive\"", "\"negative\"").is_ok());
+    assert!(own("positive emotion", "negative emotion").is_ok());
     assert!(own("\"surprised\"", "\"happy\"").is_ok());
+}
+
+#[test]
+fn a_node_has_what_it_does_not_state_from_its_parent() {
+    let schemata = Schemata::standard();
+    let concerned = schemata.node("CONCERNED").unwrap();
+    assert_eq!(concerned.level, Level::Emotion);
+    assert_eq!(concerned.own.valence, None);
+    assert_eq!(concerned.all.valence, Some(Valence::Negative));
+    assert_eq!(concerned.all.duration, Some(Duration::Minutes));
+    assert_eq!(concerned.all.focality, Some(Focality::Event));
+    // The personality is inherited from the higher node, so any personality can have any emotion [D: S].
+    assert_eq!(concerned.all.traits, Some(vec!["caution".to_owned()]));
+    let origin = |key| {
+        schemata
+            .origin(concerned, key)
+            .map(|node| node.name.as_str())
+    };
+    assert_eq!(origin("valence"), Some("negative affect"));
+    assert_eq!(origin("duration"), Some("negative emotion"));
+    assert_eq!(origin("facial_expression"), Some("CONCERNED"));
+
+    let mood = schemata.node("negative mood").unwrap();
+    assert_eq!(
+        (mood.level, mood.all.duration),
+        (Level::Mood, Some(Duration::Days))
+    );
+    assert_eq!(mood.all.focality, Some(Focality::Global));
+    assert_eq!(mood.all.measured, Some(vec!["intensity".to_owned()]));
+}
+
+#[test]
+fn an_emotion_can_refine_another_one() {
+    let text = "[SEETHING]\nparent = 'ANGRY'\naction_tendency = 'avoid'";
+    let schemata = Schemata::standard().extended(text).unwrap();
+    let seething = schemata.get("SEETHING").unwrap();
+    let angry = schemata.get("ANGRY").unwrap();
+    assert_eq!(seething.causal_chain, angry.causal_chain);
+    assert_ne!(seething.action_tendency, angry.action_tendency);
+
+    // Without the standard emotions there is none to refine.
+    let error = Schemata::from_toml(text).unwrap_err().to_string();
+    assert!(
+        error.contains("unknown parent \"ANGRY\" of SEETHING; there are SEETHING, negative affect"),
+        "{error}"
+    );
+}
+
+#[test]
+fn the_tree_is_figure_1() {
+    let tree = Schemata::standard().tree();
+    let lines: Vec<String> = tree
+        .iter()
+        .map(|(depth, node)| format!("{}{}", "-".repeat(*depth), node.name))
+        .collect();
+    assert_eq!(
+        lines,
+        [
+            "personality",
+            "-negative affect",
+            "--negative mood",
+            "--negative emotion",
+            "---CONCERNED",
+            "---FRUSTRATED",
+            "---ANGRY",
+            "---DISCOURAGED",
+            "-positive affect",
+            "--positive mood",
+            "--positive emotion",
+            "---HAPPY",
+            "---CONFIDENT",
+            "---HOPEFUL",
+        ]
+    );
+}
+
+#[test]
+fn every_value_of_the_standard_taxonomy_is_marked() {
+    for (_, node) in Schemata::standard().tree() {
+        let parent = node.parent.as_ref().map(|_| "parent");
+        let stated = node.own.entries();
+        for key in stated.iter().map(|(key, _)| *key).chain(parent) {
+            let mark = node
+                .marks
+                .get(key)
+                .unwrap_or_else(|| panic!("{}.{key}", node.name));
+            assert!(mark.starts_with("[D") || mark.starts_with("[I]"), "{mark}");
+        }
+    }
 }
 
 #[test]
@@ -156,9 +247,61 @@ fn a_contradictory_schema_is_rejected_when_loaded() {
         ("{n}", "{m}", "unknown placeholder {m}"),
         ("{n}", "{n", "unmatched brace"),
         ("{n}", "n}", "unmatched brace"),
-        ("valence = \"positive\"", "", "valence"),
-        ("valence =", "valense = 1\nvalence =", "valense"),
+        ("belief: ", "", "does not begin with its kind: `goal: `"),
+        (
+            "action_tendency = \"approach\"",
+            "",
+            "AMAZED has no `action_tendency`, and no node above it has",
+        ),
+        ("parent =", "parnet =", "parnet"),
         ("[AMAZED]", "[\"\"]", "an emotion must have a name"),
+        (
+            "parent = \"positive emotion\"",
+            "",
+            "AMAZED has no parent; add `parent = \"positive emotion\"`",
+        ),
+        (
+            "positive emotion",
+            "good emotion",
+            "unknown parent \"good emotion\" of AMAZED; there are AMAZED, negative affect",
+        ),
+        ("positive emotion", "AMAZED", "AMAZED is its own ancestor"),
+        (
+            "positive emotion",
+            "positive mood",
+            "AMAZED is of the level mood, which does not have `facial_expression = \"surprised\"`; only an emotion has it",
+        ),
+        ("positive emotion", "personality", "only an emotion has it"),
+        (
+            "facial",
+            "level = \"affect\"\nfacial",
+            "AMAZED is of the level affect, which cannot be below positive emotion, of the level emotion",
+        ),
+        (
+            "facial",
+            "valence = \"negative\"\nfacial",
+            "AMAZED has Negative valence and is below positive emotion",
+        ),
+        (
+            "facial",
+            "duration = \"days\"\nfacial",
+            "AMAZED is of the level emotion, which does not have `duration = \"days\"`; it lasts \"minutes\"",
+        ),
+        (
+            "facial",
+            "focality = \"global\"\nfacial",
+            "an emotion is about an event, an agent or an object",
+        ),
+        (
+            "facial",
+            "traits = [\"vain\"]\nfacial",
+            "only a personality has it",
+        ),
+        (
+            "facial",
+            "measured = [\"pulse\"]\nfacial",
+            "what is measured is one of intensity, agency",
+        ),
         (
             "\"surprised\"",
             "\"sad\"",
@@ -168,4 +311,41 @@ fn a_contradictory_schema_is_rejected_when_loaded() {
         let error = own(from, to).unwrap_err().to_string();
         assert!(error.contains(expected), "{error}");
     }
+}
+
+#[test]
+fn a_mood_has_no_agency_and_no_short_duration() {
+    for (line, expected) in [
+        (
+            "measured = ['agency']",
+            "GLOOM is of the level mood, which does not have `measured = \"agency\"`; a mood has no agency",
+        ),
+        ("duration = 'minutes'", "it lasts \"days\""),
+        ("focality = 'event'", "it is \"global\""),
+        ("causal_chain = []", "only an emotion has it"),
+    ] {
+        let text = format!("[GLOOM]\nparent = 'negative mood'\n{line}");
+        let error = Schemata::from_toml(&text).unwrap_err().to_string();
+        assert!(error.contains(expected), "{error}");
+    }
+    assert!(Schemata::from_toml("[GLOOM]\nparent = 'negative mood'").is_ok());
+}
+
+#[test]
+fn nodes_can_not_be_above_one_another() {
+    let text = "[A]\nparent = 'B'\n[B]\nparent = 'A'";
+    let error = Schemata::from_toml(text).unwrap_err().to_string();
+    assert!(error.contains("is its own ancestor"), "{error}");
+}
+
+#[test]
+fn a_personality_can_have_a_strategy_and_traits_of_its_own() {
+    let text = "[personality]\nlevel = 'personality'\nduration = 'lifetime'\nfocality = 'global'\n\
+                traits = ['vindictive']\ninteractive_strategy = 'tit-for-tat'";
+    let schemata = Schemata::standard().extended(text).unwrap();
+    let angry = schemata.node("ANGRY").unwrap();
+    assert_eq!(
+        angry.all.interactive_strategy.as_deref(),
+        Some("tit-for-tat")
+    );
 }

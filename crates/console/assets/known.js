@@ -12,7 +12,7 @@ import { seconds, short } from "./units.js";
 
 /** State variables that say how a robot feels, if it publishes them; every robot in any language may. */
 const INTENSITY = "intensity";
-const FACE = "face";
+const FACE = "facial_expression";
 const FACES = ["happy", "sad", "surprised", "disgusted", "angry", "fearful", "neutral"];
 const MOST_COMMANDS = 3;
 /** Lines of the log that are searched for a robot's commands. */

@@ -173,7 +173,7 @@ function person(paper, words, theme, robot, panel, y) {
  */
 function faceOf(robot, panel) {
   const widget = (panel?.widgets ?? []).find((one) => one?.widget === "face");
-  const own = robot.state_variables.face;
+  const own = robot.state_variables.facial_expression;
   const face = widget?.widget === "face" ? widget.face : typeof own === "string" ? /** @type {Face} */ (own) : "neutral";
   return { face, intensity: intensityOf(robot, panel) ?? 0 };
 }

@@ -14,8 +14,8 @@ use std::io::Write;
 
 use affect::Schemata;
 use affect::frame::{
-    ACTION_TENDENCY, AGENCY, CERTAINTY, CONTROLLABILITY, FACE, GOAL_CONGRUENCE, INTENSITY, URGENCY,
-    VALENCE,
+    ACTION_TENDENCY, AGENCY, CERTAINTY, CONTROLLABILITY, FACIAL_EXPRESSION, GOAL_CONGRUENCE,
+    INTENSITY, URGENCY, VALENCE,
 };
 use config::FileError;
 use protocol::keys::Keys;
@@ -236,7 +236,9 @@ impl<W: Write> Document<'_, W> {
         let begin_ms = self.milliseconds(stay.period.begin);
         let duration_ms = self.milliseconds(stay.period.begin + ticks) - begin_ms;
         let clock = self.keys.clock();
-        let face = published.text(FACE).filter(|face| *face != NEUTRAL_FACE);
+        let face = published
+            .text(FACIAL_EXPRESSION)
+            .filter(|face| *face != NEUTRAL_FACE);
         let face = face.map_or("", |_| " expressed-through=\"face\"");
         write!(
             self.out,

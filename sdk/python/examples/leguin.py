@@ -497,7 +497,7 @@ class Leguin(CarsRobotInterface):
             "certainty": appraisal.certainty,
             "agency": appraisal.agency,
             "action_tendency": TENDENCIES[emotion],
-            "face": EXPRESSIONS[emotion][0],
+            "facial_expression": EXPRESSIONS[emotion][0],
         }
 
     def resume(self, cars: Cars, last: StateVariables) -> None:

@@ -421,7 +421,7 @@ async function finishTick() {
     urgency: her.urgency,
     ...appraisal(),
     action_tendency,
-    face,
+    facial_expression: face,
   };
   send({
     type: "done",

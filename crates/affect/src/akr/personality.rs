@@ -15,11 +15,22 @@ pub enum Preference {
     SeekPositive,
 }
 
+impl Preference {
+    /// The name used in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::AvoidNegative => "avoid_negative",
+            Self::SeekPositive => "seek_positive",
+        }
+    }
+}
+
 /// The lasting character of an agent, the same in every situation [D: S, F2].
 ///
 /// Any personality can have any emotion [D: S]. Caution determines how fast emotions rise, and the preferences determine
 /// which anticipated affect counts in a decision. The published taxonomy also has traits such as "vindictive" and
-/// interactive strategies such as "tit for tat" [D: F2, S]; no documented robot has one, and neither does this crate.
+/// interactive strategies such as "tit for tat" [D: F2, S]: a node of [`Schemata`](crate::Schemata) can name them, and no
+/// documented robot has one that changes what it does.
 ///
 /// ```
 /// use affect::akr::{Personality, Valence};
