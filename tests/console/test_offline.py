@@ -107,6 +107,17 @@ def test_a_server_that_is_stopped_is_noticed_and_does_nothing_later(launch, open
     nothing_is_done_later(page, run)
 
 
+def test_a_simulator_that_is_stopped_does_nothing_later(launch, open_quietly):
+    run = launch()
+    page = open_quietly(run.address)
+    connected(page)
+
+    with stopped(run.simulator):
+        page.get_by_test_id("btn-step").click()
+        expect(page.get_by_test_id("message")).to_contain_text("is not done later", timeout=10_000)
+    nothing_is_done_later(page, run)
+
+
 def test_a_network_that_is_silent_is_noticed_and_delivers_nothing_later(launch, open_quietly):
     run = launch()
     port = free_port()

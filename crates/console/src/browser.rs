@@ -17,7 +17,7 @@ use tokio::time::{Instant, sleep_until, timeout};
 use crate::app::{App, Ending, MAX_BROWSERS, Mode};
 use crate::failed::Failed;
 use crate::feed::Cursor;
-use crate::live::{Live, Viewer};
+use crate::live::{Live, MAX_REQUEST_AGE, Viewer};
 use crate::page::{PageMessage, RequestHead, ServerMessage};
 
 /// Largest message of a page, bytes: a scenario of 1 MiB, and the JSON around it.
@@ -30,9 +30,6 @@ const STALL_TIMEOUT: Duration = Duration::from_secs(30);
 const PING_INTERVAL: Duration = Duration::from_secs(5);
 /// Time between two beats. `connection.js` expects a message within [`MAX_REQUEST_AGE`].
 const BEAT_INTERVAL: Duration = Duration::from_millis(500);
-/// A request is not carried out if the page may have sent it earlier than this: after as long without a message the page takes
-/// the connection for lost, and tells people so.
-const MAX_REQUEST_AGE: Duration = Duration::from_millis(2500);
 /// How long to wait for a browser's close frame.
 const CLOSE_TIMEOUT: Duration = Duration::from_secs(1);
 /// Batches that may be sent before the browser answers the ping of the first one.

@@ -19,6 +19,9 @@ use protocol::{FieldError, Message, RobotName, RunName, decode, encode};
 
 use crate::feed::Feed;
 
+/// A request is not carried out if a person may have sent it earlier than this: after as long without a message the page takes
+/// the connection for lost, and tells people so.
+pub(crate) const MAX_REQUEST_AGE: Duration = Duration::from_millis(2500);
 /// How long one attempt to connect to the simulator lasts; attempts are repeated until one succeeds.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(1);
 /// Pause between two attempts.
@@ -216,12 +219,28 @@ impl Live {
             return Err("only the launcher reports what it did with processes".to_owned());
         }
 
-        let timeout = if matches!(control, Control::Step { .. }) {
-            STEP_TIMEOUT
-        } else {
-            self.reply_timeout
+        let timeout = match control {
+            Control::Status | Control::Setup | Control::Log => {
+                return self.query(control, self.reply_timeout);
+            }
+            Control::Step { .. } => STEP_TIMEOUT,
+            _ => self.reply_timeout,
         };
+        self.check_attention()?;
         self.query(control, timeout)
+    }
+
+    /// Checks that the simulator answers at once. What waits in the socket of one that does not is done whenever it goes on,
+    /// so nothing is sent to it.
+    fn check_attention(&self) -> Result<(), String> {
+        let asked_at = Instant::now();
+        let answer = self.query(&Control::Status, MAX_REQUEST_AGE.min(self.reply_timeout));
+        let reason = match answer {
+            Ok(_) if asked_at.elapsed() < MAX_REQUEST_AGE => return Ok(()),
+            Ok(_) => "the simulator answers late".to_owned(),
+            Err(reason) => reason,
+        };
+        Err(format!("{reason}; this was not sent, and is not done later"))
     }
 
     /// Sends a person's command to a robot and waits for the simulator's answer.
@@ -240,6 +259,7 @@ impl Live {
         // Checked here, because a put has no answer that could say so.
         message.check().map_err(|error| malformed(&error))?;
         let bus = self.found_simulator()?;
+        self.check_attention()?;
 
         let key = self.keys.command(to, &RobotName::operator());
         bus.put(&key, encode(&message))
