@@ -5,7 +5,7 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from lab import FITS, ROOT, eventually, until
+from lab import FITS, ROOT, download, eventually, until
 
 pytestmark = pytest.mark.thorough
 
@@ -187,3 +187,27 @@ def test_a_face_without_intensity_is_neutral(launch, open_page):
     neutral = page.evaluate(mouth, ["neutral", 0])
     assert page.evaluate(mouth, ["happy", 0]) == neutral
     assert page.evaluate(mouth, ["happy", 0.1]) != neutral
+
+
+def test_guests_who_ask_in_vain_are_seen_on_the_plan_and_in_its_picture(launch, open_page, tmp_path, screenshots):
+    options = ("--set", 'guests.requests={ range = "60 ft", patience = "1 s" }', "--set", "robot.Butler.params.treat_capacity=1")
+    run = launch(options=options)
+    page = open_page(run.address)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    assert page.locator("#waiting-guests").is_hidden()
+
+    run.control("step", "40")
+    expect(page.get_by_test_id("tick")).to_have_text("40")
+    moods = page.evaluate("window.carsConsole.frame().guest_moods")
+    assert moods["waiting"] and moods["annoyed"], moods
+    assert not set(moods["waiting"]) & set(moods["annoyed"])
+    told = {event["guest"]: event["mood"] for event in run.events() if event["event"] == "guest"}
+    shown = {guest: mood for mood, guests in moods.items() for guest in guests}
+    assert shown == {guest: mood for guest, mood in told.items() if mood != "content"}
+
+    expect(page.locator("#waiting-guests")).to_be_visible()
+    expect(page.locator("#annoyed-guests")).to_be_visible()
+    picture = tmp_path / "plan.svg"
+    download(page, "vector", picture)
+    assert "annoyed guest" in picture.read_text()
+    page.screenshot(path=screenshots / "guest-moods.png")
