@@ -1,12 +1,17 @@
 //! How an emotion changes over time: the filter of the urgency and the state machine over a [`Ladder`].
 //!
 //! The general behavior is documented [D: S]: positive progress keeps a robot HAPPY, negative progress worries it
-//! more and more until it is FRUSTRATED, and a positive input then leads back by as much as the input is important.
+//! more and more until it is FRUSTRATED, and only a positive input then leads back, by as much as the input is important.
 //! The numbers are parameters \[I\].
+//!
+//! That only a positive input leads back is the *floor* of the urgency \[I\]. A rung that is left by positive inputs only
+//! ([`Rung::needs_progress`](crate::Rung)) puts the floor where the rung would be left. A positive input of importance `i`
+//! lowers it to `1 - i`, and the first pleasant emotion removes it.
 //!
 //! [`Dynamics`] holds the immutable rule, and [`EmotionState`] holds everything that changes. Saving and restoring
 //! the state resumes the dynamics exactly.
 
+use crate::affect::Valence;
 use crate::label::{EmotionLabel, Feeling, StandardEmotion};
 use crate::ladder::{Ladder, Place};
 use crate::parameters::{DynamicsParameters, ParameterError};
@@ -19,25 +24,50 @@ use serde::{Deserialize, Serialize};
 pub enum StepInput {
     /// The time until help arrives divided by the time until it is needed; dimensionless, 0 or more.
     Need(f64),
+    /// The pressure itself, 0 to 1, as the robot measures it: the urgency moves toward it.
+    Pressure(Urgency),
     /// No need: the urgency falls.
     Rest,
     /// No measure is available: the urgency stays the same. A need of NaN is treated the same way.
     Hold,
 }
 
-/// A discrete event that affects a goal.
+/// Something that brings the robot nearer to its goal, or farther from it.
 ///
 /// The two classes are documented [D: S], and so is that the effect of a positive input depends on its importance.
 /// How much each event changes the urgency is chosen here \[I\].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ProgressEvent {
-    /// A step toward the goal; its importance is subtracted from the urgency.
+    /// A step toward the goal. The urgency falls to `1 - importance` at once if it is above that.
     Positive(Urgency),
+    /// Progress that the drive measures. It counts only if the urgency is above its target: the urgency may then fall
+    /// there, as fast as it otherwise does. So its importance is `1 - target`.
+    Easing,
     /// A setback; its importance, multiplied by the gain, is added to the urgency.
     Negative(Urgency),
     /// The goal is achieved, the most important positive input: returns to the initial emotion with urgency 0.
     GoalAchieved,
+}
+
+/// What counted as progress in a step.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Progress {
+    /// The importance with the sign of the class: above 0 for a positive input, below 0 for a negative one, -1 to 1.
+    /// That of a drive whose target is above the urgency is the difference \[I\].
+    pub signed: f64,
+    /// Whether it was the event of the step, and not the drive.
+    pub is_event: bool,
+}
+
+impl Progress {
+    fn event(signed: f64) -> Self {
+        Self {
+            signed,
+            is_event: true,
+        }
+    }
 }
 
 /// What the robot believes about its own ability [D: S].
@@ -118,6 +148,10 @@ impl Stimulus {
 pub struct EmotionState<E> {
     emotion: E,
     urgency: Urgency,
+    /// What the urgency does not fall below until there is a positive input.
+    floor: Urgency,
+    /// What counted as progress in the last step.
+    progress: Option<Progress>,
     /// Time since the emotion last changed, or since the start, in seconds.
     unchanged_s: f64,
     /// Time for which the condition of the next rung has held without interruption, in seconds.
@@ -142,6 +176,11 @@ impl<E: EmotionLabel> EmotionState<E> {
     /// The robot's current belief about its ability.
     pub fn belief(&self) -> Belief {
         self.belief
+    }
+
+    /// What counted as progress in the last step; `None` if nothing did.
+    pub fn progress(&self) -> Option<Progress> {
+        self.progress
     }
 
     fn change_to(&mut self, emotion: E) {
@@ -213,9 +252,33 @@ impl<E: EmotionLabel> Dynamics<E> {
         EmotionState {
             emotion: self.ladder.start(),
             urgency: Urgency::MIN,
+            floor: Urgency::MIN,
+            progress: None,
             unchanged_s: 0.0,
             pressing_s: 0.0,
             belief: Belief::Unstated,
+        }
+    }
+
+    /// The state of a robot that takes over a feeling of which nothing else is known; the initial one if no such emotion
+    /// is on the ladder. An unpleasant emotion is left by a positive input only \[I\].
+    pub fn taken_over(&self, feeling: Feeling<E>) -> EmotionState<E> {
+        let place = self.ladder.place(feeling.emotion);
+        if place == Place::Elsewhere {
+            return self.start();
+        }
+
+        let floor = match place {
+            Place::Rung(index) if feeling.emotion.valence() == Valence::Negative => {
+                self.leave_below(index)
+            }
+            _ => 0.0,
+        };
+        EmotionState {
+            emotion: feeling.emotion,
+            urgency: feeling.urgency,
+            floor: Urgency::saturating(floor),
+            ..self.start()
         }
     }
 
@@ -240,6 +303,7 @@ impl<E: EmotionLabel> Dynamics<E> {
                 let target = self.gain * ratio / self.parameters.rho_max;
                 Some(Urgency::saturating(target))
             }
+            StepInput::Pressure(pressure) => Some(pressure),
             StepInput::Rest => Some(Urgency::MIN),
             StepInput::Hold => None,
         }
@@ -252,8 +316,13 @@ impl<E: EmotionLabel> Dynamics<E> {
 
         let place = self.ladder.place(state.emotion);
         if stimulus.event == Some(ProgressEvent::GoalAchieved) && place != Place::Discouraged {
-            state.urgency = Urgency::MIN;
-            state.pressing_s = 0.0;
+            *state = EmotionState {
+                unchanged_s: state.unchanged_s,
+                belief: state.belief,
+                emotion: state.emotion,
+                progress: Some(Progress::event(1.0)),
+                ..self.start()
+            };
             state.change_to(self.ladder.start());
             return;
         }
@@ -266,24 +335,75 @@ impl<E: EmotionLabel> Dynamics<E> {
             Place::Hopeful => self.next_from_hopeful(state),
             Place::Elsewhere => self.rung_by_urgency(state, usize::MAX),
         };
+        self.update_floor(state, place, next);
         state.change_to(next);
     }
 
-    /// Filters the drive into the urgency, then adds the effect of the event.
+    /// Filters the drive into the urgency, then adds the effect of the event. The urgency does not fall below the floor.
     fn update_urgency(&self, state: &mut EmotionState<E>, stimulus: &Stimulus, dt_s: f64) {
-        let mut urgency = state.urgency.value();
+        let before = state.urgency.value();
+        let target = self.target(stimulus.drive).map(Urgency::value);
+        let mut urgency = match target {
+            Some(target) => self.filter(before, target, dt_s),
+            None => before,
+        };
+        let mut floor = state.floor.value();
+        let driven = target
+            .filter(|target| *target > before)
+            .map(|target| Progress {
+                signed: before - target,
+                is_event: false,
+            });
 
-        if let Some(target) = self.target(stimulus.drive) {
-            urgency = self.filter(urgency, target.value(), dt_s);
-        }
-
-        let jump = match stimulus.event {
-            Some(ProgressEvent::Positive(importance)) => -importance.value(),
-            Some(ProgressEvent::Negative(importance)) => self.gain * importance.value(),
-            Some(ProgressEvent::GoalAchieved) | None => 0.0,
+        state.progress = match stimulus.event {
+            Some(ProgressEvent::Positive(importance)) => {
+                let limit = 1.0 - importance.value();
+                urgency = urgency.min(limit);
+                floor = floor.min(limit);
+                Some(Progress::event(importance.value()))
+            }
+            Some(ProgressEvent::Negative(importance)) => {
+                urgency += self.gain * importance.value();
+                Some(Progress::event(-importance.value()))
+            }
+            Some(ProgressEvent::Easing) => match target {
+                Some(target) if target < before => {
+                    floor = floor.min(target);
+                    Some(Progress::event(1.0 - target))
+                }
+                _ => driven,
+            },
+            Some(ProgressEvent::GoalAchieved) => Some(Progress::event(1.0)),
+            None => driven,
         };
 
-        state.urgency = Urgency::saturating(urgency + jump);
+        state.floor = Urgency::saturating(floor);
+        state.urgency = Urgency::saturating(urgency.max(before.min(floor)));
+    }
+
+    /// A rung that needs progress puts the floor where it would be left, if it is reached from below; the first pleasant
+    /// emotion removes the floor.
+    fn update_floor(&self, state: &mut EmotionState<E>, from: Place, next: E) {
+        if next == state.emotion {
+            return;
+        }
+        if next.valence() == Valence::Positive {
+            state.floor = Urgency::MIN;
+            return;
+        }
+
+        let Place::Rung(index) = self.ladder.place(next) else {
+            return;
+        };
+        let comes_from_above = matches!(from, Place::Rung(before) if before > index);
+        if self.ladder.rungs()[index].needs_progress && !comes_from_above {
+            state.floor = Urgency::saturating(self.leave_below(index));
+        }
+    }
+
+    /// The urgency below which a rung is left.
+    fn leave_below(&self, index: usize) -> f64 {
+        self.ladder.rungs()[index].enter - self.parameters.hysteresis
     }
 
     /// First-order filter with time constant `tau_up_s / g` when rising and `tau_down_s` when falling.
@@ -336,10 +456,8 @@ impl<E: EmotionLabel> Dynamics<E> {
 
     /// The highest rung, not above `index`, that is not left at this urgency.
     fn fall_from(&self, index: usize, urgency: f64) -> usize {
-        let rungs = self.ladder.rungs();
-
         let mut lower = index;
-        while lower > 0 && urgency < rungs[lower].enter - self.parameters.hysteresis {
+        while lower > 0 && urgency < self.leave_below(lower) {
             lower -= 1;
         }
 

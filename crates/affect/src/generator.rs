@@ -5,8 +5,7 @@
 //! The types enforce this. An [`EmotionGenerator`] has shared references to measures and behavior, owns only its
 //! emotion, and returns a [`Feeling`], which is a copy.
 //!
-//! There are two generators: [`DynamicGenerator`] for continuous measures, and [`RuleGenerator`] for a table of
-//! conditions.
+//! [`DynamicGenerator`] is the generator of the documented robots.
 //!
 //! ```compile_fail,E0594
 //! use affect::{EmotionGenerator, Feeling, Urgency, StandardEmotion};
@@ -28,7 +27,6 @@
 
 use crate::dynamics::{Dynamics, EmotionState, Stimulus};
 use crate::label::{EmotionLabel, Feeling};
-use crate::scalar::Urgency;
 use std::fmt;
 
 /// Turns progress measures into a feeling.
@@ -126,72 +124,6 @@ impl<M, B, E: EmotionLabel> EmotionGenerator for DynamicGenerator<M, B, E> {
     }
 }
 
-/// One row of a [`RuleGenerator`]: the emotion during certain behaviors while a condition holds.
-pub struct EmotionRow<M: 'static, B: 'static, E> {
-    /// The behaviors during which the row can apply.
-    pub during: &'static [B],
-    /// Condition on the measures.
-    pub when: fn(&M) -> bool,
-    /// The emotion.
-    pub feel: E,
-}
-
-/// A generator that takes the emotion from the first matching row of a table, and the urgency from a function.
-///
-/// The emotion does not change if no row matches. The feeling is the only state.
-pub struct RuleGenerator<M: 'static, B: 'static, E: 'static> {
-    rows: &'static [EmotionRow<M, B, E>],
-    urgency: fn(&M, &B) -> Urgency,
-    feeling: Feeling<E>,
-}
-
-impl<M, B: PartialEq, E: EmotionLabel> RuleGenerator<M, B, E> {
-    /// Creates a generator that starts with the emotion `start` at urgency 0.
-    pub fn new(
-        rows: &'static [EmotionRow<M, B, E>],
-        urgency: fn(&M, &B) -> Urgency,
-        start: E,
-    ) -> Self {
-        Self {
-            rows,
-            urgency,
-            feeling: Feeling {
-                emotion: start,
-                urgency: Urgency::MIN,
-            },
-        }
-    }
-
-    /// Resumes from a saved feeling.
-    pub fn restore(&mut self, feeling: Feeling<E>) {
-        self.feeling = feeling;
-    }
-}
-
-impl<M, B: PartialEq, E: EmotionLabel> EmotionGenerator for RuleGenerator<M, B, E> {
-    type Measures = M;
-    type Behavior = B;
-    type Emotion = E;
-
-    fn update(&mut self, measures: &M, behavior: &B, _dt_s: f64) -> Feeling<E> {
-        let row = self
-            .rows
-            .iter()
-            .find(|row| row.during.contains(behavior) && (row.when)(measures));
-
-        if let Some(row) = row {
-            self.feeling.emotion = row.feel;
-        }
-        self.feeling.urgency = (self.urgency)(measures, behavior);
-
-        self.feeling
-    }
-
-    fn feeling(&self) -> Feeling<E> {
-        self.feeling
-    }
-}
-
 // Derived implementations would add bounds on measures and behaviors, although no value of them is stored.
 
 impl<M, B, E: Clone> Clone for DynamicGenerator<M, B, E> {
@@ -209,89 +141,5 @@ impl<M, B, E: fmt::Debug> fmt::Debug for DynamicGenerator<M, B, E> {
         f.debug_struct("DynamicGenerator")
             .field("state", &self.state)
             .finish_non_exhaustive()
-    }
-}
-
-impl<M, B, E: Clone> Clone for RuleGenerator<M, B, E> {
-    fn clone(&self) -> Self {
-        Self {
-            rows: self.rows,
-            urgency: self.urgency,
-            feeling: self.feeling.clone(),
-        }
-    }
-}
-
-impl<M, B, E: fmt::Debug> fmt::Debug for RuleGenerator<M, B, E> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("RuleGenerator")
-            .field("feeling", &self.feeling)
-            .finish_non_exhaustive()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::label::StandardEmotion::{self, Concerned, Confident, Frustrated, Happy};
-
-    #[derive(PartialEq)]
-    enum Behavior {
-        Wait,
-        Go,
-        Other,
-    }
-
-    struct Measures {
-        is_hurried: bool,
-        blocked: f64,
-    }
-
-    const ROWS: &[EmotionRow<Measures, Behavior, StandardEmotion>] = &[
-        EmotionRow {
-            during: &[Behavior::Wait],
-            when: |_| true,
-            feel: Happy,
-        },
-        EmotionRow {
-            during: &[Behavior::Go],
-            when: |m| m.blocked >= 1.0,
-            feel: Frustrated,
-        },
-        EmotionRow {
-            during: &[Behavior::Go],
-            when: |m| m.is_hurried,
-            feel: Concerned,
-        },
-        EmotionRow {
-            during: &[Behavior::Go],
-            when: |_| true,
-            feel: Confident,
-        },
-    ];
-
-    fn urgency(measures: &Measures, _: &Behavior) -> Urgency {
-        Urgency::saturating(measures.blocked)
-    }
-
-    #[test]
-    fn the_first_matching_row_determines_the_emotion() {
-        let mut esg = RuleGenerator::new(ROWS, urgency, Happy);
-
-        for (is_hurried, blocked, behavior, expected) in [
-            (true, 0.5, Behavior::Wait, (Happy, 0.5)),
-            (false, 0.0, Behavior::Go, (Confident, 0.0)),
-            (true, 0.2, Behavior::Go, (Concerned, 0.2)),
-            (true, 3.0, Behavior::Go, (Frustrated, 1.0)),
-            (true, 0.0, Behavior::Other, (Frustrated, 0.0)),
-        ] {
-            let measures = Measures {
-                is_hurried,
-                blocked,
-            };
-            let feeling = esg.update(&measures, &behavior, 0.5);
-
-            assert_eq!((feeling.emotion, feeling.urgency.value()), expected);
-        }
     }
 }

@@ -19,6 +19,8 @@ pub struct Rung<E> {
     pub hold_s: f64,
     /// Whether the rung is only entered while another agent is to blame.
     pub needs_blame: bool,
+    /// Whether only a positive input leads down from the rung, as far as the input is important.
+    pub needs_progress: bool,
 }
 
 impl<E> Rung<E> {
@@ -29,6 +31,7 @@ impl<E> Rung<E> {
             enter,
             hold_s: 0.0,
             needs_blame: false,
+            needs_progress: false,
         }
     }
 }
@@ -164,7 +167,7 @@ impl Ladder<StandardEmotion> {
     ///
     /// `murphy4` follows the order of the paper's Table 2 [D: S]. `akr4` has no CONFIDENT, and ANGRY follows
     /// FRUSTRATED after the urgency has been extreme for a long time and another agent is to blame. The paper shows
-    /// that state but not how it is entered \[I\].
+    /// that state but not how it is entered \[I\]. Only a positive input leads down from FRUSTRATED [D: S].
     ///
     /// # Errors
     ///
@@ -175,12 +178,16 @@ impl Ladder<StandardEmotion> {
         let happy = Rung::new(Happy, 0.0);
         let confident = Rung::new(Confident, parameters.th_confident);
         let concerned = Rung::new(Concerned, parameters.th_concerned);
-        let frustrated = Rung::new(Frustrated, parameters.th_frustrated);
+        let frustrated = Rung {
+            needs_progress: true,
+            ..Rung::new(Frustrated, parameters.th_frustrated)
+        };
         let angry = Rung {
             emotion: Angry,
             enter: parameters.th_angry,
             hold_s: parameters.anger_s,
             needs_blame: true,
+            needs_progress: false,
         };
 
         let rungs = match parameters.state_set {

@@ -158,9 +158,9 @@ mod scalar;
 mod schema;
 
 pub use causal::{CausalChain, Circumstances, Clause, ClauseError, ClauseKind};
-pub use dynamics::{Belief, Dynamics, EmotionState, ProgressEvent, StepInput, Stimulus};
+pub use dynamics::{Belief, Dynamics, EmotionState, Progress, ProgressEvent, StepInput, Stimulus};
 pub use frame::AffectFrame;
-pub use generator::{DynamicGenerator, EmotionGenerator, EmotionRow, RuleGenerator};
+pub use generator::{DynamicGenerator, EmotionGenerator};
 pub use label::{EmotionLabel, Feeling, StandardEmotion};
 pub use ladder::{BeliefEmotions, Ladder, Rung};
 pub use parameters::{DynamicsParameters, ParameterError, StateSet};

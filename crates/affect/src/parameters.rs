@@ -62,6 +62,13 @@ pub struct DynamicsParameters {
     pub hysteresis: f64,
     /// Minimum time between two changes of emotion, in seconds. Default 1 \[I\].
     pub dwell_s: f64,
+    /// Importance of a small positive input, such as progress on the way home. Default 0.4 \[I\]: it leads from
+    /// FRUSTRATED to CONCERNED. That the effect depends on the importance [D: S].
+    pub low_importance: f64,
+    /// Importance of a great positive input, such as a new errand. Default 0.75 \[I\]: it leads to CONFIDENT.
+    pub high_importance: f64,
+    /// Importance of a negative input, such as giving up. Default 0.15 \[I\].
+    pub setback: f64,
     /// How long HOPEFUL lasts without success, in seconds. Default 15 \[I\].
     pub hope_s: f64,
     /// Lower bounds of the labels low, medium, high and very high. Default 0.2, 0.4, 0.6, 0.8 \[I\].
@@ -86,6 +93,9 @@ impl Default for DynamicsParameters {
             anger_s: 15.0,
             hysteresis: 0.08,
             dwell_s: 1.0,
+            low_importance: 0.4,
+            high_importance: 0.75,
+            setback: 0.15,
             hope_s: 15.0,
             label_cuts: IntensityLabel::CUTS,
         }
@@ -182,8 +192,13 @@ impl DynamicsParameters {
         not_negative("hysteresis", self.hysteresis)?;
         not_negative("dwell_s", self.dwell_s)?;
         not_negative("hope_s", self.hope_s)?;
+        not_negative("setback", self.setback)?;
 
         ascending(&self.label_cuts)?;
+        ascend(&[
+            ("low_importance", self.low_importance),
+            ("high_importance", self.high_importance),
+        ])?;
         self.check_thresholds()
     }
 
@@ -198,23 +213,28 @@ impl DynamicsParameters {
             StateSet::Akr4 => [concerned, frustrated, angry],
         };
 
-        let mut lower_name = "the start";
-        let mut lower = 0.0;
-        for (name, value) in in_use {
-            let ascends = value > lower && value <= 1.0;
-            if !ascends {
-                return Err(ParameterError::Threshold {
-                    name,
-                    value,
-                    lower_name,
-                    lower,
-                });
-            }
-            lower_name = name;
-            lower = value;
-        }
-        Ok(())
+        ascend(&in_use)
     }
+}
+
+/// Checks that named values are strictly ascending, above 0 and at most 1.
+fn ascend(values: &[(&'static str, f64)]) -> Result<(), ParameterError> {
+    let mut lower_name = "the start";
+    let mut lower = 0.0;
+    for &(name, value) in values {
+        let ascends = value > lower && value <= 1.0;
+        if !ascends {
+            return Err(ParameterError::Threshold {
+                name,
+                value,
+                lower_name,
+                lower,
+            });
+        }
+        lower_name = name;
+        lower = value;
+    }
+    Ok(())
 }
 
 pub(crate) fn positive(name: &'static str, value: f64) -> Result<(), ParameterError> {

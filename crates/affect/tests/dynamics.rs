@@ -9,8 +9,8 @@ use affect::StandardEmotion::{
     Angry, Concerned, Confident, Discouraged, Frustrated, Happy, Hopeful,
 };
 use affect::{
-    Belief, Caution, Dynamics, DynamicsParameters, EmotionState, Ladder, ProgressEvent,
-    StandardEmotion, StateSet, StepInput, Stimulus, Urgency,
+    Belief, Caution, Dynamics, DynamicsParameters, EmotionState, Feeling, Ladder, ProgressEvent,
+    Rung, StandardEmotion, StateSet, StepInput, Stimulus, Urgency,
 };
 use proptest::prelude::*;
 
@@ -84,10 +84,114 @@ fn positive_input_keeps_happy_and_negative_leads_to_frustrated() {
         robot.entered(Stimulus::need(9.0), 60.0),
         [Confident, Concerned, Frustrated]
     );
+    assert_eq!(robot.entered(Stimulus::rest(), 60.0), []);
     assert_eq!(
-        robot.entered(Stimulus::rest(), 60.0),
+        robot.entered(easing(StepInput::Rest), 60.0),
         [Concerned, Confident, Happy]
     );
+}
+
+/// A drive that falls because of progress.
+fn easing(drive: StepInput) -> Stimulus {
+    Stimulus::new(drive).with_event(Some(ProgressEvent::Easing))
+}
+
+#[test]
+fn frustration_without_a_positive_input_does_not_end() {
+    let mut robot = Robot::new(StateSet::Murphy4);
+    robot.entered(Stimulus::need(9.0), 60.0);
+    assert_eq!(robot.entered(Stimulus::rest(), 3600.0), []);
+
+    // It is felt less: down to where it would be left.
+    assert_eq!(robot.urgency(), 0.75 - 0.08);
+    assert_eq!(robot.state.progress(), None);
+}
+
+#[test]
+fn after_frustration_the_way_down_ends_where_the_importance_ends() {
+    for (value, expected) in [
+        (0.2, vec![]),
+        (0.4, vec![Concerned]),
+        (0.7, vec![Confident, Happy]),
+    ] {
+        let mut robot = Robot::new(StateSet::Murphy4);
+        robot.entered(Stimulus::need(9.0), 60.0);
+        let event = Some(ProgressEvent::Positive(importance(value)));
+        let mut entered = robot.entered(Stimulus::rest().with_event(event), DT_S);
+        entered.extend(robot.entered(Stimulus::rest(), 600.0));
+        assert_eq!(entered, expected, "importance {value}");
+    }
+}
+
+#[test]
+fn concern_that_was_no_frustration_ends_by_itself() {
+    let mut robot = Robot::new(StateSet::Murphy4);
+    robot.entered(Stimulus::need(1.2), 60.0);
+    assert_eq!(robot.entered(Stimulus::rest(), 60.0), [Confident, Happy]);
+}
+
+#[test]
+fn easing_is_progress_only_where_the_pressure_is_below_the_urgency() {
+    let mut robot = Robot::new(StateSet::Murphy4);
+    let pressure = |value: f64| StepInput::Pressure(importance(value));
+    robot.step(easing(pressure(0.5)));
+    let signed = |robot: &Robot| {
+        robot
+            .state
+            .progress()
+            .map(|progress| (progress.signed, progress.is_event))
+    };
+    assert_eq!(signed(&robot), Some((-0.5, false)));
+
+    robot.entered(Stimulus::new(pressure(1.0)), 60.0);
+    robot.step(easing(pressure(0.25)));
+    assert_eq!(signed(&robot), Some((0.75, true)));
+    // What follows without progress goes no further than it led.
+    robot.entered(Stimulus::rest(), 60.0);
+    assert_eq!(
+        robot.state.feeling().emotion,
+        Happy,
+        "CONFIDENT is pleasant, and frees it"
+    );
+
+    let mut robot = Robot::new(StateSet::Murphy4);
+    robot.entered(Stimulus::new(pressure(1.0)), 60.0);
+    robot.step(easing(pressure(0.5)));
+    robot.entered(Stimulus::rest(), 60.0);
+    assert_eq!(
+        (robot.state.feeling().emotion, robot.urgency()),
+        (Concerned, 0.5)
+    );
+}
+
+#[test]
+fn who_takes_over_an_unpleasant_emotion_needs_a_positive_input() {
+    for (emotion, urgency, keeps) in [
+        (Happy, 0.1, false),
+        (Concerned, 0.5, true),
+        (Frustrated, 0.9, true),
+        (Discouraged, 0.9, true),
+    ] {
+        let mut robot = Robot::new(StateSet::Murphy4);
+        let feeling = Feeling {
+            emotion,
+            urgency: importance(urgency),
+        };
+        robot.state = robot.dynamics.taken_over(feeling);
+        assert!(robot.dynamics.accepts(&robot.state));
+        assert_eq!(robot.state.feeling(), feeling);
+
+        robot.entered(Stimulus::rest(), 60.0);
+        let negative = robot.state.feeling().affect().signed() < 0.0;
+        assert_eq!(negative, keeps, "{emotion:?}");
+    }
+
+    let akr4 = dynamics(StateSet::Akr4);
+    let confident = Feeling {
+        emotion: Confident,
+        urgency: importance(0.3),
+    };
+    assert_eq!(akr4.taken_over(confident), akr4.start());
 }
 
 #[test]
@@ -184,9 +288,10 @@ fn anger_needs_lasting_extreme_urgency_and_an_agent_to_blame() {
     assert_eq!(robot.entered(Stimulus::need(9.0), 0.5), []);
     assert_eq!(robot.entered(blaming, 14.5), []);
     assert_eq!(robot.entered(blaming, 0.5), [Angry]);
+    assert_eq!(robot.entered(Stimulus::rest(), 120.0), [Frustrated]);
     assert_eq!(
-        robot.entered(Stimulus::rest(), 120.0),
-        [Frustrated, Concerned, Happy]
+        robot.entered(easing(StepInput::Rest), 120.0),
+        [Concerned, Happy]
     );
 
     // There is no anger in murphy4.
@@ -285,12 +390,12 @@ fn a_state_of_another_ladder_moves_to_a_rung() {
     robot.state = other.state;
     robot.entered(Stimulus::need(9.0), 2.0);
 
-    let json = r#"{"emotion":"CONFIDENT","urgency":0.5,"unchanged_s":0.0,"pressing_s":0.0,"belief":"unstated"}"#;
+    let json = r#"{"emotion":"CONFIDENT","urgency":0.5,"floor":0.0,"progress":null,"unchanged_s":0.0,"pressing_s":0.0,"belief":"unstated"}"#;
     robot.state = serde_json::from_str(json).unwrap();
     assert!(!robot.dynamics.accepts(&robot.state));
     assert_eq!(robot.step(Stimulus::new(StepInput::Hold)), Concerned);
 
-    let wrong = json.replace("0.5", "1.5");
+    let wrong = json.replace("0.5,", "1.5,");
     assert!(serde_json::from_str::<EmotionState<StandardEmotion>>(&wrong).is_err());
 }
 
@@ -302,12 +407,54 @@ fn rung(ladder: &Ladder<StandardEmotion>, emotion: StandardEmotion) -> usize {
         .unwrap()
 }
 
+/// The first step of a course in which a pleasant emotion follows FRUSTRATED and no step between had a positive input.
+fn first_groundless(dynamics: &Dynamics<StandardEmotion>, course: &[Stimulus]) -> Option<usize> {
+    let mut state = dynamics.start();
+    let mut owes = false;
+    for (index, stimulus) in course.iter().enumerate() {
+        let before = state.feeling().emotion;
+        dynamics.step(&mut state, stimulus, DT_S);
+
+        let progress = state.progress().map_or(0.0, |progress| progress.signed);
+        owes &= progress <= 0.0;
+        if owes && state.feeling().affect().signed() > 0.0 {
+            return Some(index);
+        }
+        owes |= state.feeling().emotion == Frustrated && before != Frustrated;
+    }
+    None
+}
+
+/// The ladder of murphy4 whose FRUSTRATED ends by itself.
+fn wrong_ladder() -> Dynamics<StandardEmotion> {
+    let rungs = dynamics(StateSet::Murphy4).ladder().rungs().to_vec();
+    let rungs = rungs.into_iter().map(|rung| Rung {
+        needs_progress: false,
+        ..rung
+    });
+    let ladder = Ladder::new(rungs.collect()).unwrap();
+    Dynamics::new(ladder, &DynamicsParameters::default(), Caution::default()).unwrap()
+}
+
+#[test]
+fn a_ladder_whose_frustration_ends_by_itself_is_found_out() {
+    let mut course = vec![Stimulus::need(9.0); 40];
+    course.extend([Stimulus::rest(); 40]);
+
+    assert!(first_groundless(&wrong_ladder(), &course).is_some());
+    assert_eq!(
+        first_groundless(&dynamics(StateSet::Murphy4), &course),
+        None
+    );
+}
+
 /// Any sequence of needs and events, sometimes with an agent to blame.
 fn any_course() -> impl Strategy<Value = Vec<Stimulus>> {
     let event = prop_oneof![
         8 => Just(None),
         1 => (0.0..=1.0).prop_map(|value| Some(ProgressEvent::Positive(Urgency::saturating(value)))),
         1 => (0.0..=1.0).prop_map(|value| Some(ProgressEvent::Negative(Urgency::saturating(value)))),
+        1 => Just(Some(ProgressEvent::Easing)),
         1 => Just(Some(ProgressEvent::GoalAchieved)),
     ];
     let stimulus = (0.0..8.0, event, any::<bool>())
@@ -359,6 +506,12 @@ proptest! {
                 prop_assert!(urgency < ladder.rungs()[to + 1].enter - parameters.hysteresis);
             }
         }
+    }
+
+    /// Nothing but a positive input leads from FRUSTRATED to a pleasant emotion, by whatever way.
+    #[test]
+    fn frustration_ends_well_only_by_a_positive_input(course in any_course(), state_set in any_set()) {
+        prop_assert_eq!(first_groundless(&dynamics(state_set), &course), None);
     }
 
     /// An urgency that oscillates around a threshold by less than the hysteresis changes the emotion once.

@@ -27,6 +27,7 @@ macro_rules! texts {
 /// All but the launch files that start programs of the project's folder.
 const FILES: &[(&str, &str)] = &texts![
     "configs/any_language.toml",
+    "configs/crowded_hall.toml",
     "configs/deliberate.toml",
     "configs/experiments/affect.toml",
     "configs/experiments/crowd.toml",
@@ -41,6 +42,7 @@ const FILES: &[(&str, &str)] = &texts![
     "configs/robots/butler.toml",
     "configs/robots/leguin.toml",
     "configs/three_robots.toml",
+    "configs/walled_hall.toml",
     "launch/hors_doeuvres.toml",
     "launch/museum.toml",
     "launch/partition.toml",

@@ -250,6 +250,85 @@ fn what_is_waited_for_at_the_end_is_undecided() {
     );
 }
 
+const NEVER_UNTIL: &str = "after = { event = 'link_healed' }
+                           never = { event = 'say' }
+                           until = { event = 'link_cut' }";
+
+#[test]
+fn a_watch_begins_after_the_event_and_ends_with_until() {
+    let mut run = Run::of(NEVER_UNTIL);
+    assert_eq!(run.tick(&[say("")]), None, "no watch yet");
+    assert_eq!(
+        run.tick(&[cut(false), say("")]),
+        None,
+        "the tick of the event"
+    );
+    run.quiet_until(5);
+    assert_eq!(
+        run.tick(&[cut(true), say("")]),
+        None,
+        "the tick that ends it"
+    );
+    assert_eq!(run.tick(&[say("")]), None);
+    run.quiet_until(10);
+    let passed = run.watch.end(End::Finished);
+    assert_eq!(passed.verdict, Verdict::Pass);
+    assert_eq!(
+        passed.because,
+        "it did not happen in any watch (1) until tick 9 (4.5 s)"
+    );
+
+    assert_eq!(run.tick(&[cut(false)]), None);
+    assert_eq!(
+        run.watch.end(End::Finished).verdict,
+        Verdict::Pass,
+        "an open watch"
+    );
+    assert_eq!(run.watch.end(End::Stopped).verdict, Verdict::Undecided);
+    let failed = run.tick(&[say("")]).unwrap();
+    assert_eq!(failed.verdict, Verdict::Fail);
+    assert!(
+        failed.because.contains("after tick 10"),
+        "{}",
+        failed.because
+    );
+
+    let idle = Run::of(NEVER_UNTIL);
+    assert_eq!(idle.watch.end(End::Finished).verdict, Verdict::NotAsked);
+}
+
+#[test]
+fn a_watch_needs_its_three_parts() {
+    for (entry, reason) in [
+        (
+            "after = { event = 'say' }\nnever = { event = 'say' }",
+            "needs what ends it",
+        ),
+        (
+            "never = { event = 'say' }\nuntil = { event = 'say' }",
+            "`until` belongs to `after`",
+        ),
+        (
+            "after = { event = 'say' }\neventually = { event = 'say' }\nwithin = '1 s'\nuntil = { event = 'say' }",
+            "`until` belongs to `never`",
+        ),
+        (
+            "after = { event = 'say' }\nnever = { event = 'say' }\nuntil = { event = 'say' }\nunless = { event = 'say' }",
+            "`unless` belongs to `eventually`",
+        ),
+    ] {
+        let error = read(entry).unwrap_err();
+        assert!(error.contains(reason), "{entry}: {error}");
+    }
+    // It is written as it was read.
+    let written = toml::to_string(&File {
+        expect: vec![read(NEVER_UNTIL).unwrap()],
+    })
+    .unwrap();
+    let again: File = toml::from_str(&written).unwrap();
+    assert_eq!(again.expect[0], read(NEVER_UNTIL).unwrap());
+}
+
 #[test]
 fn without_any_event_that_it_is_expected_after_it_is_not_asked() {
     let mut run = Run::of(AFTER_HEALING);
@@ -467,7 +546,7 @@ fn what_cannot_be_checked_is_refused() {
         ),
         (
             "after = { event = 'say' }\nnever = { event = 'lost' }",
-            "`after` belongs to `eventually`",
+            "needs what ends it",
         ),
         (
             "eventually = { event = 'say' }\nwithin = '1 s'\nunless = { event = 'lost' }",

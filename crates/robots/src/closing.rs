@@ -14,9 +14,10 @@ pub struct Closing {
 
 impl Closing {
     /// Adds a distance after `dt_s` seconds; `None` if it is unknown, which is no progress. A distance that is
-    /// `progress_m` smaller than all before is progress.
-    pub fn observe(&mut self, distance_m: Option<f64>, progress_m: f64, dt_s: f64) {
+    /// `progress_m` smaller than all before is progress. Returns whether there was one before, and this one is.
+    pub fn observe(&mut self, distance_m: Option<f64>, progress_m: f64, dt_s: f64) -> bool {
         self.stalled_s += dt_s;
+        let has_begun = self.nearest_m.is_some();
 
         if let Some(distance_m) = distance_m
             && self
@@ -25,7 +26,9 @@ impl Closing {
         {
             self.nearest_m = Some(distance_m);
             self.stalled_s = 0.0;
+            return has_begun;
         }
+        false
     }
 
     /// Time without progress, seconds.
@@ -42,9 +45,9 @@ mod tests {
     #[test]
     fn only_a_new_minimum_is_progress() {
         let mut closing = Closing::default();
-        for distance_m in [10.0, 9.0, 12.0, 9.5, 9.0] {
-            closing.observe(Some(distance_m), 0.5, 1.0);
-        }
+        let came = [10.0, 9.0, 12.0, 9.5, 9.0]
+            .map(|distance_m| closing.observe(Some(distance_m), 0.5, 1.0));
+        assert_eq!(came, [false, true, false, false, false]);
         assert_eq!(closing.stalled_s(), 3.0);
 
         closing.observe(Some(8.7), 0.5, 1.0);

@@ -2,73 +2,33 @@
 //! saved and restored.
 
 use affect::{
-    DynamicGenerator, EmotionGenerator, EmotionLabel, EmotionState, Feeling, RuleGenerator,
-    StandardEmotion,
+    DynamicGenerator, EmotionGenerator, EmotionLabel, EmotionState, Feeling, Progress, Schemata,
+    StandardEmotion, Urgency,
 };
-use robot::Cars;
+use robot::{Cars, StateVariables};
 
+use crate::published::{number, text};
 use crate::script::Script;
 use crate::switch::Switch;
 
 /// The emotion that a robot without emotions publishes.
 pub(crate) const NEUTRAL: &str = "NEUTRAL";
 
-/// A generator whose state can be saved and restored.
-pub(crate) trait Restore: EmotionGenerator {
-    /// Everything that the generator remembers.
-    type State: PartialEq;
-
-    fn state(&self) -> Self::State;
-
-    /// Whether the generator can be in this state.
-    fn accepts(&self, state: &Self::State) -> bool;
-
-    fn restore(&mut self, state: Self::State);
-}
-
-impl<M, B, E: EmotionLabel> Restore for DynamicGenerator<M, B, E> {
-    type State = EmotionState<E>;
-
-    fn state(&self) -> EmotionState<E> {
-        self.state().clone()
-    }
-
-    fn accepts(&self, state: &EmotionState<E>) -> bool {
-        self.dynamics().accepts(state)
-    }
-
-    fn restore(&mut self, state: EmotionState<E>) {
-        self.restore(state);
-    }
-}
-
-impl<M, B: PartialEq, E: EmotionLabel> Restore for RuleGenerator<M, B, E> {
-    type State = Feeling<E>;
-
-    fn state(&self) -> Feeling<E> {
-        self.feeling()
-    }
-
-    fn accepts(&self, _: &Feeling<E>) -> bool {
-        true
-    }
-
-    fn restore(&mut self, feeling: Feeling<E>) {
-        self.restore(feeling);
-    }
-}
-
 /// A generator and its switch. Switched off, the generator never runs and stays in its initial state.
-pub(crate) struct SwitchableGenerator<G> {
+pub(crate) struct SwitchableGenerator<M, B> {
     switch: Switch,
     script: Script,
     /// The feeling of the script at this time.
     scripted: Option<Feeling<StandardEmotion>>,
-    generator: G,
+    generator: DynamicGenerator<M, B, StandardEmotion>,
 }
 
-impl<G: Restore + EmotionGenerator<Emotion = StandardEmotion>> SwitchableGenerator<G> {
-    pub(crate) fn new(switch: Switch, script: Script, generator: G) -> Self {
+impl<M, B> SwitchableGenerator<M, B> {
+    pub(crate) fn new(
+        switch: Switch,
+        script: Script,
+        generator: DynamicGenerator<M, B, StandardEmotion>,
+    ) -> Self {
         Self {
             switch,
             script,
@@ -77,19 +37,22 @@ impl<G: Restore + EmotionGenerator<Emotion = StandardEmotion>> SwitchableGenerat
         }
     }
 
-    /// The step of this tick.
+    /// The step of this tick. Returns what counted as progress in it.
     pub(crate) fn update(
         &mut self,
-        measures: &G::Measures,
-        behavior: &G::Behavior,
+        measures: &M,
+        behavior: &B,
         cars: &Cars<'_>,
-    ) {
+    ) -> Option<Progress> {
+        let mut progress = None;
         if self.switch.is_on() {
             self.generator.update(measures, behavior, cars.tick_s());
+            progress = self.generator.state().progress();
         }
 
         let time_s = cars.tick() as f64 * cars.tick_s();
         self.scripted = self.script.feeling_at(time_s);
+        progress
     }
 
     /// The feeling; switched off, the initial one.
@@ -117,19 +80,19 @@ impl<G: Restore + EmotionGenerator<Emotion = StandardEmotion>> SwitchableGenerat
             .map_or(NEUTRAL, |feeling| feeling.emotion.name())
     }
 
-    pub(crate) fn save(&self) -> G::State {
-        self.generator.state()
+    pub(crate) fn save(&self) -> EmotionState<StandardEmotion> {
+        self.generator.state().clone()
     }
 
     /// Continues from a saved state.
     ///
     /// # Errors
     /// The emotion cannot be in this state.
-    pub(crate) fn restore(&mut self, state: G::State) -> Result<(), String> {
+    pub(crate) fn restore(&mut self, state: EmotionState<StandardEmotion>) -> Result<(), String> {
         let is_possible = if self.switch.is_on() {
-            self.generator.accepts(&state)
+            self.generator.dynamics().accepts(&state)
         } else {
-            state == self.generator.state()
+            state == *self.generator.state()
         };
         if !is_possible {
             return Err("the saved emotion does not fit these parameters".to_owned());
@@ -137,5 +100,26 @@ impl<G: Restore + EmotionGenerator<Emotion = StandardEmotion>> SwitchableGenerat
 
         self.generator.restore(state);
         Ok(())
+    }
+
+    /// Continues from the feeling that a lost incarnation published: its urgency, and the emotion of its action tendency.
+    pub(crate) fn take_over(&mut self, last: &StateVariables) {
+        let tendency = text(last, affect::frame::ACTION_TENDENCY);
+        let emotion = StandardEmotion::ALL.into_iter().find(|emotion| {
+            let schema = Schemata::standard().get(emotion.name());
+            schema.is_some_and(|schema| Some(schema.action_tendency.name()) == tendency)
+        });
+        let urgency = number(last, affect::frame::URGENCY);
+
+        if let (Some(emotion), Some(urgency)) = (emotion, urgency)
+            && self.switch.is_on()
+        {
+            let urgency = Urgency::saturating(urgency);
+            let state = self
+                .generator
+                .dynamics()
+                .taken_over(Feeling { emotion, urgency });
+            self.generator.restore(state);
+        }
     }
 }

@@ -1,9 +1,9 @@
 //! The robots of the paper's experiment: Butler, who serves a reception, Leguin, who refills his tray, and Vonda, who is
 //! Leguin under another name.
 //!
-//! Each robot is a set of parameters, a table for its emotion, a table for its behavior, and a panel. They share how they
-//! move ([`drive`]), what they know of one another ([`peer`]), the random streams ([`chance`]), and the emotion that an
-//! experiment can switch off.
+//! Each robot is a set of parameters, an appraisal of its measures, a table for its behavior, and a panel. They share how they
+//! move ([`drive`]), what they know of one another ([`peer`]), the random streams ([`chance`]), what counts as progress
+//! ([`input`]), and the emotion that an experiment can switch off.
 //!
 //! An emotion acts at the three levels of `affect::levels`: sensory-motor (Leguin's speed), schematic (the behavior of
 //! both) and conceptual (Butler's plans, off by default). Each level has a switch, and so has the emotion as a whole, for
@@ -22,6 +22,7 @@ mod commands;
 pub mod drive;
 mod emotion;
 pub mod frame;
+pub mod input;
 mod jokes;
 pub mod leguin;
 mod panel;

@@ -218,7 +218,7 @@ fn a_later_incarnation_believes_what_the_lost_one_did() {
     assert_eq!(belief(&stage).as_deref(), Some("cannot"));
 
     stage.step();
-    assert_eq!(stage.emotion("Butler"), "HAPPY");
+    assert_eq!(stage.emotion("Butler"), "DISCOURAGED");
     assert_eq!(belief(&stage).as_deref(), Some("cannot"));
 }
 

@@ -53,7 +53,9 @@ fn without_the_sensory_motor_level_concern_does_not_speed_leguin_up() {
             &format!("sensory_motor = \"{level}\""),
         );
         stage.command("Leguin", "hurry");
-        assert!(stage.step_until(5.0, |stage| stage.report("Leguin").speed_mps > 0.0));
+        let is_fully_concerned = |stage: &Stage| stage.number("Leguin", "urgency") >= 0.55;
+        assert!(stage.step_until(10.0, is_fully_concerned));
+        stage.step();
         assert_eq!(
             (stage.emotion("Leguin"), stage.behavior("Leguin")),
             ("CONCERNED", "REFILL")

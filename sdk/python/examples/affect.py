@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Generic, TypeVar
+from typing import Generic, Literal, TypeVar
 
 SLACK_S = 1e-9
 """Sums of steps such as 0.1 s fall short of what they mean by far less than this, and no step is as short."""
@@ -61,37 +61,169 @@ class Appraisal:
     """Who is responsible: oneself, or another one by name."""
 
 
-M = TypeVar("M")
 B = TypeVar("B")
 C = TypeVar("C")
 A = TypeVar("A")
 
 
-@dataclass(frozen=True, slots=True)
-class EmotionRow(Generic[M, B]):
-    """During these behaviors, if the guard holds, this is felt."""
-
-    during: Sequence[B]
-    when: Callable[[M], bool]
-    feel: Emotion
+Event = tuple[Literal["positive", "negative"], float] | Literal["easing", "achieved"]
+"""Something that brings nearer to the goal or farther from it: of this importance, 0 to 1; progress that the pressure shows; or
+the goal itself."""
 
 
-class RuleGenerator(Generic[M, B]):
-    """An ESG: the emotion is that of the first matching row, the urgency that of a formula. Without a row the emotion stays."""
+@dataclass(frozen=True)
+class DynamicsParameters:
+    """The constants of the dynamics; what each means is in ``configs/robots/leguin.toml``. Of the sets of emotions there is
+    one here."""
 
-    def __init__(self, rows: Sequence[EmotionRow[M, B]], urgency: Callable[[M], float], start: Emotion) -> None:
-        self._rows = rows
-        self._urgency = urgency
-        self.feeling = Feeling(start, 0.0)
+    state_set: Literal["murphy4"] = "murphy4"
+    rho_max: float = 2.0
+    caution_gain_base: float = 0.5
+    caution_gain_slope: float = 1.0
+    tau_up_s: float = 1.5
+    tau_down_s: float = 3.0
+    th_confident: float = 0.25
+    th_concerned: float = 0.45
+    th_frustrated: float = 0.75
+    th_angry: float = 0.95
+    anger_s: float = 15.0
+    hysteresis: float = 0.08
+    dwell_s: float = 1.0
+    low_importance: float = 0.4
+    high_importance: float = 0.75
+    setback: float = 0.15
+    hope_s: float = 15.0
+    label_cuts: tuple[float, float, float, float] = (0.2, 0.4, 0.6, 0.8)
 
-    def update(self, measures: M, behavior: B) -> None:
-        """One step: measures of progress in, emotion out."""
-        emotion = self.feeling.emotion
-        for row in self._rows:
-            if behavior in row.during and row.when(measures):
-                emotion = row.feel
-                break
-        self.feeling = Feeling(emotion, min(max(self._urgency(measures), 0.0), 1.0))
+    def check(self) -> None:
+        """:raises ValueError: what is wrong with the values, if anything is."""
+        for name in ("rho_max", "caution_gain_base", "tau_up_s", "tau_down_s"):
+            if getattr(self, name) <= 0.0:
+                raise ValueError(f"dynamics.{name} must be above 0, not {getattr(self, name):g}")
+        for name in ("caution_gain_slope", "anger_s", "hysteresis", "dwell_s", "hope_s", "setback"):
+            if getattr(self, name) < 0.0:
+                raise ValueError(f"dynamics.{name} must be at least 0, not {getattr(self, name):g}")
+        for names in (("low_importance", "high_importance"), ("th_confident", "th_concerned", "th_frustrated")):
+            values = [0.0, *(getattr(self, name) for name in names), 1.0]
+            if values[0] == values[1] or any(one > next_ for one, next_ in zip(values, values[1:], strict=False)):
+                raise ValueError(f"{', '.join(names)} must ascend up to 1")
+
+    def gain(self, caution: float) -> float:
+        """How strongly a robot of this caution reacts."""
+        return self.caution_gain_base + self.caution_gain_slope * caution
+
+
+class DynamicGenerator:
+    """An ESG: the urgency follows a pressure, and leads up and down a ladder of emotions. FRUSTRATED is left by positive
+    inputs only, as far as they are important."""
+
+    RUNGS = tuple(Emotion)
+
+    def __init__(self, parameters: DynamicsParameters, caution: float) -> None:
+        self._parameters = parameters
+        self._gain = parameters.gain(caution)
+        self._enter = (0.0, parameters.th_confident, parameters.th_concerned, parameters.th_frustrated)
+        self._rung = 0
+        self._urgency = self._floor = self._unchanged_s = 0.0
+        self.progress: tuple[float, bool] | None = None
+        """What counted as progress in the last step: its importance with its sign, and whether it was the event."""
+
+    @property
+    def feeling(self) -> Feeling:
+        """What is felt now."""
+        return Feeling(self.RUNGS[self._rung], self._urgency)
+
+    def take_over(self, emotion: Emotion, urgency: float) -> None:
+        """Continues with a feeling of which nothing else is known: a negative one ends by a positive input only."""
+        self._rung = self.RUNGS.index(emotion)
+        self._urgency = min(max(urgency, 0.0), 1.0)
+        self._floor = max(self._leave_below(self._rung), 0.0) if emotion.is_negative else 0.0
+
+    def update(self, pressure: float | None, event: Event | None, dt_s: float) -> None:
+        """One step: progress in, emotion out. Without a pressure the urgency holds."""
+        self._unchanged_s += dt_s
+        if event == "achieved":
+            self._urgency = self._floor = 0.0
+            self.progress = (1.0, True)
+            self._change_to(0)
+            return
+
+        self._update_urgency(pressure, event, dt_s)
+        rung, urgency = self._rung, self._urgency
+        if self._unchanged_s + SLACK_S < self._parameters.dwell_s:
+            return
+        if rung + 1 < len(self.RUNGS) and urgency >= self._enter[rung + 1]:
+            rung += 1
+        else:
+            while rung > 0 and urgency < self._leave_below(rung):
+                rung -= 1
+        if rung != self._rung:
+            if not self.RUNGS[rung].is_negative:
+                self._floor = 0.0
+            elif self.RUNGS[rung] is Emotion.FRUSTRATED:
+                self._floor = max(self._leave_below(rung), 0.0)
+        self._change_to(rung)
+
+    def _update_urgency(self, pressure: float | None, event: Event | None, dt_s: float) -> None:
+        before, floor = self._urgency, self._floor
+        urgency = before if pressure is None else self._filtered(before, pressure, dt_s)
+        self.progress = None
+        if pressure is not None and pressure > before:
+            self.progress = (before - pressure, False)
+        match event:
+            case ("positive", importance):
+                limit = 1.0 - importance
+                urgency, floor = min(urgency, limit), min(floor, limit)
+                self.progress = (importance, True)
+            case ("negative", importance):
+                urgency += self._gain * importance
+                self.progress = (-importance, True)
+            case "easing" if pressure is not None and pressure < before:
+                floor = min(floor, pressure)
+                self.progress = (1.0 - pressure, True)
+        self._floor = floor
+        self._urgency = min(max(urgency, min(before, floor), 0.0), 1.0)
+
+    def _filtered(self, urgency: float, target: float, dt_s: float) -> float:
+        rises = target > urgency
+        tau_s = self._parameters.tau_up_s / self._gain if rises else self._parameters.tau_down_s
+        return urgency + (target - urgency) * (1.0 - exp(-dt_s / tau_s))
+
+    def _leave_below(self, rung: int) -> float:
+        return self._enter[rung] - self._parameters.hysteresis
+
+    def _change_to(self, rung: int) -> None:
+        if rung != self._rung:
+            self._rung, self._unchanged_s = rung, 0.0
+
+
+def exp(x: float) -> float:
+    """The exponential of a number that is not above 0, to the last bit as in Rust: FreeBSD's ``e_exp.c``, whose license is
+
+    Copyright (C) 2004 by Sun Microsystems, Inc. All rights reserved. Permission to use, copy, modify, and distribute this
+    software is freely granted, provided that this notice is preserved.
+    """
+    if x < -708.0:
+        return 0.0
+    k = 0
+    if -x >= 1.0397205352783203:  # 1.5 ln 2, to the bits that are compared
+        k = int(1.4426950408889634 * x - 0.5)
+    elif -x >= 0.3465735912322998:  # 0.5 ln 2
+        k = -1
+    elif -x < 3.725293851175593e-09:
+        return 1.0 + x
+    high, low = x - k * 6.93147180369123816490e-01, k * 1.90821492927058770002e-10
+    x = high - low
+    xx = x * x
+    c = x - xx * (
+        1.66666666666666019037e-01
+        + xx
+        * (
+            -2.77777777770155933842e-03
+            + xx * (6.61375632143793436117e-05 + xx * (-1.65339022054652515390e-06 + xx * 4.13813679705723846039e-08))
+        )
+    )
+    return (1.0 + (x * c / (2.0 - c) - low + high)) * 2.0**k
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,11 +18,12 @@ from typing import Literal
 from affect import (
     Appraisal,
     BehaviorGenerator,
+    DynamicGenerator,
+    DynamicsParameters,
     Emotion,
-    EmotionRow,
+    Event,
     Feeling,
     Row,
-    RuleGenerator,
     intensity_label,
     motor_gain,
 )
@@ -48,19 +49,6 @@ Policy = Literal["emotion", "rules", "timer", "neither"]
 
 
 @dataclass(frozen=True)
-class Feelings:
-    """The constants of her emotions; what each means is in ``configs/robots/leguin.toml``."""
-
-    caution_gain_base: float = 0.5
-    caution_gain_slope: float = 1.0
-    th_concerned: float = 0.45
-    hurry: float = 0.6
-    haste_onset: float = 0.25
-    haste_full: float = 0.6
-    label_cuts: tuple[float, float, float, float] = (0.2, 0.4, 0.6, 0.8)
-
-
-@dataclass(frozen=True)
 class Parameters:
     """What she can be told about herself, in SI units; what each means is in ``configs/robots/leguin.toml``."""
 
@@ -76,8 +64,12 @@ class Parameters:
     v_refill_mps: float = 3.0 * FT_M
     hurry_mult: float = 1.5
     prep_s: float = 1.0
-    block_patience_s: float = 25.0
-    await_patience_s: float = 20.0
+    errand_pressure: float = 0.35
+    hurry_pressure: float = 0.6
+    haste_onset: float = 0.25
+    haste_full: float = 0.55
+    block_patience_s: float = 32.0
+    await_patience_s: float = 26.0
     progress_m: float = 0.5 * FT_M
     arrive_m: float = 1.5 * FT_M
     settle_s: float = 5.0
@@ -87,7 +79,7 @@ class Parameters:
     turn_mean_s: float = 5.0
     look_s: float = 2.0
     joke_mean_s: float = 60.0
-    dynamics: Feelings = field(default_factory=Feelings)
+    dynamics: DynamicsParameters = field(default_factory=DynamicsParameters)
 
     POSITIVE = (
         "exchange_radius_m",
@@ -105,19 +97,10 @@ class Parameters:
             if isinstance(value, float) and (value < 0.0 or (name in self.POSITIVE and value == 0.0)):
                 least = "above 0" if name in self.POSITIVE else "at least 0"
                 raise ValueError(f"{name} must be {least}, not {value:g}")
-        if self.dynamics.caution_gain_base <= 0.0:
-            raise ValueError(f"dynamics.caution_gain_base must be above 0, not {self.dynamics.caution_gain_base:g}")
-        if self.dynamics.caution_gain_slope < 0.0:
-            raise ValueError(
-                f"dynamics.caution_gain_slope must be at least 0, not {self.dynamics.caution_gain_slope:g}"
-            )
-        for name in ("th_concerned", "hurry", "haste_onset", "haste_full"):
-            value = getattr(self.dynamics, name)
-            if value < 0.0:
-                raise ValueError(f"dynamics.{name} must be at least 0, not {value:g}")
-        if not self.dynamics.haste_onset <= self.dynamics.haste_full <= 1.0:
-            onset, full = self.dynamics.haste_onset, self.dynamics.haste_full
-            raise ValueError(f"dynamics.haste_onset, {onset:g}, and dynamics.haste_full, {full:g}, must ascend up to 1")
+        if not self.haste_onset <= self.haste_full <= 1.0:
+            onset, full = self.haste_onset, self.haste_full
+            raise ValueError(f"haste_onset, {onset:g}, and haste_full, {full:g}, must ascend up to 1")
+        self.dynamics.check()
         if not 0.0 <= self.caution <= 1.0:
             raise ValueError(f"caution must lie in [0, 1], not {self.caution:g}")
 
@@ -130,7 +113,7 @@ class Parameters:
     @property
     def gain(self) -> float:
         """How strongly she reacts: 1 with the defaults."""
-        return self.dynamics.caution_gain_base + self.dynamics.caution_gain_slope * self.caution
+        return self.dynamics.gain(self.caution)
 
 
 class Behavior(Enum):
@@ -151,6 +134,7 @@ class Act(Enum):
     FINISH_ERRAND = auto()
     GIVE_UP = auto()
     TURN_HOME = auto()
+    COME_HOME = auto()
     JOKE = auto()
 
 
@@ -159,8 +143,8 @@ class Measures:
     """The progress measures."""
 
     hurried: bool = False
-    hurry: float = 0.0
-    """How strongly that concerns her."""
+    errand: float = 0.0
+    """The pressure of her errand itself."""
     blocked: float = 0.0
     """Time without progress on the way, as a share of her patience with that."""
     waiting: float = 0.0
@@ -188,17 +172,6 @@ WAIT, DRIVE, EXCHANGE, AWAIT, HOME = Behavior
 HAPPY, CONFIDENT, CONCERNED, FRUSTRATED = Emotion
 
 # fmt: off
-EMOTIONS: tuple[EmotionRow[Measures, Behavior], ...] = (
-    # Emotion state generator: the refiller's column of the paper's Table 2. The first row that holds counts.
-    EmotionRow((WAIT, EXCHANGE, HOME), lambda m: True,             HAPPY),
-    EmotionRow((DRIVE,),               lambda m: m.blocked >= 1.0, FRUSTRATED),
-    EmotionRow((DRIVE,),               lambda m: m.hurried or m.blocked >= m.th_concerned, CONCERNED),
-    EmotionRow((DRIVE,),               lambda m: True,             CONFIDENT),
-    EmotionRow((AWAIT,),               lambda m: m.waiting >= 1.0, FRUSTRATED),
-    EmotionRow((AWAIT,),               lambda m: m.waiting >= 0.5, CONCERNED),
-    EmotionRow((AWAIT,),               lambda m: True,             CONFIDENT),
-)
-
 TABLE: tuple[Row[Behavior, Context, Act], ...] = (
     # Behavior state generator.
     Row((WAIT, DRIVE),  lambda c: c.waiter_is_needy_here,             (Act.FINISH_ERRAND,), EXCHANGE),
@@ -207,7 +180,7 @@ TABLE: tuple[Row[Behavior, Context, Act], ...] = (
     Row((EXCHANGE,),    lambda c: c.exchange_is_over,                 (),                   AWAIT),
     Row((AWAIT,),       lambda c: c.sent_home,                        (Act.TURN_HOME,),     HOME),
     Row((AWAIT, DRIVE), lambda c: c.gives_up,                         (Act.GIVE_UP,),       HOME),
-    Row((HOME,),        lambda c: c.is_home,                          (),                   WAIT),
+    Row((HOME,),        lambda c: c.is_home,                          (Act.COME_HOME,),      WAIT),
     Row((WAIT, HOME),   lambda c: c.is_happy and c.has_joke,          (Act.JOKE,),          None),
 )
 
@@ -233,9 +206,11 @@ CROWD = "the crowd"
 """The name of what blocks her way."""
 
 
-def urgency(measures: Measures) -> float:
-    """How pressing her errand is."""
-    return max(measures.hurry, measures.blocked, measures.waiting)
+def urgency(measures: Measures, behavior: Behavior) -> float:
+    """How pressing her errand is: what is asked of her and how long her way is blocked; then how long she is kept waiting."""
+    if behavior is DRIVE:
+        return min(max(measures.errand, measures.blocked), 1.0)
+    return min(measures.waiting, 1.0) if behavior is AWAIT else 0.0
 
 
 class Leguin(CarsRobotInterface):
@@ -249,7 +224,9 @@ class Leguin(CarsRobotInterface):
             self.parameters.check()
         except ValueError as error:
             raise BadParameters(cars.name, str(error)) from None
-        self.esg = RuleGenerator(EMOTIONS, urgency, HAPPY)
+        self.esg = DynamicGenerator(self.parameters.dynamics, self.parameters.caution)
+        self.noted = self.shown = ""  # What happened, for the next emotion, and what the present one was shown.
+        self.progress: tuple[str, float] | None = None  # The last input that counted.
         self.bsg = BehaviorGenerator(TABLE, WAIT)
         self.measures = Measures()
         self.appraisal = Appraisal()
@@ -258,6 +235,7 @@ class Leguin(CarsRobotInterface):
         self.hurried = self.sent_home = False
         self.pending = ""
         self.way = Closing()  # How near she has come to her goal on this way.
+        self.comes_nearer = False
         self.waiting_s = 0.0  # How long she has waited to be sent home.
         self.trips = self.given_up = 0
         self.waiter = Peer(self.parameters.waiter)
@@ -301,7 +279,7 @@ class Leguin(CarsRobotInterface):
         self.observe_way(behavior, cars.tick_s)
         self.measures = Measures(
             hurried=self.hurried,
-            hurry=parameters.dynamics.hurry * parameters.gain if self.hurried else 0.0,
+            errand=max(parameters.hurry_pressure, parameters.errand_pressure) if self.hurried else parameters.errand_pressure,
             blocked=self.way.stalled_s * parameters.gain / parameters.block_patience_s if behavior is DRIVE else 0.0,
             waiting=self.waiting_s * parameters.gain / parameters.await_patience_s,
             th_concerned=parameters.dynamics.th_concerned,
@@ -319,7 +297,7 @@ class Leguin(CarsRobotInterface):
         elif measures.blocked >= measures.th_concerned:
             agency = CROWD
         return Appraisal(
-            goal_congruence=1.0 - 2.0 * min(urgency(measures), 1.0),
+            goal_congruence=1.0 - 2.0 * urgency(measures, self.bsg.current),
             controllability=1.0 - min(measures.blocked, 1.0),
             certainty=self.waiter.location_certainty(self.parameters.query_stale_s),
             agency=agency,
@@ -339,15 +317,43 @@ class Leguin(CarsRobotInterface):
         distance_m = None if goal is None else self.at.distance_m(goal)
         has_left = behavior is DRIVE and self.bsg.has_lasted(self.parameters.prep_s)
         if has_left or behavior is HOME:
-            self.way.observe(distance_m, self.parameters.progress_m, tick_s)
+            self.comes_nearer = self.way.observe(distance_m, self.parameters.progress_m, tick_s)
         else:
-            self.way = Closing()
+            self.way, self.comes_nearer = Closing(), False
 
     # Emotion.
 
     def update_emotion_state(self, cars: Cars) -> None:
-        if self.parameters.affect == "on":
-            self.esg.update(self.measures, self.bsg.current)
+        behavior, event = self.bsg.current, self.event()
+        if self.parameters.affect != "on":
+            return
+        pressure = None if behavior is EXCHANGE else urgency(self.measures, behavior)
+        self.esg.update(pressure, event, cars.tick_s)
+        if self.esg.progress is not None:
+            signed, is_event = self.esg.progress
+            self.progress = (self.shown if is_event else "falls behind", signed)
+
+    def event(self) -> Event | None:
+        """What happened since the last emotion, or else what this tick's measures say."""
+        behavior, dynamics = self.bsg.current, self.parameters.dynamics
+        measured = ""
+        if behavior is EXCHANGE and self.bsg.has_lasted(self.parameters.exchange_s):
+            measured = "exchange over"
+        elif self.comes_nearer:
+            measured = {DRIVE: "comes nearer", HOME: "nearer home"}[behavior]
+        self.shown, self.noted = self.noted or measured, ""
+        match self.shown:
+            case "exchange over":
+                return "achieved"
+            case "comes nearer":
+                return "easing"
+            case "nearer home":
+                return ("positive", dynamics.low_importance)
+            case "new errand" | "sent home" | "home":
+                return ("positive", dynamics.high_importance)
+            case "gives up" | "hurry":
+                return ("negative", dynamics.setback)
+        return None
 
     def emotion_state(self) -> str:
         return self.feeling.emotion.value if self.parameters.affect == "on" else "NEUTRAL"
@@ -378,9 +384,11 @@ class Leguin(CarsRobotInterface):
 
     def gives_up(self) -> bool:
         """Whether she turns back, by her policy."""
+        if not self.bsg.has_lasted(self.parameters.prep_s):
+            return False
         if self.parameters.acts_by == "emotion":
             return self.feeling.emotion is FRUSTRATED
-        is_over = self.measures.blocked >= 1.0 or self.measures.waiting >= 1.0
+        is_over = max(self.measures.blocked, self.measures.waiting) >= self.parameters.dynamics.th_frustrated
         return self.parameters.acts_by != "neither" and is_over
 
     def is_needed(self, cars: Cars) -> bool:
@@ -401,15 +409,21 @@ class Leguin(CarsRobotInterface):
         match act:
             case Act.TAKE_ERRAND:
                 self.hurried, self.pending = self.pending == HURRY, ""
+                self.noted = "hurry" if self.hurried else "new errand"
             case Act.HURRY:
                 self.hurried, self.pending = True, ""
+                self.noted = "hurry"
             case Act.FINISH_ERRAND:
                 self.hurried, self.pending, self.sent_home = False, "", False
             case Act.TURN_HOME:
                 self.trips, self.sent_home = self.trips + 1, False
+                self.noted = "sent home"
+            case Act.COME_HOME:
+                self.noted = "home"
             case Act.GIVE_UP:
                 self.given_up, self.hurried = self.given_up + 1, False
                 self.way = Closing()
+                self.noted = "gives up"
             case Act.JOKE:
                 cars.log(f"jokes: {JOKES[self.jokes.one_of(len(JOKES))]}")
                 self.until_joke_s = self.jokes.exponential(self.parameters.joke_mean_s)
@@ -452,7 +466,7 @@ class Leguin(CarsRobotInterface):
         faster she is; nothing else changes her speed."""
         parameters, dynamics = self.parameters, self.parameters.dynamics
         if parameters.policy == "emotion" and parameters.sensory_motor == "on":
-            return motor_gain(self.feeling, parameters.hurry_mult, dynamics.haste_onset, dynamics.haste_full)
+            return motor_gain(self.feeling, parameters.hurry_mult, parameters.haste_onset, parameters.haste_full)
         is_concerning = self.hurried or self.measures.blocked >= dynamics.th_concerned
         hurries = is_concerning if parameters.policy == "rules" else parameters.policy == "timer" and self.hurried
         return parameters.hurry_mult if hurries else 1.0
@@ -483,6 +497,8 @@ class Leguin(CarsRobotInterface):
             "home_x_m": self.home.x,
             "home_y_m": self.home.y,
         }
+        if self.progress is not None:
+            variables["progress_by"], variables["progress"] = self.progress
         return {**variables, **self.frame()} if self.parameters.affect == "on" else variables
 
     def frame(self) -> StateVariables:
@@ -511,6 +527,10 @@ class Leguin(CarsRobotInterface):
         x, y = number("home_x_m"), number("home_y_m")
         if x is not None and y is not None:
             self.home = Point(x, y)
+        urgency = number("urgency")
+        for emotion, tendency in TENDENCIES.items():
+            if self.parameters.affect == "on" and urgency is not None and tendency == last.get("action_tendency"):
+                self.esg.take_over(emotion, urgency)
         known = {behavior.value: behavior for behavior in Behavior}
         self.bsg = BehaviorGenerator(TABLE, known.get(str(last.get("behavior")), HOME))
         cars.log("is back, and takes over where the last one was lost")

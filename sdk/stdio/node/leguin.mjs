@@ -25,8 +25,12 @@ const PARAMETERS = {
   v_refill_mps: 3 * FT_M,
   hurry_mult: 1.5,
   prep_s: 1,
-  block_patience_s: 25,
-  await_patience_s: 20,
+  errand_pressure: 0.35,
+  hurry_pressure: 0.6,
+  haste_onset: 0.25,
+  haste_full: 0.55,
+  block_patience_s: 32,
+  await_patience_s: 26,
   progress_m: 0.5 * FT_M,
   arrive_m: 1.5 * FT_M,
   settle_s: 5,
@@ -38,12 +42,23 @@ const PARAMETERS = {
   joke_mean_s: 60,
 };
 const DYNAMICS = {
+  state_set: "murphy4", // The only one that she has here.
+  rho_max: 2,
   caution_gain_base: 0.5,
   caution_gain_slope: 1,
+  tau_up_s: 1.5,
+  tau_down_s: 3,
+  th_confident: 0.25,
   th_concerned: 0.45,
-  hurry: 0.6,
-  haste_onset: 0.25,
-  haste_full: 0.6,
+  th_frustrated: 0.75,
+  th_angry: 0.95,
+  anger_s: 15,
+  hysteresis: 0.08,
+  dwell_s: 1,
+  low_importance: 0.4,
+  high_importance: 0.75,
+  setback: 0.15,
+  hope_s: 15,
   label_cuts: [0.2, 0.4, 0.6, 0.8],
 };
 const JOKES = [
@@ -59,31 +74,31 @@ const FEELINGS = {
   CONCERNED: [true, "fearful", "monitor-progress-closely"],
   FRUSTRATED: [true, "angry", "change-current-strategy"],
 };
-const always = () => true;
-/** Emotion state generator: the refiller's column of the paper's Table 2. The first row that holds counts. */
-const EMOTIONS = [
-  [["WAIT", "EXCHANGE", "GO_HOME"], always, "HAPPY"],
-  [["REFILL"], (m) => m.blocked >= 1, "FRUSTRATED"],
-  [["REFILL"], (m) => m.hurried || m.blocked >= dynamics.th_concerned, "CONCERNED"],
-  [["REFILL"], always, "CONFIDENT"],
-  [["AWAIT_GO_HOME"], (m) => m.waiting >= 1, "FRUSTRATED"],
-  [["AWAIT_GO_HOME"], (m) => m.waiting >= 0.5, "CONCERNED"],
-  [["AWAIT_GO_HOME"], always, "CONFIDENT"],
+/** Emotions in the order in which the urgency leads to them, and the parameters with their thresholds. */
+const LADDER = [
+  ["HAPPY", null],
+  ["CONFIDENT", "th_confident"],
+  ["CONCERNED", "th_concerned"],
+  ["FRUSTRATED", "th_frustrated"],
 ];
 /** What she has done before on a way counts no more. */
-const NO_WAY = { stalledS: 0, nearestM: null };
+const NO_WAY = { stalledS: 0, nearestM: null, comesNearer: false };
 const finishErrand = () => set({ hurried: false, pending: "", sentHome: false });
-const turnHome = () => set({ trips: her.trips + 1, sentHome: false });
-const giveUp = () => set({ givenUp: her.givenUp + 1, hurried: false, ...NO_WAY });
+const turnHome = () => set({ trips: her.trips + 1, sentHome: false, noted: "sent home" });
+const giveUp = () => set({ givenUp: her.givenUp + 1, hurried: false, noted: "gives up", ...NO_WAY });
+const takeErrand = ({ pending }) => {
+  const hurried = pending === "hurry";
+  set({ hurried, pending: "", noted: hurried ? "hurry" : "new errand" });
+};
 /** Behavior state generator: a row that applies acts, and goes where it says; without a place it reads on. */
 const BEHAVIORS = [
   [["WAIT", "REFILL"], (c) => c.waiterIsNeedyHere, finishErrand, "EXCHANGE"],
-  [["WAIT"], (c) => c.pending !== "", (c) => set({ hurried: c.pending === "hurry", pending: "" }), "REFILL"],
-  [["REFILL"], (c) => c.pending === "hurry", () => set({ hurried: true, pending: "" }), null],
+  [["WAIT"], (c) => c.pending !== "", takeErrand, "REFILL"],
+  [["REFILL"], (c) => c.pending === "hurry", () => set({ hurried: true, pending: "", noted: "hurry" }), null],
   [["EXCHANGE"], (c) => c.exchangeIsOver, () => {}, "AWAIT_GO_HOME"],
   [["AWAIT_GO_HOME"], (c) => c.sentHome, turnHome, "GO_HOME"],
   [["AWAIT_GO_HOME", "REFILL"], (c) => c.givesUp, giveUp, "GO_HOME"],
-  [["GO_HOME"], (c) => c.isHome, () => {}, "WAIT"],
+  [["GO_HOME"], (c) => c.isHome, () => set({ noted: "home" }), "WAIT"],
   [["WAIT", "GO_HOME"], (c) => c.isHappy && c.hasJoke, joke, null],
 ];
 
@@ -299,27 +314,35 @@ function observeWay() {
   if (!hasLeft && her.behavior !== "GO_HOME") return set(NO_WAY);
   her.stalledS += told.tick_s;
   const awayM = goal() && distanceM(her.at, goal());
-  if (awayM !== null && (her.nearestM === null || awayM <= her.nearestM - parameters.progress_m)) {
-    set({ nearestM: awayM, stalledS: 0 });
-  }
+  const isProgress = awayM !== null && (her.nearestM === null || awayM <= her.nearestM - parameters.progress_m);
+  her.comesNearer = isProgress && her.nearestM !== null;
+  if (isProgress) set({ nearestM: awayM, stalledS: 0 });
 }
 
 function measure() {
   const { hurried, behavior } = her;
   const gain = dynamics.caution_gain_base + dynamics.caution_gain_slope * parameters.caution;
-  const hurry = hurried ? dynamics.hurry * gain : 0;
+  const { errand_pressure, hurry_pressure } = parameters;
+  const errand = hurried ? Math.max(hurry_pressure, errand_pressure) : errand_pressure;
   const blocked = behavior === "REFILL" ? (her.stalledS * gain) / parameters.block_patience_s : 0;
   const waiting = (her.waitingS * gain) / parameters.await_patience_s;
-  her.measures = { hurried, blocked, waiting, urgency: Math.min(Math.max(hurry, blocked, waiting), 1) };
+  her.measures = { hurried, errand, blocked, waiting };
+}
+
+/** How pressing her errand is. */
+function pressure() {
+  const { errand, blocked, waiting } = her.measures;
+  if (her.behavior === "REFILL") return Math.min(Math.max(errand, blocked), 1);
+  return her.behavior === "AWAIT_GO_HOME" ? Math.min(waiting, 1) : 0;
 }
 
 /** How she judges the moment: who is responsible is the waiter if he hurries her or keeps her waiting, or the crowd. */
 function appraisal() {
-  const { hurried, blocked, waiting, urgency } = her.measures;
+  const { hurried, blocked, waiting } = her.measures;
   const isOfCrowd = blocked >= dynamics.th_concerned;
   const age = her.unseenS === 0 ? 0 : Math.min(her.unseenS / parameters.query_stale_s, 1);
   return {
-    goal_congruence: 1 - 2 * urgency,
+    goal_congruence: 1 - 2 * her.judgedPressure,
     controllability: 1 - Math.min(blocked, 1),
     certainty: her.waiter === null ? 0 : 1 - age,
     agency: hurried || waiting >= 0.5 ? parameters.waiter : isOfCrowd ? "the crowd" : "self",
@@ -332,10 +355,81 @@ const hasAffect = () => parameters.affect === "on";
 const isNegative = () => FEELINGS[her.emotion][0];
 const intensity = () => (isNegative() ? her.urgency : 1 - her.urgency);
 
+/** What happened since the last emotion, or else what this tick's measures say. */
+function input() {
+  const isOver = her.behavior === "EXCHANGE" && hasLasted(parameters.exchange_s);
+  const nearer = her.behavior === "REFILL" ? "comes nearer" : "nearer home";
+  const shown = her.noted || (isOver ? "exchange over" : her.comesNearer ? nearer : "");
+  her.noted = "";
+  return shown;
+}
+
+const leaveBelow = (rung) => (rung === 0 ? 0 : dynamics[LADDER[rung][1]]) - dynamics.hysteresis;
+const rungOf = (emotion) => LADDER.findIndex(([name]) => name === emotion);
+
+/** How an input changes the urgency, and how far it may fall from now on. */
+function respond(shown, target, before, gain) {
+  let urgency = before;
+  if (target !== null) {
+    const tauS = target > before ? dynamics.tau_up_s / gain : dynamics.tau_down_s;
+    urgency = before + (target - before) * (1 - exp(-told.tick_s / tauS));
+  }
+  const behind = target !== null && target > before ? ["falls behind", before - target] : null;
+  const positive = (importance, limit, jumps = true) => {
+    her.floor = Math.min(her.floor, limit);
+    return { urgency: jumps ? Math.min(urgency, limit) : urgency, counted: [shown, importance] };
+  };
+  const { low_importance: low, high_importance: high, setback } = dynamics;
+  if (["new errand", "sent home", "home"].includes(shown)) return positive(high, 1 - high);
+  if (shown === "nearer home") return positive(low, 1 - low);
+  if (["hurry", "gives up"].includes(shown)) return { urgency: urgency + gain * setback, counted: [shown, -setback] };
+  if (shown === "comes nearer" && target !== null && target < before) return positive(1 - target, target, false);
+  return { urgency, counted: behind };
+}
+
+/** Emotion state generator: the urgency follows the pressure and leads up and down the ladder. FRUSTRATED is left by positive inputs
+    only, as far as they are important. */
 function updateEmotion() {
+  const shown = input();
+  her.judgedPressure = pressure();
   if (!hasAffect()) return;
-  const row = EMOTIONS.find(([during, when]) => during.includes(her.behavior) && when(her.measures));
-  set({ emotion: row[2], urgency: her.measures.urgency });
+  her.unchangedS += told.tick_s;
+  const rung = rungOf(her.emotion);
+  if (shown === "exchange over") {
+    if (rung !== 0) her.unchangedS = 0;
+    return set({ emotion: "HAPPY", urgency: 0, floor: 0, progress: [shown, 1] });
+  }
+  const before = her.urgency;
+  const gain = dynamics.caution_gain_base + dynamics.caution_gain_slope * parameters.caution;
+  const { urgency, counted } = respond(shown, her.behavior === "EXCHANGE" ? null : pressure(), before, gain);
+  her.urgency = Math.min(Math.max(urgency, Math.min(before, her.floor), 0), 1);
+  her.progress = counted ?? her.progress;
+  if (her.unchangedS + 1e-9 < dynamics.dwell_s) return;
+  let next = rung;
+  if (next + 1 < LADDER.length && her.urgency >= dynamics[LADDER[next + 1][1]]) next++;
+  else while (next > 0 && her.urgency < leaveBelow(next)) next--;
+  if (next === rung) return;
+  set({ emotion: LADDER[next][0], unchangedS: 0 });
+  if (!isNegative()) her.floor = 0;
+  else if (her.emotion === "FRUSTRATED") her.floor = Math.max(leaveBelow(next), 0);
+}
+
+// Copyright (C) 2004 by Sun Microsystems, Inc. All rights reserved. Permission to use, copy, modify, and distribute this software is
+// freely granted, provided that this notice is preserved.
+/** The exponential of a number that is not above 0, to the last bit as in Rust: FreeBSD's e_exp.c. */
+function exp(x) {
+  if (x < -708) return 0;
+  let k = 0;
+  if (-x >= 1.0397205352783203) k = Math.trunc(1.4426950408889634 * x - 0.5); // 1.5 ln 2, to the bits that are compared
+  else if (-x >= 0.3465735912322998) k = -1; // 0.5 ln 2
+  else if (-x < 3.725293851175593e-9) return 1 + x;
+  const high = x - k * 6.93147180369123816490e-1;
+  const low = k * 1.90821492927058770002e-10;
+  const r = high - low;
+  const rr = r * r;
+  const inner = 6.61375632143793436117e-5 + rr * (-1.65339022054652515390e-6 + rr * 4.13813679705723846039e-8);
+  const c = r - rr * (1.66666666666666019037e-1 + rr * (-2.77777777770155933842e-3 + rr * inner));
+  return (1 + ((r * c) / (2 - c) - low + high)) * 2 ** k;
 }
 
 function updateBehavior() {
@@ -346,10 +440,11 @@ function updateBehavior() {
   const isCertain = her.isSensed || (told.sensing_range_m < radiusM && her.unseenS === 0);
   const isHere = isCertain && her.waiter !== null && distanceM(her.at, her.waiter) <= radiusM;
   const awayM = distanceM(her.at, her.home);
-  const isOver = blocked >= 1 || waiting >= 1;
+  const hasSetOut = hasLasted(parameters.prep_s);
+  const isOver = Math.max(blocked, waiting) >= dynamics.th_frustrated;
   const actsByRules = policy === "rules" || policy === "timer";
   const context = {
-    givesUp: policy === "emotion" ? isEmotional && her.emotion === "FRUSTRATED" : actsByRules && isOver,
+    givesUp: hasSetOut && (policy === "emotion" ? isEmotional && her.emotion === "FRUSTRATED" : actsByRules && isOver),
     isHappy: isEmotional && her.emotion === "HAPPY",
     pending: her.pending,
     // Vonda does not step in for Leguin.
@@ -375,8 +470,8 @@ function joke() {
 
 /** The factor on her speed. By emotion, the stronger her concern, the faster she is. */
 function haste() {
-  const { policy, hurry_mult: most, sensory_motor } = parameters;
-  const { haste_onset: onset, haste_full: full, th_concerned } = dynamics;
+  const { policy, hurry_mult: most, sensory_motor, haste_onset: onset, haste_full: full } = parameters;
+  const { th_concerned } = dynamics;
   if (policy === "emotion") {
     if (sensory_motor !== "on") return 1;
     const felt = intensity();
@@ -443,6 +538,7 @@ async function finishTick() {
       behavior: her.behavior,
       home_x_m: her.home.x,
       home_y_m: her.home.y,
+      ...(her.progress ? { progress_by: her.progress[0], progress: her.progress[1] } : {}),
       ...(hasAffect() ? frame : {}),
     },
   });
@@ -484,7 +580,12 @@ async function begin(init) {
     waitingS: 0,
     emotion: "HAPPY",
     urgency: 0,
-    measures: { hurried: false, blocked: 0, waiting: 0, urgency: 0 },
+    floor: 0, // What the urgency does not fall below until there is a positive input.
+    unchangedS: 0,
+    noted: "", // What happened, for the next emotion.
+    progress: null, // The last input that counted: its name, and its importance with its sign.
+    judgedPressure: 0,
+    measures: { hurried: false, errand: 0, blocked: 0, waiting: 0 },
     hurried: false,
     sentHome: false,
     pending: "",
@@ -502,6 +603,11 @@ async function begin(init) {
   const isErrand = last.pending === "refill" || last.pending === "hurry";
   set({ hurried: last.hurried === true, pending: isErrand ? last.pending : "" });
   set({ trips: last.trips ?? 0, givenUp: last.given_up ?? 0, behavior: last.behavior ?? "GO_HOME" });
+  const felt = Object.entries(FEELINGS).find(([, feeling]) => feeling[2] === last.action_tendency);
+  if (hasAffect() && felt && typeof last.urgency === "number") {
+    set({ emotion: felt[0], urgency: last.urgency });
+    her.floor = isNegative() ? Math.max(leaveBelow(rungOf(felt[0])), 0) : 0;
+  }
   her.home = { x: last.home_x_m ?? her.home.x, y: last.home_y_m ?? her.home.y };
   log("is back, and takes over where the last one was lost");
 }

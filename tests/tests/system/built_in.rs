@@ -161,7 +161,15 @@ fn init_writes_all_files_and_replaces_none() {
 #[test]
 fn every_name_can_be_checked_and_an_unknown_one_shows_them() {
     let lab = Lab::new();
-    for name in ["hors_doeuvres", "museum", "deliberate", "affect", "crowd"] {
+    for name in [
+        "hors_doeuvres",
+        "museum",
+        "crowded_hall",
+        "walled_hall",
+        "deliberate",
+        "affect",
+        "crowd",
+    ] {
         let (code, text) = elsewhere_without_out(&lab, &["check", name]);
         assert_eq!(code, 0, "{name}: {text}");
     }

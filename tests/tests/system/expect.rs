@@ -10,6 +10,8 @@ const OVERLAP: &str = "no robot overlaps another";
 const CALL: &str = "a call is answered or escalated";
 const HEALED: &str = "after a partition has healed, treats are exchanged";
 const PROGRESS: &str = "no robot stays in a behavior without progress";
+const BUTLER_PLEASED: &str = "Butler's frustration ends well only by a positive input";
+const LEGUIN_PLEASED: &str = "Leguin's frustration ends well only by a positive input";
 
 /// Robots that call once and then wait for each other, cut off while Butler calls: one lost message stops their work.
 const BROKEN: [&str; 6] = [
@@ -33,7 +35,7 @@ fn verdicts(lab: &Lab, run: &str) -> Vec<(String, String)> {
     verdicts
 }
 
-fn named(pairs: [(&str, &str); 4]) -> Vec<(String, String)> {
+fn named<const N: usize>(pairs: [(&str, &str); N]) -> Vec<(String, String)> {
     let pairs = pairs.map(|(name, verdict)| (name.to_owned(), verdict.to_owned()));
     pairs.to_vec()
 }
@@ -56,7 +58,9 @@ fn the_hall_does_what_is_expected_of_it() {
             (OVERLAP, "pass"),
             (CALL, "pass"),
             (HEALED, "not_asked"),
-            (PROGRESS, "pass")
+            (PROGRESS, "pass"),
+            (BUTLER_PLEASED, "pass"),
+            (LEGUIN_PLEASED, "not_asked")
         ])
     );
     let line = format!("not asked  {HEALED}: nothing that it is expected after happened until");
@@ -100,6 +104,8 @@ fn a_team_that_stops_working_fails_in_one_process_and_as_processes() {
             (PROGRESS, "fail"),
             (HEALED, "fail"),
             (OVERLAP, "pass"),
+            (BUTLER_PLEASED, "pass"),
+            (LEGUIN_PLEASED, "not_asked"),
         ])
     );
 
@@ -125,7 +131,7 @@ fn a_team_that_stops_working_fails_in_one_process_and_as_processes() {
     for line in text.lines() {
         assert!(table.contains(line), "{line} is not in\n{table}");
     }
-    assert_eq!(text.lines().count(), 4);
+    assert_eq!(text.lines().count(), 6);
 
     let other = lab.write(
         "other.toml",
@@ -154,7 +160,7 @@ fn what_the_end_of_a_run_leaves_open_is_undecided() {
     lab.ok(&["ctl", "stop", "--run", "stopped"]);
     assert_eq!(launch.wait().code(), Some(2), "{}", launch.printed());
     let undecided = verdicts(&lab, "stopped");
-    assert_eq!(undecided.len(), 4);
+    assert_eq!(undecided.len(), 6);
     assert!(undecided.iter().all(|(_, verdict)| verdict == "undecided"));
 }
 

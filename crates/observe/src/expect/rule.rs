@@ -54,6 +54,15 @@ pub enum Rule {
         /// Events that end the wait: the condition is not waited for any longer. Empty if there are none.
         unless: Vec<Pattern>,
     },
+    /// In the ticks after each event that matches, the condition does not hold before the other one has.
+    NeverUntil {
+        /// Events from each of which on the condition must not hold; one of these patterns matches.
+        trigger: Vec<Pattern>,
+        /// What must not hold.
+        condition: TickCondition,
+        /// What ends the watch: from its tick on, the condition may hold.
+        until: TickCondition,
+    },
 }
 
 /// An expectation that cannot be checked, or of another run.
@@ -73,7 +82,12 @@ pub enum ExpectError {
     /// `eventually` without a time.
     #[error("`eventually` needs a time: `within = \"60 s\"`")]
     NoTime,
-    /// `after`, `within` or `unless` without the key that it belongs to.
+    /// `after` with `never`, without what ends the watch.
+    #[error(
+        "`never` with `after` needs what ends it: `until = …`; without `after` it is for the whole run"
+    )]
+    NoUntil,
+    /// `after`, `within`, `unless` or `until` without the key that it belongs to.
     #[error("`{0}` belongs to `{1}`")]
     Alone(&'static str, &'static str),
     /// The time is negative.
@@ -122,6 +136,8 @@ struct RuleTable {
     within: Option<Time>,
     #[serde(skip_serializing_if = "Option::is_none")]
     unless: Option<Patterns>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    until: Option<TickCondition>,
 }
 
 /// A pattern, or a list of which one has to match.
@@ -179,22 +195,39 @@ impl RuleTable {
             return Err(ExpectError::Negative);
         }
 
-        if self.eventually.is_none() {
-            for (key, is_given) in [
-                ("within", within.is_some()),
-                ("after", self.after.is_some()),
-            ] {
-                if is_given {
-                    return Err(ExpectError::Alone(key, "eventually"));
-                }
+        let has_after = self.after.is_some();
+        let has_never = self.never.is_some();
+        let has_eventually = self.eventually.is_some();
+        for (key, is_given, of, is_there) in [
+            ("within", within.is_some(), "eventually", has_eventually),
+            (
+                "after",
+                has_after,
+                "eventually",
+                has_eventually || has_never,
+            ),
+            ("unless", self.unless.is_some(), "after", has_after),
+            (
+                "unless",
+                self.unless.is_some(),
+                "eventually",
+                has_eventually,
+            ),
+            ("until", self.until.is_some(), "after", has_after),
+            ("until", self.until.is_some(), "never", has_never),
+        ] {
+            if is_given && !is_there {
+                return Err(ExpectError::Alone(key, of));
             }
-        }
-        if self.after.is_none() && self.unless.is_some() {
-            return Err(ExpectError::Alone("unless", "after"));
         }
 
         match (self.never, self.always, self.eventually, self.after) {
             (Some(condition), None, None, None) => Ok(Rule::Never(observed(condition)?)),
+            (Some(condition), None, None, Some(after)) => Ok(Rule::NeverUntil {
+                trigger: patterns("after", after)?,
+                condition: observed(condition)?,
+                until: observed(self.until.ok_or(ExpectError::NoUntil)?)?,
+            }),
             (None, Some(condition), None, None) => {
                 if condition.patterns().next().is_some() {
                     return Err(ExpectError::AlwaysEvent);
@@ -256,6 +289,7 @@ impl From<Expectation> for RuleTable {
             eventually: None,
             within: None,
             unless: None,
+            until: None,
         };
 
         match expectation.rule {
@@ -275,6 +309,15 @@ impl From<Expectation> for RuleTable {
                 table.eventually = Some(condition);
                 table.within = Some(within);
                 table.unless = (!unless.is_empty()).then_some(Patterns(unless));
+            }
+            Rule::NeverUntil {
+                trigger,
+                condition,
+                until,
+            } => {
+                table.after = Some(Patterns(trigger));
+                table.never = Some(condition);
+                table.until = Some(until);
             }
         }
         table
@@ -299,12 +342,8 @@ impl Expectation {
     /// Whether it depends on what robots report and where they are, and not on events alone.
     #[must_use]
     pub fn needs_states(&self) -> bool {
-        match &self.rule {
-            Rule::Never(condition) | Rule::Always(condition) => condition.needs_states(),
-            Rule::Eventually { condition, .. } | Rule::After { condition, .. } => {
-                condition.needs_states()
-            }
-        }
+        let (conditions, _) = self.parts();
+        conditions.iter().any(|condition| condition.needs_states())
     }
 
     /// Checks it as an entry that follows others.
@@ -318,20 +357,32 @@ impl Expectation {
         self.check(roster)
     }
 
-    /// The words that robots choose and that it names.
-    pub(crate) fn words(&self) -> Vec<Word> {
-        let (condition, patterns): (_, Vec<&Pattern>) = match &self.rule {
-            Rule::Never(condition) | Rule::Always(condition) => (condition, Vec::new()),
-            Rule::Eventually { condition, .. } => (condition, Vec::new()),
+    /// Its conditions and its patterns.
+    fn parts(&self) -> (Vec<&TickCondition>, Vec<&Pattern>) {
+        match &self.rule {
+            Rule::Never(condition) | Rule::Always(condition) => (vec![condition], Vec::new()),
+            Rule::Eventually { condition, .. } => (vec![condition], Vec::new()),
             Rule::After {
                 trigger,
                 condition,
                 unless,
                 ..
-            } => (condition, trigger.iter().chain(unless).collect()),
-        };
+            } => (vec![condition], trigger.iter().chain(unless).collect()),
+            Rule::NeverUntil {
+                trigger,
+                condition,
+                until,
+            } => (vec![condition, until], trigger.iter().collect()),
+        }
+    }
 
-        let mut named = condition.words();
+    /// The words that robots choose and that it names.
+    pub(crate) fn words(&self) -> Vec<Word> {
+        let (conditions, patterns) = self.parts();
+        let mut named = Vec::new();
+        for condition in conditions {
+            named.extend(condition.words());
+        }
         for pattern in patterns {
             named.extend(pattern.words());
         }
@@ -340,24 +391,14 @@ impl Expectation {
 
     /// The robots that it names.
     fn robots(&self) -> Vec<&str> {
+        let (conditions, patterns) = self.parts();
         let mut robots = Vec::new();
-        let condition = match &self.rule {
-            Rule::Never(condition) | Rule::Always(condition) => condition,
-            Rule::Eventually { condition, .. } => condition,
-            Rule::After {
-                trigger,
-                condition,
-                unless,
-                ..
-            } => {
-                for pattern in trigger.iter().chain(unless) {
-                    robots.extend(pattern.robots());
-                }
-                condition
-            }
-        };
-
-        robots.extend(condition.robots());
+        for pattern in patterns {
+            robots.extend(pattern.robots());
+        }
+        for condition in conditions {
+            robots.extend(condition.robots());
+        }
         robots
     }
 }

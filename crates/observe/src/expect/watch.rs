@@ -40,12 +40,22 @@ pub struct Monitor {
     now: Tick,
     /// The earliest event after which the condition has not held yet, if it is waited for.
     pending: Option<OpenCheck>,
+    /// What ends a watch, if there are watches.
+    until: Option<Until>,
     /// How many waits events have begun.
     asked: u64,
     /// How many times the condition held after an event.
     met: u64,
     /// The longest wait, ticks.
     longest: Tick,
+}
+
+/// What ends a watch.
+#[derive(Debug, Clone)]
+struct Until {
+    condition: Evaluation,
+    /// The condition that must not hold and this one, as each watch begins with them.
+    fresh: (Evaluation, Evaluation),
 }
 
 #[derive(Debug, Clone)]
@@ -62,11 +72,25 @@ impl Monitor {
         let rule = expectation.rule.clone();
         let condition = match &rule {
             Rule::Never(condition) | Rule::Always(condition) => condition,
-            Rule::Eventually { condition, .. } | Rule::After { condition, .. } => condition,
+            Rule::Eventually { condition, .. }
+            | Rule::After { condition, .. }
+            | Rule::NeverUntil { condition, .. } => condition,
+        };
+        let condition = Evaluation::new(condition, tick_s, body_m, roster);
+        let until = match &rule {
+            Rule::NeverUntil { until, .. } => {
+                let until = Evaluation::new(until, tick_s, body_m, roster);
+                Some(Until {
+                    fresh: (condition.clone(), until.clone()),
+                    condition: until,
+                })
+            }
+            _ => None,
         };
 
         Self {
-            condition: Evaluation::new(condition, tick_s, body_m, roster),
+            condition,
+            until,
             rule,
             tick_s,
             now: 0,
@@ -81,6 +105,11 @@ impl Monitor {
     /// decided; it must not be called after that.
     pub fn observe(&mut self, seen: &Observation<'_>) -> Option<Judgment> {
         self.now = seen.tick;
+        if let Rule::NeverUntil { trigger, .. } = &self.rule {
+            let triggered = first_event(trigger, seen);
+            return self.observe_until(triggered, seen);
+        }
+
         // In every tick, whether it is asked for or not: some conditions depend on the ticks before.
         let held = self.condition.holds(seen);
 
@@ -106,7 +135,40 @@ impl Monitor {
                 let within = *within;
                 self.observe_after(held.is_some(), triggered, is_over, within)
             }
+            Rule::NeverUntil { .. } => None,
         }
+    }
+
+    /// The tick of the event itself does not count. Conditions are evaluated only during a watch, each from their beginning.
+    fn observe_until(
+        &mut self,
+        triggered: Option<String>,
+        seen: &Observation<'_>,
+    ) -> Option<Judgment> {
+        let until = self.until.as_mut()?;
+        if let Some(open) = &self.pending {
+            let held = self.condition.holds(seen);
+            if until.condition.holds(seen).is_some() {
+                self.pending = None;
+                self.met += 1;
+            } else if let Some(reason) = held {
+                let because = format!(
+                    "{}: {reason}, after {}: {}",
+                    self.place(seen.tick),
+                    self.place(open.since),
+                    open.event
+                );
+                return Some(Judgment::new(Verdict::Fail, because));
+            }
+        }
+
+        if let (None, Some(event)) = (&self.pending, triggered) {
+            let since = seen.tick;
+            self.pending = Some(OpenCheck { since, event });
+            self.asked += 1;
+            (self.condition, until.condition) = until.fresh.clone();
+        }
+        None
     }
 
     fn observe_always(&self, holds: bool) -> Option<Judgment> {
@@ -181,8 +243,9 @@ impl Monitor {
     #[must_use]
     pub fn end(&self, end: End) -> Judgment {
         let here = self.place(self.now);
+        let is_watch = self.until.is_some();
         // What is open is looked at first: even in a run that was long enough, its time was not over.
-        if let Some(pending) = &self.pending {
+        if let Some(pending) = self.pending.as_ref().filter(|_| !is_watch) {
             let because = format!(
                 "the run ended at {here}, and it had not happened after {}: {}",
                 self.place(pending.since),
@@ -199,12 +262,12 @@ impl Monitor {
             return Judgment::new(Verdict::Undecided, because);
         }
         if let Some(unknown) = self.condition.unknown()
-            && !matches!(self.rule, Rule::After { .. })
+            && !matches!(self.rule, Rule::After { .. } | Rule::NeverUntil { .. })
         {
             return Judgment::new(Verdict::Undecided, unknown.to_owned());
         }
 
-        if let Rule::After { .. } = self.rule
+        if let Rule::After { .. } | Rule::NeverUntil { .. } = self.rule
             && self.asked == 0
         {
             let because = format!("nothing that it is expected after happened until {here}");
@@ -213,6 +276,10 @@ impl Monitor {
 
         let because = match &self.rule {
             Rule::Never(_) => format!("it did not happen until {here}"),
+            Rule::NeverUntil { .. } => format!(
+                "it did not happen in any watch ({}) until {here}",
+                self.asked
+            ),
             Rule::Always(_) => format!("it held until {here}"),
             Rule::After { .. } if self.met == 0 => {
                 format!(

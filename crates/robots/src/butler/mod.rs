@@ -28,6 +28,7 @@ use crate::commands::{GO_HOME, HURRY, REFILL, shortened};
 use crate::drive::StraightDrive;
 use crate::emotion::SwitchableGenerator;
 use crate::frame::{self, publish_variables};
+use crate::input::Input;
 use crate::panel;
 use crate::policy::{Policy, Urge};
 use crate::published::text;
@@ -44,7 +45,7 @@ const JOKES: &[&str] = &[
 /// The waiter.
 pub struct Butler {
     parameters: ButlerParameters,
-    emotion: SwitchableGenerator<DynamicGenerator<ButlerMeasures, ButlerBehavior, StandardEmotion>>,
+    emotion: SwitchableGenerator<ButlerMeasures, ButlerBehavior>,
     bsg: BehaviorGenerator<ButlerBehavior, ButlerContext, ButlerAct>,
     deliberator: Deliberator,
     state: ButlerMemory,
@@ -108,8 +109,10 @@ impl CarsRobotInterface for Butler {
     }
 
     fn update_emotion_state(&mut self, cars: &mut Cars<'_>) {
-        self.emotion
+        let progress = self
+            .emotion
             .update(&self.state.measures, self.bsg.current(), cars);
+        self.state.inputs.record(progress);
         self.state.appraisal = self.appraisal(cars);
         // A plan is a matter of what he feels.
         if self.deliberator.plans() && self.parameters.policy() == Policy::Emotion {
@@ -171,6 +174,7 @@ impl Robot for Butler {
 
     fn resume(&mut self, cars: &mut Cars<'_>, last: &StateVariables) {
         self.state.take_over(last, self.parameters.treat_capacity);
+        self.emotion.take_over(last);
 
         // An exchange cannot be resumed in the middle; its need is still there, and the refiller may still be near.
         let was_going_back = text(last, "behavior") == Some(ButlerBehavior::GoBack.name());
@@ -364,19 +368,21 @@ impl Butler {
         let state = &mut self.state;
 
         let behavior = state.refiller.behavior(self.parameters.query_stale_s);
+        let mut comes_nearer = false;
         if state.need && !is_busy(behavior) {
             let way_to_go_m = distance_m.map(|_| -state.come_m);
-            state.errand.observe(way_to_go_m, progress_m, tick_s);
+            comes_nearer = state.errand.observe(way_to_go_m, progress_m, tick_s);
         } else {
             state.come_m = 0.0;
             state.errand = Closing::default();
         }
 
         if is_intercepting {
-            state.chase.observe(distance_m, progress_m, tick_s);
+            comes_nearer |= state.chase.observe(distance_m, progress_m, tick_s);
         } else {
             state.chase = Closing::default();
         }
+        state.comes_nearer = comes_nearer;
     }
 
     fn measure(&mut self, cars: &Cars<'_>) {
@@ -388,12 +394,20 @@ impl Butler {
         let exchange_is_over = self.behavior() == ButlerBehavior::Exchange
             && self.bsg.has_lasted(self.parameters.exchange_s);
 
+        let measured = match (exchange_is_over, self.state.comes_nearer) {
+            (true, _) => Some(Input::ExchangeOver),
+            (false, true) => Some(Input::ComesNearer),
+            (false, false) => None,
+        };
+        let event = self.state.inputs.show(measured, &self.parameters.dynamics);
+
         self.state.measures = ButlerMeasures {
             rate_per_s,
             time_to_empty_s,
             time_to_refill_s,
             need_ratio: need_ratio(time_to_refill_s, time_to_empty_s, rate_per_s),
             exchange_is_over,
+            event,
             belief: None,
         };
     }
@@ -599,6 +613,7 @@ impl Butler {
                 state.gave_up = state.gave_up.saturating_add(1);
                 state.rest_s = self.parameters.intercept_again_s;
                 state.mind.abandon();
+                state.inputs.note(Input::GivesUp);
             }
             ButlerAct::Joke => {
                 state.jokes.tell(JOKES, self.parameters.joke_mean_s, cars);

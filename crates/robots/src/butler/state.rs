@@ -14,6 +14,7 @@ use super::tables::{ButlerBehavior, ButlerMeasures};
 use crate::chance::Chance;
 use crate::closing::Closing;
 use crate::drive::Drive;
+use crate::input::Inputs;
 use crate::jokes::Jokes;
 use crate::panel::SPARKLINE_LEN;
 use crate::peer::Peer;
@@ -56,6 +57,9 @@ pub(super) struct ButlerMemory {
     pub(super) errand: Closing,
     /// The distance of the refiller since he began to intercept.
     pub(super) chase: Closing,
+    /// Whether one of the two made progress in this tick.
+    pub(super) comes_nearer: bool,
+    pub(super) inputs: Inputs,
     pub(super) until_tap_s: f64,
     pub(super) rate: RateEstimator,
     pub(super) approach: ApproachEstimator,
@@ -101,6 +105,8 @@ impl ButlerMemory {
             come_m: 0.0,
             errand: Closing::default(),
             chase: Closing::default(),
+            comes_nearer: false,
+            inputs: Inputs::default(),
             until_tap_s: parameters.treat_mean_s,
             rate: RateEstimator::new(parameters.rate())?,
             approach: ApproachEstimator::new(parameters.approach())?,
@@ -206,6 +212,7 @@ impl ButlerMemory {
             variables.insert("table_x_m", table.x.into());
             variables.insert("table_y_m", table.y.into());
         }
+        self.inputs.publish(&mut variables);
         if let Some(belief) = self.mind.belief() {
             variables.insert("belief", belief.into());
         }
@@ -216,7 +223,7 @@ impl ButlerMemory {
         variables
     }
 
-    /// Continues from what a lost incarnation published. Estimates and emotion recover by themselves within seconds.
+    /// Continues from what a lost incarnation published. Estimates recover by themselves within seconds.
     pub(super) fn take_over(&mut self, last: &StateVariables, capacity: u32) {
         self.treats = number(last, "treats")
             .map_or(capacity, saturated)

@@ -145,6 +145,8 @@ pub struct ButlerMeasures {
     pub need_ratio: f64,
     /// Whether an exchange has just been completed.
     pub exchange_is_over: bool,
+    /// What else happened: the input of his emotion besides the need.
+    pub event: Option<ProgressEvent>,
     /// What he believes of himself; `None` if he does not deliberate.
     pub belief: Option<Belief>,
 }
@@ -157,12 +159,11 @@ pub fn appraise(measures: &ButlerMeasures, behavior: &ButlerBehavior) -> Stimulu
     } else {
         StepInput::Need(measures.need_ratio)
     };
-    let event = measures
-        .exchange_is_over
-        .then_some(ProgressEvent::GoalAchieved);
 
     // He blames the refiller for an empty tray [D: FRUSTRATED at the assistant].
-    let stimulus = Stimulus::new(drive).with_event(event).with_blame(true);
+    let stimulus = Stimulus::new(drive)
+        .with_event(measures.event)
+        .with_blame(true);
     Stimulus {
         belief: measures.belief,
         ..stimulus

@@ -9,16 +9,18 @@ mod tables;
 use affect::akr::Agency;
 use affect::behavior::{BehaviorGenerator, BehaviorState};
 use affect::levels::{SensoryMotor, SensoryMotorParameters};
-use affect::{AffectFrame, Circumstances, Feeling, RuleGenerator, StandardEmotion};
+use affect::{
+    AffectFrame, Circumstances, DynamicGenerator, Dynamics, EmotionState, Feeling, StandardEmotion,
+};
 use robot::{
     Action, BadParameters, Cars, CarsRobotInterface, Panel, ParametersCheck, Point, Robot,
     RobotName, StateVariables, Widget, control_cycle, read_parameters,
 };
 use serde::{Deserialize, Serialize};
 
-pub use parameters::{Feelings, LeguinParameters};
+pub use parameters::LeguinParameters;
 pub use tables::{
-    EMOTIONS, Errand, LeguinAct, LeguinBehavior, LeguinContext, LeguinMeasures, TABLE, urgency,
+    Errand, LeguinAct, LeguinBehavior, LeguinContext, LeguinMeasures, TABLE, appraise, urgency,
 };
 
 use crate::closing::Closing;
@@ -26,6 +28,7 @@ use crate::commands::{GO_HOME, HURRY, REFILL, shortened};
 use crate::drive::StraightDrive;
 use crate::emotion::SwitchableGenerator;
 use crate::frame::{self, publish_variables};
+use crate::input::Input;
 use crate::panel;
 use crate::policy::Policy;
 use crate::published::{flag, text};
@@ -41,7 +44,7 @@ const JOKES: &[&str] = &[
 /// The refiller.
 pub struct Leguin {
     parameters: LeguinParameters,
-    emotion: SwitchableGenerator<RuleGenerator<LeguinMeasures, LeguinBehavior, StandardEmotion>>,
+    emotion: SwitchableGenerator<LeguinMeasures, LeguinBehavior>,
     bsg: BehaviorGenerator<LeguinBehavior, LeguinContext, LeguinAct>,
     haste: SensoryMotor,
     state: LeguinMemory,
@@ -54,7 +57,7 @@ pub struct Leguin {
 #[serde(deny_unknown_fields)]
 pub struct LeguinState {
     state: LeguinMemory,
-    feeling: Feeling<StandardEmotion>,
+    emotion: EmotionState<StandardEmotion>,
     behavior: BehaviorState<LeguinBehavior>,
 }
 
@@ -112,8 +115,10 @@ impl CarsRobotInterface for Leguin {
     }
 
     fn update_emotion_state(&mut self, cars: &mut Cars<'_>) {
-        self.emotion
+        let progress = self
+            .emotion
             .update(&self.state.measures, self.bsg.current(), cars);
+        self.state.inputs.record(progress);
         self.state.appraisal = self.appraisal();
     }
 
@@ -170,6 +175,7 @@ impl Robot for Leguin {
 
     fn resume(&mut self, cars: &mut Cars<'_>, last: &StateVariables) {
         self.state.take_over(last);
+        self.emotion.take_over(last);
 
         let name = text(last, "behavior");
         let behavior = LeguinBehavior::ALL
@@ -210,14 +216,16 @@ impl Leguin {
     /// What is wrong with the parameters.
     pub fn new(parameters: LeguinParameters) -> Result<Self, String> {
         parameters.check()?;
-        let esg = RuleGenerator::new(EMOTIONS, urgency, StandardEmotion::Happy);
+        let dynamics = Dynamics::standard(&parameters.dynamics, parameters.caution)
+            .map_err(|error| error.to_string())?;
+        let esg = DynamicGenerator::new(dynamics, appraise);
 
         // The sensory-motor level: the stronger her concern, the faster she is; nothing else changes her speed.
         let haste = SensoryMotor::new(SensoryMotorParameters {
             negative_gain: parameters.hurry_mult,
             positive_gain: 1.0,
-            onset: parameters.dynamics.haste_onset,
-            full: parameters.dynamics.haste_full,
+            onset: parameters.haste_onset,
+            full: parameters.haste_full,
         })
         .map_err(|error| error.to_string())?;
 
@@ -254,7 +262,7 @@ impl Leguin {
     pub fn save(&self) -> LeguinState {
         LeguinState {
             state: self.state.clone(),
-            feeling: self.emotion.save(),
+            emotion: self.emotion.save(),
             behavior: self.bsg.state().clone(),
         }
     }
@@ -264,7 +272,7 @@ impl Leguin {
     /// # Errors
     /// A Leguin of these parameters cannot have the saved emotion.
     pub fn restore(&mut self, saved: LeguinState) -> Result<(), String> {
-        self.emotion.restore(saved.feeling)?;
+        self.emotion.restore(saved.emotion)?;
         self.bsg.restore(saved.behavior);
         self.state = saved.state;
         Ok(())
@@ -278,16 +286,28 @@ impl Leguin {
         } else {
             0.0
         };
-        let hurry = if self.state.hurried {
-            parameters.dynamics.hurry * gain
+        let errand = if self.state.hurried {
+            parameters.hurry_pressure.max(parameters.errand_pressure)
         } else {
-            0.0
+            parameters.errand_pressure
         };
+
+        let measured = match (behavior, self.state.comes_nearer) {
+            (LeguinBehavior::Exchange, _) if self.bsg.has_lasted(parameters.exchange_s) => {
+                Some(Input::ExchangeOver)
+            }
+            (LeguinBehavior::Refill, true) => Some(Input::ComesNearer),
+            (LeguinBehavior::GoHome, true) => Some(Input::NearerHome),
+            _ => None,
+        };
+        let event = self.state.inputs.show(measured, &parameters.dynamics);
+
         self.state.measures = LeguinMeasures {
             hurried: self.state.hurried,
-            hurry,
+            errand,
             blocked,
             waiting: self.state.waiting_s * gain / parameters.await_patience_s,
+            event,
             th_concerned: parameters.dynamics.th_concerned,
         };
     }
@@ -303,9 +323,11 @@ impl Leguin {
 
         if is_on_the_way {
             let progress_m = self.parameters.progress_m;
-            self.state.way.observe(distance_m, progress_m, tick_s);
+            let way = &mut self.state.way;
+            self.state.comes_nearer = way.observe(distance_m, progress_m, tick_s);
         } else {
             self.state.way = Closing::default();
+            self.state.comes_nearer = false;
         }
     }
 
@@ -355,12 +377,17 @@ impl Leguin {
         }
     }
 
-    /// Whether she turns back, by her policy.
+    /// Whether she turns back, by her policy. Not before she has set out: what frustrated her before is over.
     fn gives_up(&self) -> bool {
+        if !self.bsg.has_lasted(self.parameters.prep_s) {
+            return false;
+        }
+
         let measures = &self.state.measures;
+        let least = self.parameters.dynamics.th_frustrated;
         match self.parameters.policy() {
             Policy::Emotion => self.feeling().emotion == StandardEmotion::Frustrated,
-            Policy::Rules | Policy::Timer => measures.blocked >= 1.0 || measures.waiting >= 1.0,
+            Policy::Rules | Policy::Timer => measures.blocked.max(measures.waiting) >= least,
             Policy::Neither => false,
         }
     }
@@ -368,10 +395,18 @@ impl Leguin {
     fn perform(&mut self, act: LeguinAct, cars: &mut Cars<'_>) {
         let state = &mut self.state;
         match act {
-            LeguinAct::TakeErrand => state.hurried = state.pending.take() == Some(Errand::Hurry),
+            LeguinAct::TakeErrand => {
+                state.hurried = state.pending.take() == Some(Errand::Hurry);
+                state.inputs.note(if state.hurried {
+                    Input::Hurry
+                } else {
+                    Input::NewErrand
+                });
+            }
             LeguinAct::Hurry => {
                 state.hurried = true;
                 state.pending = None;
+                state.inputs.note(Input::Hurry);
             }
             LeguinAct::FinishErrand => {
                 state.hurried = false;
@@ -381,11 +416,14 @@ impl Leguin {
             LeguinAct::TurnHome => {
                 state.trips += 1;
                 state.sent_home = false;
+                state.inputs.note(Input::SentHome);
             }
+            LeguinAct::ComeHome => state.inputs.note(Input::Home),
             LeguinAct::GiveUp => {
                 state.given_up += 1;
                 state.hurried = false;
                 state.way = Closing::default();
+                state.inputs.note(Input::GivesUp);
             }
             LeguinAct::Joke => {
                 state.jokes.tell(JOKES, self.parameters.joke_mean_s, cars);

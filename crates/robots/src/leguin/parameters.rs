@@ -1,6 +1,6 @@
 //! Leguin's parameters, in SI units. A parameter file may have text with a unit: `"4 ft"`.
 
-use affect::{Caution, IntensityLabel};
+use affect::{Caution, DynamicsParameters};
 use serde::{Deserialize, Serialize};
 
 use crate::bounds::{not_negative, positive};
@@ -46,12 +46,20 @@ pub struct LeguinParameters {
     pub hurry_mult: f64,
     /// Time from a call until she leaves the table, s. Default 1 \[I\].
     pub prep_s: f64,
-    /// Time without coming nearer to the waiter after which she is FRUSTRATED with the way, s; divided by her gain.
-    /// Default 25 \[I\]: above the time after which the waiter is FRUSTRATED, or she turns back before he can come to meet
-    /// her.
+    /// Pressure of an errand, 0 to 1. Default 0.35 \[I\]: it makes her CONFIDENT.
+    pub errand_pressure: f64,
+    /// Pressure of an errand on which she was told to hurry, 0 to 1. Default 0.6 \[I\]: it makes her CONCERNED.
+    pub hurry_pressure: f64,
+    /// Intensity of concern from which she moves faster. Default 0.25 \[I\].
+    pub haste_onset: f64,
+    /// Intensity of concern from which she moves as fast as she can. Default 0.55 \[I\].
+    pub haste_full: f64,
+    /// Time without coming nearer to the waiter after which the pressure is 1, s; divided by her gain. Default 32 \[I\]: she is
+    /// FRUSTRATED with the way after some 25 s. That is above the time after which the waiter is FRUSTRATED, or she turns
+    /// back before he can come to meet her.
     pub block_patience_s: f64,
-    /// Time without being sent home after which she is FRUSTRATED with the waiter, s; divided by her gain. Default
-    /// 20 \[I\].
+    /// Time without being sent home after which the pressure is 1, s; divided by her gain. Default 26 \[I\]: she is
+    /// FRUSTRATED with the waiter after some 20 s.
     pub await_patience_s: f64,
     /// By how much a distance must be smaller than ever before on this way to count as progress, m. Default 0.5 ft \[I\].
     pub progress_m: f64,
@@ -72,41 +80,7 @@ pub struct LeguinParameters {
     /// Mean time from one joke to the next while she is HAPPY and waits, s. Default 60 \[I\]; that she jokes \[D\].
     pub joke_mean_s: f64,
     /// Constants of her emotions.
-    pub dynamics: Feelings,
-}
-
-/// The constants of Leguin's emotions, named as those of Butler's dynamics.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Feelings {
-    /// Gain (dimensionless) without caution. Default 0.5 \[I\].
-    pub caution_gain_base: f64,
-    /// What full caution adds to the gain (dimensionless). Default 1 \[I\].
-    pub caution_gain_slope: f64,
-    /// Share of her patience with the way at which she is CONCERNED about it. Default 0.45 \[I\], as Butler's.
-    pub th_concerned: f64,
-    /// Intensity of her concern if she was commanded to hurry, multiplied by her gain. Default 0.6 \[I\].
-    pub hurry: f64,
-    /// Intensity of concern from which she moves faster. Default 0.25 \[I\].
-    pub haste_onset: f64,
-    /// Intensity of concern from which she moves as fast as she can. Default 0.6 \[I\].
-    pub haste_full: f64,
-    /// Intensities at which low, medium, high and very high begin. Default 0.2, 0.4, 0.6, 0.8 \[I\].
-    pub label_cuts: [f64; 4],
-}
-
-impl Default for Feelings {
-    fn default() -> Self {
-        Self {
-            caution_gain_base: 0.5,
-            caution_gain_slope: 1.0,
-            th_concerned: 0.45,
-            hurry: 0.6,
-            haste_onset: 0.25,
-            haste_full: 0.6,
-            label_cuts: IntensityLabel::CUTS,
-        }
-    }
+    pub dynamics: DynamicsParameters,
 }
 
 impl Default for LeguinParameters {
@@ -125,8 +99,12 @@ impl Default for LeguinParameters {
             v_refill_mps: 3.0 * FT_M,
             hurry_mult: 1.5,
             prep_s: 1.0,
-            block_patience_s: 25.0,
-            await_patience_s: 20.0,
+            errand_pressure: 0.35,
+            hurry_pressure: 0.6,
+            haste_onset: 0.25,
+            haste_full: 0.55,
+            block_patience_s: 32.0,
+            await_patience_s: 26.0,
             progress_m: 0.5 * FT_M,
             arrive_m: 1.5 * FT_M,
             settle_s: 5.0,
@@ -136,7 +114,7 @@ impl Default for LeguinParameters {
             turn_mean_s: 5.0,
             look_s: LOOK_S,
             joke_mean_s: 60.0,
-            dynamics: Feelings::default(),
+            dynamics: DynamicsParameters::default(),
         }
     }
 }
@@ -150,10 +128,10 @@ impl LeguinParameters {
 
     /// How strongly she reacts: 1 with the defaults.
     pub(super) fn gain(&self) -> f64 {
-        self.dynamics.caution_gain_base + self.dynamics.caution_gain_slope * self.caution.value()
+        self.dynamics.gain(self.caution)
     }
 
-    /// Checks the values, except `hurry_mult` and those of her haste, which are checked where they are used.
+    /// Checks the values, except those of her haste and of the dynamics, which are checked where they are used.
     ///
     /// # Errors
     /// The first value that is wrong.
@@ -163,20 +141,12 @@ impl LeguinParameters {
         positive("await_patience_s", self.await_patience_s)?;
         positive("turn_mean_s", self.turn_mean_s)?;
         positive("joke_mean_s", self.joke_mean_s)?;
-        positive(
-            "dynamics.caution_gain_base",
-            self.dynamics.caution_gain_base,
-        )?;
-        not_negative(
-            "dynamics.caution_gain_slope",
-            self.dynamics.caution_gain_slope,
-        )?;
         not_negative("exchange_s", self.exchange_s)?;
         not_negative("v_refill_mps", self.v_refill_mps)?;
         not_negative("prep_s", self.prep_s)?;
         positive("progress_m", self.progress_m)?;
-        not_negative("dynamics.th_concerned", self.dynamics.th_concerned)?;
-        not_negative("dynamics.hurry", self.dynamics.hurry)?;
+        not_negative("errand_pressure", self.errand_pressure)?;
+        not_negative("hurry_pressure", self.hurry_pressure)?;
         self.script.check()?;
         not_negative("arrive_m", self.arrive_m)?;
         not_negative("settle_s", self.settle_s)?;

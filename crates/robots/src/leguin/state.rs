@@ -10,6 +10,7 @@ use crate::chance::Chance;
 use crate::closing::Closing;
 use crate::commands::{HURRY, REFILL};
 use crate::drive::Drive;
+use crate::input::Inputs;
 use crate::jokes::Jokes;
 use crate::peer::Peer;
 use crate::published::{count, flag, location, text};
@@ -30,6 +31,9 @@ pub(super) struct LeguinMemory {
     pub(super) pending: Option<Errand>,
     /// The distance of her goal on this way.
     pub(super) way: Closing,
+    /// Whether she made progress on it in this tick.
+    pub(super) comes_nearer: bool,
+    pub(super) inputs: Inputs,
     /// Time for which she has waited to be sent home.
     pub(super) waiting_s: f64,
     pub(super) trips: u32,
@@ -57,6 +61,8 @@ impl LeguinMemory {
             sent_home: false,
             pending: None,
             way: Closing::default(),
+            comes_nearer: false,
+            inputs: Inputs::default(),
             waiting_s: 0.0,
             trips: 0,
             given_up: 0,
@@ -104,7 +110,7 @@ impl LeguinMemory {
             None => "",
         };
 
-        [
+        let mut variables: StateVariables = [
             ("hurried", self.hurried.into()),
             ("blocked_s", self.way.stalled_s().into()),
             ("waiting_s", self.waiting_s.into()),
@@ -117,7 +123,10 @@ impl LeguinMemory {
             ("home_x_m", self.home.x.into()),
             ("home_y_m", self.home.y.into()),
         ]
-        .into()
+        .into();
+        self.inputs.publish(&mut variables);
+
+        variables
     }
 
     /// Continues from what a lost incarnation published.

@@ -1,14 +1,13 @@
-//! Leguin's emotion and behavior, as tables.
+//! Leguin's emotion and behavior: how she appraises her measures, and her behavior as a table.
 //!
 //! One tick is: state variables, then emotion (from them), then behavior (from them and the emotion), then the next
 //! motion. So "hurry" on the way acts on the behavior table in the tick in which it arrives, and on emotion in the next.
 
-use affect::StandardEmotion::{self, Concerned, Confident, Frustrated, Happy};
 use affect::behavior::{
     Row,
     Then::{Go, Stay},
 };
-use affect::{EmotionRow, Urgency};
+use affect::{ProgressEvent, StepInput, Stimulus, Urgency};
 use serde::{Deserialize, Serialize};
 
 /// Leguin's behaviors.
@@ -62,12 +61,14 @@ pub enum Errand {
 pub struct LeguinMeasures {
     /// Whether she was commanded to hurry.
     pub hurried: bool,
-    /// How strongly that concerns her, 0 to 1.
-    pub hurry: f64,
-    /// Time without progress on the way, as a share of the time after which she is FRUSTRATED with it.
+    /// The pressure of her errand itself, 0 to 1.
+    pub errand: f64,
+    /// Time without progress on the way, as a share of her patience with it, multiplied by her gain.
     pub blocked: f64,
-    /// Time for which she has waited to be sent home, as a share of the time after which she is FRUSTRATED with it.
+    /// Time for which she has waited to be sent home, as a share of her patience with that, multiplied by her gain.
     pub waiting: f64,
+    /// What else happened: the input of her emotion besides the pressure.
+    pub event: Option<ProgressEvent>,
     /// The share at which she is CONCERNED about the way.
     pub th_concerned: f64,
 }
@@ -75,21 +76,25 @@ pub struct LeguinMeasures {
 /// Share of her patience with being sent home from which she is kept waiting \[I\].
 pub(super) const KEPT_WAITING: f64 = 0.5;
 
-/// The emotion state generator: the refiller's column of the paper's Table 2. The first row that holds counts.
-#[rustfmt::skip]
-pub const EMOTIONS: &[EmotionRow<LeguinMeasures, LeguinBehavior, StandardEmotion>] = &[
-    EmotionRow { during: &[Wait, Exchange, GoHome], when: |_| true, feel: Happy },
-    EmotionRow { during: &[Refill], when: |m| m.blocked >= 1.0, feel: Frustrated },
-    EmotionRow { during: &[Refill], when: |m| m.hurried || m.blocked >= m.th_concerned, feel: Concerned },
-    EmotionRow { during: &[Refill], when: |_| true, feel: Confident },
-    EmotionRow { during: &[AwaitGoHome], when: |m| m.waiting >= 1.0, feel: Frustrated },
-    EmotionRow { during: &[AwaitGoHome], when: |m| m.waiting >= KEPT_WAITING, feel: Concerned },
-    EmotionRow { during: &[AwaitGoHome], when: |_| true, feel: Confident },
-];
+/// How pressing her errand is, 0 to 1 \[I\]: what is asked of her and how long her way is blocked; then how long she is kept
+/// waiting. Nothing presses at the table, on the way there and while treats are handed over.
+pub fn urgency(measures: &LeguinMeasures, behavior: &LeguinBehavior) -> Urgency {
+    match behavior {
+        Refill => Urgency::saturating(measures.errand.max(measures.blocked)),
+        AwaitGoHome => Urgency::saturating(measures.waiting),
+        Wait | Exchange | GoHome => Urgency::MIN,
+    }
+}
 
-/// The urgency of her emotion \[I\].
-pub fn urgency(measures: &LeguinMeasures, _: &LeguinBehavior) -> Urgency {
-    Urgency::saturating(measures.hurry.max(measures.blocked).max(measures.waiting))
+/// Appraises the measures for the emotion state generator. While an exchange is under way what she feels stays, as Butler's
+/// does.
+pub fn appraise(measures: &LeguinMeasures, behavior: &LeguinBehavior) -> Stimulus {
+    let drive = match behavior {
+        Exchange => StepInput::Hold,
+        _ => StepInput::Pressure(urgency(measures, behavior)),
+    };
+
+    Stimulus::new(drive).with_event(measures.event)
 }
 
 /// What a row of the behavior table makes Leguin do.
@@ -103,6 +108,8 @@ pub enum LeguinAct {
     FinishErrand,
     /// Turns back.
     GiveUp,
+    /// Is back at the table.
+    ComeHome,
     /// Counts the trip and obeys "go home".
     TurnHome,
     /// Tells a joke.
@@ -139,6 +146,6 @@ pub const TABLE: &[Row<LeguinBehavior, LeguinContext, LeguinAct>] = &[
     Row { from: &[Exchange], when: |c| c.exchange_is_over, act: &[], then: Go(AwaitGoHome) },
     Row { from: &[AwaitGoHome], when: |c| c.sent_home, act: &[LeguinAct::TurnHome], then: Go(GoHome) },
     Row { from: &[AwaitGoHome, Refill], when: |c| c.gives_up, act: &[LeguinAct::GiveUp], then: Go(GoHome) },
-    Row { from: &[GoHome], when: |c| c.is_home, act: &[], then: Go(Wait) },
+    Row { from: &[GoHome], when: |c| c.is_home, act: &[LeguinAct::ComeHome], then: Go(Wait) },
     Row { from: &[Wait, GoHome], when: |c| c.is_happy && c.has_joke, act: &[LeguinAct::Joke], then: Stay },
 ];
