@@ -84,9 +84,7 @@ fn describe(path: &Path) -> Result<String> {
 
 fn describe_launch(path: &Path) -> Result<String> {
     let changes = Changes::default();
-    let file = LaunchFile::load(path)?;
-    let scenario = file.load_scenario(&changes)?;
-    file.check_robots(&scenario)?;
+    let (file, scenario) = LaunchFile::load_with_scenario(path, &changes)?;
     remarks::show(&file.scenario, &changes);
     remarks::show_all(file.remarks(&scenario));
 

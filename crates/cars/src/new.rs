@@ -223,8 +223,8 @@ fn check_launch(skeleton: &Skeleton, name: &RobotName) -> Result<()> {
         )
     };
     let scenario = Scenario::parse(&scenario, Path::new("")).map_err(wrong)?;
-    let launch = LaunchFile::parse(launch, Path::new("")).map_err(wrong)?;
-    launch.check_robots(&scenario).map_err(wrong)?;
+    let mut launch = LaunchFile::parse(launch, Path::new("")).map_err(wrong)?;
+    launch.assign_robots(&scenario).map_err(wrong)?;
     Ok(())
 }
 

@@ -9,7 +9,7 @@ use std::time::Duration;
 use config::speed::SpeedError;
 use config::units::Time;
 use config::{Changes, FileError, Source, Speed};
-use protocol::{RobotName, RunName};
+use protocol::{RobotName, RobotPattern, RunName};
 use scenario::{OnLate, Scenario};
 use serde::Deserialize;
 use toml::Spanned;
@@ -83,8 +83,10 @@ pub struct Process {
     pub command: Vec<String>,
     /// Place of the command in the file.
     pub span: Option<Range<usize>>,
-    /// The robots that it runs.
+    /// The robots that it runs; those of patterns from [`LaunchFile::assign_robots`] on.
     pub robots: Vec<RobotName>,
+    /// The robots as they are written.
+    written: WrittenRobots,
     robots_span: Option<Range<usize>>,
     /// Environment in addition to the launcher's.
     pub env: BTreeMap<String, String>,
@@ -98,6 +100,15 @@ pub struct Process {
     required_span: Option<Range<usize>>,
     /// Whether the user starts it, instead of the launcher.
     pub is_extern: bool,
+}
+
+/// The robots of a process as they are written in the file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum WrittenRobots {
+    /// All that match run in one process.
+    Together(Vec<RobotPattern>),
+    /// Each that matches has a process of its own, which has its name.
+    Each(RobotPattern),
 }
 
 #[derive(Debug, Deserialize)]
@@ -156,7 +167,7 @@ impl Default for RawConsole {
 struct RawProcess {
     name: Spanned<String>,
     command: Spanned<Vec<String>>,
-    robots: Option<Spanned<Vec<RobotName>>>,
+    robots: Option<Spanned<Vec<RobotPattern>>>,
     #[serde(default)]
     env: BTreeMap<String, String>,
     #[serde(default)]
@@ -179,6 +190,20 @@ impl LaunchFile {
     pub fn load(path: &Path) -> Result<Self, FileError> {
         let folder = path.parent().unwrap_or(Path::new(""));
         Self::parse(Source::read(path)?, folder)
+    }
+
+    /// Reads a launch file and its scenario, with changes, and gives each process its robots.
+    ///
+    /// # Errors
+    /// [`FileError`] of one of them.
+    pub fn load_with_scenario(
+        path: &Path,
+        changes: &Changes,
+    ) -> Result<(Self, Scenario), FileError> {
+        let mut file = Self::load(path)?;
+        let scenario = file.load_scenario(changes)?;
+        file.assign_robots(&scenario)?;
+        Ok((file, scenario))
     }
 
     /// Reads the text of a launch file; `folder` is where its relative paths begin.
@@ -223,6 +248,7 @@ impl LaunchFile {
             let program = format!("cars-{}", spec.class.to_lowercase());
             processes.push(Process {
                 robots: vec![name.clone()],
+                written: WrittenRobots::Together(vec![name.clone().into()]),
                 ..Process::new(name.as_str(), vec![program])
             });
         }
@@ -245,7 +271,7 @@ impl LaunchFile {
     ///
     /// # Errors
     /// [`FileError`] of the scenario file, which also names the launch file.
-    pub fn load_scenario(&self, changes: &Changes) -> Result<Scenario, FileError> {
+    fn load_scenario(&self, changes: &Changes) -> Result<Scenario, FileError> {
         if let Some(span) = &self.scenario_span {
             self.source.check_named(span.clone(), &self.scenario)?;
         }
@@ -284,11 +310,62 @@ impl LaunchFile {
         Ok(())
     }
 
-    /// Checks that every robot of the scenario is run by exactly one process.
+    /// Gives each process its robots: those of the scenario that match its patterns.
     ///
     /// # Errors
-    /// [`FileError`] at the process or at the scenario.
-    pub fn check_robots(&self, scenario: &Scenario) -> Result<(), FileError> {
+    /// [`FileError`] at the process or at the scenario, unless every robot of the scenario is run by exactly one process.
+    pub fn assign_robots(&mut self, scenario: &Scenario) -> Result<(), FileError> {
+        let mut processes = Vec::new();
+        for process in &self.processes {
+            processes.extend(self.processes_of(process, scenario)?);
+        }
+        self.processes = processes;
+        self.check_robots(scenario)
+    }
+
+    /// The processes that an entry of the file is.
+    fn processes_of(
+        &self,
+        process: &Process,
+        scenario: &Scenario,
+    ) -> Result<Vec<Process>, FileError> {
+        let matching = |pattern: &RobotPattern| {
+            let robots = scenario.robots.keys();
+            let found: Vec<RobotName> = robots
+                .filter(|robot| pattern.matches(robot))
+                .cloned()
+                .collect();
+            if found.is_empty() && pattern.is_open() {
+                let text = format!("the scenario has no robot whose name matches {pattern}");
+                return Err(self.refuse(process, &text, &roster(scenario)));
+            }
+            Ok(found)
+        };
+
+        match &process.written {
+            WrittenRobots::Each(pattern) => {
+                let robots = matching(pattern)?;
+                let of_robot = |robot: RobotName| Process {
+                    name: robot.to_string(),
+                    written: WrittenRobots::Together(vec![robot.clone().into()]),
+                    robots: vec![robot],
+                    ..process.clone()
+                };
+                Ok(robots.into_iter().map(of_robot).collect())
+            }
+            WrittenRobots::Together(patterns) => {
+                let mut process = process.clone();
+                process.robots = named(patterns);
+                for pattern in patterns.iter().filter(|pattern| pattern.is_open()) {
+                    process.robots.extend(matching(pattern)?);
+                }
+                Ok(vec![process])
+            }
+        }
+    }
+
+    /// Checks that every robot of the scenario is run by exactly one process.
+    fn check_robots(&self, scenario: &Scenario) -> Result<(), FileError> {
         let mut run_by: BTreeMap<&RobotName, &str> = BTreeMap::new();
         for process in &self.processes {
             for robot in &process.robots {
@@ -367,6 +444,7 @@ impl Process {
             command,
             span: None,
             robots: Vec::new(),
+            written: WrittenRobots::Together(Vec::new()),
             robots_span: None,
             env: BTreeMap::new(),
             restart: Restart::Never,
@@ -376,6 +454,14 @@ impl Process {
             is_extern: false,
         }
     }
+}
+
+/// The robots among these patterns that are called by their names.
+fn named(patterns: &[RobotPattern]) -> Vec<RobotName> {
+    let names = patterns.iter().filter(|pattern| !pattern.is_open());
+    names
+        .filter_map(|pattern| RobotName::new(pattern.as_str()).ok())
+        .collect()
 }
 
 fn roster(scenario: &Scenario) -> String {
@@ -449,12 +535,22 @@ fn check_process(source: &Source, raw: RawProcess) -> Result<Process, FileError>
     let name_span = raw.name.span();
 
     // The rules of robot names make the name of a process fit for its log file.
-    let name = RobotName::new(raw.name.get_ref())
+    let name = RobotPattern::new(raw.name.get_ref())
         .map_err(|error| FileError::at(source, Some(name_span.clone()), &error.to_string()))?;
-    let robots_span = raw.robots.as_ref().map_or(name_span, Spanned::span);
-    let robots = match raw.robots {
-        Some(robots) => robots.into_inner(),
-        None => vec![name.clone()],
+    let robots_span = raw.robots.as_ref().map_or(name_span.clone(), Spanned::span);
+    let written = match raw.robots {
+        Some(_) if name.is_open() => {
+            let text = "a process whose name is a pattern is one for each robot that matches";
+            let help = "name the process, or leave `robots` out";
+            return Err(FileError::at(source, Some(name_span), text).with_help(help));
+        }
+        Some(robots) => WrittenRobots::Together(robots.into_inner()),
+        None if name.is_open() => WrittenRobots::Each(name.clone()),
+        None => WrittenRobots::Together(vec![name.clone()]),
+    };
+    let robots = match &written {
+        WrittenRobots::Together(patterns) => named(patterns),
+        WrittenRobots::Each(_) => Vec::new(),
     };
     let backoff = match raw.backoff {
         Some(backoff) => check_backoff(source, &backoff)?,
@@ -464,6 +560,7 @@ fn check_process(source: &Source, raw: RawProcess) -> Result<Process, FileError>
     Ok(Process {
         span: Some(raw.command.span()),
         robots,
+        written,
         robots_span: Some(robots_span),
         env: raw.env,
         restart: raw.restart,

@@ -76,6 +76,8 @@ impl Launched {
         }
 
         let folder = self.file.parent().unwrap_or(Path::new(""));
-        LaunchFile::parse(source, folder)
+        let mut file = LaunchFile::parse(source, folder)?;
+        file.assign_robots(scenario)?;
+        Ok(file)
     }
 }

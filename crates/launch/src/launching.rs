@@ -99,11 +99,7 @@ impl What {
                 let file = LaunchFile::of_roster(path, source, &scenario);
                 Ok((file, scenario))
             }
-            Self::File(path) => {
-                let file = LaunchFile::load(path)?;
-                let scenario = file.load_scenario(changes)?;
-                Ok((file, scenario))
-            }
+            Self::File(path) => LaunchFile::load_with_scenario(path, changes),
         }
     }
 
@@ -121,7 +117,6 @@ impl Launch {
     /// [`FileError`] of the file or its scenario; a missing certificate of a secured run.
     pub fn load(what: What, options: LaunchOptions) -> Result<Self, LaunchError> {
         let (mut file, mut scenario) = what.load(&options.run.changes())?;
-        file.check_robots(&scenario)?;
         let run = options.run.run_name(what.path())?;
         file.replay(&options.replayed, &mut scenario)?;
         if options.run.if_taken == IfTaken::Replace {

@@ -22,7 +22,7 @@ fn scenario() -> Scenario {
 
 fn load(text: &str) -> Result<LaunchFile, FileError> {
     let text = format!("scenario = \"../configs/hall.toml\"\n{text}");
-    let file = LaunchFile::parse(
+    let mut file = LaunchFile::parse(
         Source {
             name: "launch/x.toml".to_owned(),
             text,
@@ -30,7 +30,7 @@ fn load(text: &str) -> Result<LaunchFile, FileError> {
         Path::new("launch"),
     )?;
 
-    file.check_robots(&scenario())?;
+    file.assign_robots(&scenario())?;
     Ok(file)
 }
 
@@ -129,6 +129,48 @@ fn one_process_may_run_several_robots() {
         load("[[process]]\nname = \"all\"\ncommand = [\"x\"]\nrobots = [\"Leguin\", \"Butler\"]")
             .unwrap();
     assert_eq!(file.processes[0].robots.len(), 2);
+}
+
+#[test]
+fn an_entry_runs_robots_in_bulk() {
+    let processes = |text: &str| {
+        let mut processes = Vec::new();
+        for process in load(text).unwrap().processes {
+            processes.push((process.name, process.robots.len()));
+        }
+        processes
+    };
+    let named = |names: &[(&str, usize)]| {
+        let names = names.iter();
+        names
+            .map(|(name, robots)| ((*name).to_owned(), *robots))
+            .collect::<Vec<_>>()
+    };
+    let each = "[[process]]\nname = \"*\"\ncommand = [\"x\"]";
+    assert_eq!(processes(each), named(&[("Butler", 1), ("Leguin", 1)]));
+    let together = "[[process]]\nname = \"all\"\ncommand = [\"x\"]\nrobots = [\"Le*\", \"Butler\"]";
+    assert_eq!(processes(together), named(&[("all", 2)]));
+
+    check(
+        &each.replace('*', "S*"),
+        &[
+            "launch/x.toml:3:8",
+            "no robot whose name matches S*",
+            "its robots are Butler, Leguin",
+        ],
+    );
+    check(
+        &each.replace('*', "B*"),
+        &["robot Leguin", "is run by no process"],
+    );
+    check(
+        &format!("{each}\n[[process]]\nname = \"Butler\"\ncommand = [\"x\"]"),
+        &["robot Butler is run by process Butler already"],
+    );
+    check(
+        &format!("{each}\nrobots = [\"Butler\"]"),
+        &["leave `robots` out"],
+    );
 }
 
 #[test]

@@ -29,6 +29,8 @@ use crate::error::LaunchError;
 use crate::file::LaunchFile;
 use crate::link::ProcessLink;
 use crate::options::RunOptions;
+use config::Speed;
+use scenario::Scenario;
 
 /// Number of bytes at the end of a record in which its last line is searched.
 const TAIL_BYTES: u64 = 16 * 1024;
@@ -117,14 +119,15 @@ impl Links for Proxies {
 /// # Errors
 /// If a file cannot be used, the links cannot be made, or a fault cannot be played.
 pub fn play(play: &Play, mut report: impl FnMut(String)) -> Result<u8, LaunchError> {
-    let file = LaunchFile::load(&play.file)?;
+    let changes = play.options.changes();
+    let (file, scenario) = LaunchFile::load_with_scenario(&play.file, &changes)?;
     let run = play.options.run_name(&play.file)?;
     let process_of = process_of(&file);
 
     let mut options = play.options.clone();
     let plan = match &play.plan {
         Some(plan) => FaultPlan::load(plan, &process_of.keys().cloned().collect())?,
-        None => partitions(&file, &options)?,
+        None => partitions(&scenario, options.speed.or(file.speed))?,
     };
     // Containers read the scenario file itself.
     if play.plan.is_none() && play.via != Via::Compose {
@@ -224,15 +227,14 @@ fn check_not_secured(file: &LaunchFile) -> Result<(), LaunchError> {
 const WITHOUT_PARTITIONS: &str = "network.partition=[]";
 
 /// The partitions of the scenario, as faults of real links.
-fn partitions(file: &LaunchFile, options: &RunOptions) -> Result<FaultPlan, LaunchError> {
-    let scenario = file.load_scenario(&options.changes())?;
-    let Some(speed) = options.speed.or(file.speed).and_then(|speed| speed.0) else {
+fn partitions(scenario: &Scenario, speed: Option<Speed>) -> Result<FaultPlan, LaunchError> {
+    let Some(speed) = speed.and_then(|speed| speed.0) else {
         return Err(LaunchError::refused_with_help(
             "without a speed, partitions have no time on the wall clock",
             "for example --speed 20",
         ));
     };
-    Ok(FaultPlan::of_partitions(&scenario, speed)?)
+    Ok(FaultPlan::of_partitions(scenario, speed)?)
 }
 
 /// Waits until the first tick is in the record. Returns `false` if the launch ends before.
