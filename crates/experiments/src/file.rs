@@ -11,6 +11,7 @@ use observe::measure::MeasureSource;
 use observe::measure::check_name;
 use observe::{Expectation, Measure};
 use protocol::RobotName;
+use protocol::pattern::overlap;
 use record::Summary;
 use scenario::Scenario;
 use serde::Deserialize;
@@ -284,7 +285,7 @@ impl Experiment {
         for measure in &self.measures {
             for robot in measure.robots() {
                 let is_operator = robot == RobotName::operator().as_str();
-                if !is_operator && !roster.iter().any(|name| name == robot) {
+                if !is_operator && !roster.iter().any(|name| overlap(robot, name)) {
                     let reason = format!(
                         "the scenario has no robot \"{robot}\"; it has {}",
                         roster.join(", ")
@@ -318,11 +319,12 @@ impl Experiment {
     /// Checks that the numbers of the summary that are measured can be there.
     fn check_summaries(&self) -> Result<(), FileError> {
         for measure in &self.measures {
-            let MeasureSource::Summary(path) = &measure.kind else {
-                continue;
-            };
-            if let Err(reason) = Summary::check_path(path) {
-                return Err(FileError::at(&self.source, Some(measure.span()), &reason));
+            for source in measure.sources() {
+                if let MeasureSource::Summary(path) = source
+                    && let Err(reason) = Summary::check_path(path)
+                {
+                    return Err(FileError::at(&self.source, Some(measure.span()), &reason));
+                }
             }
         }
         Ok(())
@@ -338,20 +340,17 @@ impl Experiment {
     ) -> Result<(), FileError> {
         for measure in &self.measures {
             for (robot, name) in measure.variables() {
-                let known = published.get(robot);
-                if known.is_some_and(|known| known.contains(name)) {
-                    continue;
-                }
-
-                let known: Vec<&str> = known.into_iter().flatten().map(String::as_str).collect();
-                let reason = match known[..] {
-                    [] => format!("{robot} has no state variables"),
-                    _ => format!(
-                        "{robot} has no state variable `{name}`; it has {}",
-                        known.join(", ")
-                    ),
+                let mut matching = published
+                    .iter()
+                    .filter(|(known, _)| overlap(robot, known.as_str()))
+                    .peekable();
+                let reason = match matching.peek() {
+                    None => Some(format!("{robot} has no state variables")),
+                    Some(_) => matching.find_map(|(robot, known)| no_variable(robot, known, name)),
                 };
-                return Err(FileError::at(&self.source, Some(measure.span()), &reason));
+                if let Some(reason) = reason {
+                    return Err(FileError::at(&self.source, Some(measure.span()), &reason));
+                }
             }
         }
         Ok(())
@@ -372,6 +371,21 @@ impl Experiment {
             None => self.procedure.clone(),
         }
     }
+}
+
+/// What is wrong if a robot does not have a state variable.
+fn no_variable(robot: &RobotName, known: &BTreeSet<String>, name: &str) -> Option<String> {
+    if known.contains(name) {
+        return None;
+    }
+    if known.is_empty() {
+        return Some(format!("{robot} has no state variables"));
+    }
+    let known: Vec<&str> = known.iter().map(String::as_str).collect();
+    Some(format!(
+        "{robot} has no state variable `{name}`; it has {}",
+        known.join(", ")
+    ))
 }
 
 /// Checks that a file has more than blanks and comments: no line of an empty file is wrong.

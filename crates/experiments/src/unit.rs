@@ -180,12 +180,13 @@ impl Plan {
             probes: Vec::new(),
             words: Words::of(&experiment.measures, &experiment.expectations),
         };
+        let scenario = self.scenario_of(unit, launcher)?;
+        let roster = scenario.roster();
         for measure in &experiment.measures {
-            let probe = Probe::new(measure, condition_s);
+            let probe = Probe::new(measure, &roster, condition_s);
             gauge.probes.push((&measure.name, probe));
         }
 
-        let scenario = self.scenario_of(unit, launcher)?;
         let ended = self.follow(scenario, launcher, &mut gauge)?;
         let mut measures = BTreeMap::new();
         for (name, probe) in gauge.probes {

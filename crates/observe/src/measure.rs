@@ -3,8 +3,10 @@
 use std::ops::Range;
 
 use config::units::Time;
-use protocol::RobotName;
-use serde::{Deserialize, Serialize};
+use protocol::{RobotName, RobotPattern};
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{MapAccess, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
 use toml::Spanned;
 
 use crate::pattern::Pattern;
@@ -12,6 +14,8 @@ use crate::words::{self, Word};
 
 /// Longest name of a measure, bytes.
 const MAX_NAME_BYTES: usize = 100;
+/// Most numbers that are added on one side of a ratio.
+const MAX_PARTS: usize = 64;
 
 /// Definition of one number of each run.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -50,6 +54,10 @@ pub enum MeasureSource {
     Variable(OfVariable),
     /// Time of the last progress before the robots come to a standstill.
     Stalled(Stalled),
+    /// How evenly a number is spread over robots.
+    Jain(Jain),
+    /// One number over another one.
+    Ratio(Box<Ratio>),
 }
 
 /// A count of events.
@@ -168,6 +176,72 @@ pub struct Stalled {
     pub lasting_s: f64,
 }
 
+/// Jain's index of fairness of a state variable's last values: (Σx)² / (n Σx²), from 1/n, where one of the robots has all, to 1,
+/// where all have the same (Jain, Chiu and Hawe 1984).
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Jain {
+    /// The robots.
+    pub robot: RobotPattern,
+    /// Name of the variable, whose values are 0 or more.
+    pub name: String,
+}
+
+/// One number over another one.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Ratio {
+    /// What is divided.
+    pub of: Parts,
+    /// What it is divided by.
+    pub by: Parts,
+}
+
+/// The numbers that are added to one side of a ratio: one, or a list. None of them is a ratio.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parts(pub Vec<MeasureSource>);
+
+impl<'de> Deserialize<'de> for Parts {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(PartsVisitor)
+    }
+}
+
+struct PartsVisitor;
+
+impl<'de> Visitor<'de> for PartsVisitor {
+    type Value = Parts;
+
+    fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("a number of the run such as { summary = \"ticks\" }, or a list of them")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, table: A) -> Result<Parts, A::Error> {
+        let Part(source) = Part::deserialize(MapAccessDeserializer::new(table))?;
+        Ok(Parts(vec![source]))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Parts, A::Error> {
+        let mut sources = Vec::new();
+        while let Some(Part(source)) = list.next_element()? {
+            if sources.len() == MAX_PARTS {
+                let reason = format!("more than {MAX_PARTS} numbers are added");
+                return Err(serde::de::Error::custom(reason));
+            }
+            sources.push(source);
+        }
+        if sources.is_empty() {
+            return Err(serde::de::Error::invalid_length(0, &self));
+        }
+        Ok(Parts(sources))
+    }
+}
+
+/// A number of a ratio.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(try_from = "RawPart")]
+struct Part(MeasureSource);
+
 /// A state variable of a robot, in a file `ROBOT.VARIABLE`.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(try_from = "String")]
@@ -280,7 +354,8 @@ impl From<f64> for Measured {
 pub enum MeasureError {
     /// It has no kind, or several.
     #[error(
-        "a measure has exactly one of `summary`, `count`, `time`, `between`, `share`, `variable` and `stalled`"
+        "a measure has exactly one of `summary`, `count`, `time`, `between`, `share`, `variable`, `stalled`, `jain` and `ratio`; a \
+         part of a ratio is no ratio"
     )]
     NotOne,
     /// It names a part of the run and counts no events.
@@ -326,6 +401,23 @@ struct RawMeasure {
     share: Option<Spanned<Share>>,
     variable: Option<Spanned<OfVariable>>,
     stalled: Option<Spanned<Stalled>>,
+    jain: Option<Spanned<Jain>>,
+    ratio: Option<Spanned<Ratio>>,
+}
+
+/// A part of a ratio as written in the file.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawPart {
+    when: Option<When>,
+    summary: Option<Spanned<String>>,
+    count: Option<Spanned<Pattern>>,
+    time: Option<Spanned<TimeTo>>,
+    between: Option<Spanned<Between>>,
+    share: Option<Spanned<Share>>,
+    variable: Option<Spanned<OfVariable>>,
+    stalled: Option<Spanned<Stalled>>,
+    jain: Option<Spanned<Jain>>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -357,43 +449,22 @@ impl TryFrom<RawMeasure> for Measure {
 
     fn try_from(raw: RawMeasure) -> Result<Self, MeasureError> {
         check_name(&raw.name)?;
-        if raw.when.is_some() && raw.count.is_none() {
-            return Err(MeasureError::NoEvents);
-        }
-
-        if let Some(time) = &raw.time
-            && let Some(after) = &time.get_ref().after
-        {
-            check_pair(("after", after), ("to", &time.get_ref().to), &["robot"])?;
-        }
-        if let Some(between) = &raw.between {
-            let Between { begin, end, .. } = between.get_ref();
-            check_pair(("begin", begin), ("end", end), &["robot", "from", "to"])?;
-        }
-
-        let when = raw.when;
-        let kinds = [
-            raw.summary
-                .map(|path| spanned(path, MeasureSource::Summary)),
-            raw.count.map(|pattern| {
-                spanned(pattern, |pattern| {
-                    MeasureSource::Count(Count { pattern, when })
-                })
-            }),
-            raw.time.map(|time| spanned(time, MeasureSource::Time)),
-            raw.between
-                .map(|between| spanned(between, MeasureSource::Between)),
-            raw.share.map(|share| spanned(share, MeasureSource::Share)),
-            raw.variable
-                .map(|variable| spanned(variable, MeasureSource::Variable)),
-            raw.stalled
-                .map(|stalled| spanned(stalled, MeasureSource::Stalled)),
-        ];
-        let mut kinds = kinds.into_iter().flatten();
-        let (kind, span) = kinds.next().ok_or(MeasureError::NotOne)?;
-        if kinds.next().is_some() {
-            return Err(MeasureError::NotOne);
-        }
+        let part = RawPart {
+            when: raw.when,
+            summary: raw.summary,
+            count: raw.count,
+            time: raw.time,
+            between: raw.between,
+            share: raw.share,
+            variable: raw.variable,
+            stalled: raw.stalled,
+            jain: raw.jain,
+        };
+        let (kind, span) = match (raw.ratio, part.check()?) {
+            (None, Some(kind)) => kind,
+            (Some(ratio), None) => spanned(ratio, |ratio| MeasureSource::Ratio(Box::new(ratio))),
+            _ => return Err(MeasureError::NotOne),
+        };
 
         Ok(Self {
             name: raw.name,
@@ -404,6 +475,60 @@ impl TryFrom<RawMeasure> for Measure {
             kind,
             span,
         })
+    }
+}
+
+impl TryFrom<RawPart> for Part {
+    type Error = MeasureError;
+
+    fn try_from(raw: RawPart) -> Result<Self, MeasureError> {
+        let (kind, _) = raw.check()?.ok_or(MeasureError::NotOne)?;
+        Ok(Self(kind))
+    }
+}
+
+impl RawPart {
+    /// The kind and its place in the file; `None` if there is none.
+    fn check(self) -> Result<Option<(MeasureSource, Range<usize>)>, MeasureError> {
+        if self.when.is_some() && self.count.is_none() {
+            return Err(MeasureError::NoEvents);
+        }
+
+        if let Some(time) = &self.time
+            && let Some(after) = &time.get_ref().after
+        {
+            check_pair(("after", after), ("to", &time.get_ref().to), &["robot"])?;
+        }
+        if let Some(between) = &self.between {
+            let Between { begin, end, .. } = between.get_ref();
+            check_pair(("begin", begin), ("end", end), &["robot", "from", "to"])?;
+        }
+
+        let when = self.when;
+        let kinds = [
+            self.summary
+                .map(|path| spanned(path, MeasureSource::Summary)),
+            self.count.map(|pattern| {
+                spanned(pattern, |pattern| {
+                    MeasureSource::Count(Count { pattern, when })
+                })
+            }),
+            self.time.map(|time| spanned(time, MeasureSource::Time)),
+            self.between
+                .map(|between| spanned(between, MeasureSource::Between)),
+            self.share.map(|share| spanned(share, MeasureSource::Share)),
+            self.variable
+                .map(|variable| spanned(variable, MeasureSource::Variable)),
+            self.stalled
+                .map(|stalled| spanned(stalled, MeasureSource::Stalled)),
+            self.jain.map(|jain| spanned(jain, MeasureSource::Jain)),
+        ];
+        let mut kinds = kinds.into_iter().flatten();
+        let kind = kinds.next();
+        if kinds.next().is_some() {
+            return Err(MeasureError::NotOne);
+        }
+        Ok(kind)
     }
 }
 
@@ -577,9 +702,46 @@ impl Measure {
         self.span.clone()
     }
 
+    /// The sources that its number is made of: its own, or those of the parts of a ratio.
+    #[must_use]
+    pub fn sources(&self) -> Vec<&MeasureSource> {
+        match &self.kind {
+            MeasureSource::Ratio(ratio) => ratio.of.0.iter().chain(&ratio.by.0).collect(),
+            source => vec![source],
+        }
+    }
+
     /// The words that robots choose and that it names.
     pub(crate) fn words(&self) -> Vec<Word> {
-        let share = match &self.kind {
+        let sources = self.sources().into_iter();
+        sources.flat_map(MeasureSource::words).collect()
+    }
+
+    /// The expectations whose verdicts it counts or waits for.
+    #[must_use]
+    pub fn expectations(&self) -> Vec<&str> {
+        let sources = self.sources().into_iter();
+        sources.flat_map(MeasureSource::expectations).collect()
+    }
+
+    /// The state variables that it needs: robots, or patterns of them, and names.
+    #[must_use]
+    pub fn variables(&self) -> Vec<(&str, &str)> {
+        let sources = self.sources().into_iter();
+        sources.flat_map(MeasureSource::variables).collect()
+    }
+
+    /// The robots that it names, or patterns of them. A run has the number only if its roster has them.
+    #[must_use]
+    pub fn robots(&self) -> Vec<&str> {
+        let sources = self.sources().into_iter();
+        sources.flat_map(MeasureSource::robots).collect()
+    }
+}
+
+impl MeasureSource {
+    fn words(&self) -> Vec<Word> {
+        let share = match self {
             MeasureSource::Count(count) => return count.pattern.words(),
             MeasureSource::Time(time) => {
                 let mut named = time.to.words();
@@ -593,7 +755,10 @@ impl Measure {
             }
             MeasureSource::Share(share) => share,
             MeasureSource::Summary(path) => return word_of(path).into_iter().collect(),
-            MeasureSource::Variable(_) | MeasureSource::Stalled(_) => return Vec::new(),
+            MeasureSource::Variable(_)
+            | MeasureSource::Stalled(_)
+            | MeasureSource::Jain(_)
+            | MeasureSource::Ratio(_) => return Vec::new(),
         };
 
         let (kind, states) = match &share.states {
@@ -611,62 +776,61 @@ impl Measure {
         named
     }
 
-    /// The expectations whose verdicts it counts or waits for.
-    #[must_use]
-    pub fn expectations(&self) -> Vec<&str> {
-        let patterns = match &self.kind {
-            MeasureSource::Count(count) => vec![&count.pattern],
-            MeasureSource::Time(time) => time.after.iter().chain([&time.to]).collect(),
-            MeasureSource::Between(between) => vec![&between.begin, &between.end],
-            MeasureSource::Summary(_)
-            | MeasureSource::Share(_)
-            | MeasureSource::Variable(_)
-            | MeasureSource::Stalled(_) => Vec::new(),
+    fn expectations(&self) -> Vec<&str> {
+        let patterns = match self {
+            Self::Count(count) => vec![&count.pattern],
+            Self::Time(time) => time.after.iter().chain([&time.to]).collect(),
+            Self::Between(between) => vec![&between.begin, &between.end],
+            Self::Summary(_)
+            | Self::Share(_)
+            | Self::Variable(_)
+            | Self::Stalled(_)
+            | Self::Jain(_)
+            | Self::Ratio(_) => Vec::new(),
         };
         let named = patterns.into_iter().flat_map(Pattern::expectations);
         named.collect()
     }
 
-    /// The state variables that it needs: robots and names.
-    #[must_use]
-    pub fn variables(&self) -> Vec<(&RobotName, &str)> {
-        match &self.kind {
-            MeasureSource::Variable(variable) => vec![(&variable.robot, variable.name.as_str())],
-            MeasureSource::Stalled(stalled) => {
+    fn variables(&self) -> Vec<(&str, &str)> {
+        match self {
+            Self::Variable(variable) => vec![(variable.robot.as_str(), variable.name.as_str())],
+            Self::Stalled(stalled) => {
                 let progress = stalled.progress.iter();
                 progress
-                    .map(|counter| (&counter.robot, counter.variable.as_str()))
+                    .map(|counter| (counter.robot.as_str(), counter.variable.as_str()))
                     .collect()
             }
+            Self::Jain(jain) => vec![(jain.robot.as_str(), jain.name.as_str())],
             _ => Vec::new(),
         }
     }
 
-    /// The robots that it names. A run has the number only if its roster has them.
-    #[must_use]
-    pub fn robots(&self) -> Vec<&str> {
-        match &self.kind {
-            MeasureSource::Summary(path) => path
+    fn robots(&self) -> Vec<&str> {
+        match self {
+            Self::Summary(path) => path
                 .strip_prefix("robots.")
                 .and_then(|rest| rest.split('.').next())
                 .filter(|robot| *robot != "*")
                 .into_iter()
                 .collect(),
-            MeasureSource::Count(count) => count.pattern.robots().collect(),
-            MeasureSource::Time(time) => {
+            Self::Count(count) => count.pattern.robots().collect(),
+            Self::Time(time) => {
                 let after = time.after.iter().flat_map(Pattern::robots);
                 time.to.robots().chain(after).collect()
             }
-            MeasureSource::Between(between) => {
+            Self::Between(between) => {
                 let ends = between.end.robots();
                 between.begin.robots().chain(ends).collect()
             }
-            MeasureSource::Share(share) => vec![share.robot.as_str()],
-            MeasureSource::Variable(variable) => vec![variable.robot.as_str()],
-            MeasureSource::Stalled(stalled) => {
+            Self::Share(share) => vec![share.robot.as_str()],
+            Self::Variable(variable) => vec![variable.robot.as_str()],
+            Self::Stalled(stalled) => {
                 let progress = stalled.progress.iter();
                 progress.map(|counter| counter.robot.as_str()).collect()
             }
+            Self::Jain(jain) => vec![jain.robot.as_str()],
+            Self::Ratio(_) => Vec::new(),
         }
     }
 }
@@ -706,6 +870,11 @@ mod tests {
             (
                 "stalled = { progress = ['A.x', 'B.y'], for = '1 s' }",
                 &["A", "B"],
+            ),
+            ("jain = { robot = 'S*', name = 'trips' }", &["S*"]),
+            (
+                "ratio = { of = { summary = 'robots.A.missed' }, by = { jain = { robot = 'S*', name = 'x' } } }",
+                &["A", "S*"],
             ),
         ] {
             assert_eq!(measure(text).unwrap().robots(), robots, "{text}");
@@ -748,6 +917,35 @@ mod tests {
             (
                 "summary = 'a'\nstalled = { progress = ['A.x'], for = '1 s' }",
                 "exactly one of",
+            ),
+            (
+                "summary = 'a'\nratio = { of = { summary = 'a' }, by = { summary = 'b' } }",
+                "exactly one of",
+            ),
+            ("ratio = { of = { summary = 'a' } }", "missing field `by`"),
+            (
+                "ratio = { of = [], by = { summary = 'b' } }",
+                "or a list of them",
+            ),
+            (
+                "ratio = { of = 'a', by = { summary = 'b' } }",
+                "a number of the run such as",
+            ),
+            (
+                "ratio = { of = { summary = 'a' }, by = {} }",
+                "exactly one of",
+            ),
+            (
+                "ratio = { of = { ratio = {} }, by = { summary = 'b' } }",
+                "unknown field `ratio`",
+            ),
+            (
+                "ratio = { of = { summary = 'a', when = 'during' }, by = { summary = 'b' } }",
+                "`when` is for `count`",
+            ),
+            (
+                "jain = { robot = 'S /', name = 'x' }",
+                "is not a usable name",
             ),
             ("summary = 'a'\nwhen = 'during'", "`when` is for `count`"),
             (

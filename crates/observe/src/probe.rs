@@ -7,8 +7,8 @@ use timeline::{Span, StateKind, Timeline};
 
 use crate::Observation;
 use crate::measure::{
-    Between, Count, Measure, MeasureSource, Measured, OfDurations, OfValues, OfVariable, Share,
-    Stalled, StateNames, TimeTo, When,
+    Between, Count, Jain, Measure, MeasureSource, Measured, OfDurations, OfValues, OfVariable,
+    Parts, Share, Stalled, StateNames, TimeTo, When,
 };
 
 /// Tables of a robot's summary that have entries for what occurred.
@@ -32,49 +32,19 @@ enum Tally<'a> {
     Share(ShareTally<'a>),
     Variable(VariableTally<'a>),
     Stalled(StalledTally<'a>),
+    Jain(JainTally<'a>),
+    Ratio(RatioTally<'a>),
 }
 
 impl<'a> Probe<'a> {
-    /// A measure of a run that has not begun. The condition of the run begins and ends at these times, simulated seconds.
+    /// A measure of a run of these robots that has not begun. The condition of the run begins and ends at these times, simulated
+    /// seconds.
     #[must_use]
-    pub fn new(measure: &'a Measure, condition_s: (f64, f64)) -> Self {
-        let tally = match &measure.kind {
-            MeasureSource::Summary(path) => Tally::Summary(path),
-            MeasureSource::Count(count) => Tally::Count(CountTally {
-                definition: count,
-                condition_s,
-                count: 0,
-            }),
-            MeasureSource::Time(time) => Tally::Time(TimeTally {
-                definition: time,
-                begun: time.after.is_none().then_some(0),
-                reached: None,
-            }),
-            MeasureSource::Between(between) => Tally::Between(BetweenTally {
-                definition: between,
-                open: None,
-                durations: Durations::default(),
-            }),
-            MeasureSource::Share(share) => Tally::Share(ShareTally {
-                definition: share,
-                timeline: Timeline::default(),
-                ticks: 0,
-            }),
-            MeasureSource::Variable(variable) => Tally::Variable(VariableTally {
-                definition: variable,
-                values: None,
-            }),
-            MeasureSource::Stalled(stalled) => Tally::Stalled(StalledTally {
-                definition: stalled,
-                values: vec![None; stalled.progress.len()],
-                progress: 0,
-            }),
-        };
-
+    pub fn new(measure: &'a Measure, roster: &[RobotName], condition_s: (f64, f64)) -> Self {
         Self {
             now: 0,
             tick_s: 0.0,
-            tally,
+            tally: Tally::new(&measure.kind, roster, condition_s),
         }
     }
 
@@ -82,32 +52,134 @@ impl<'a> Probe<'a> {
     pub fn observe(&mut self, observation: &Observation<'_>) {
         self.now = observation.tick;
         self.tick_s = observation.tick_s;
-        match &mut self.tally {
-            Tally::Summary(_) => {}
-            Tally::Count(tally) => tally.observe(observation),
-            Tally::Time(tally) => tally.observe(observation),
-            Tally::Between(tally) => tally.observe(observation),
-            Tally::Share(tally) => tally.observe(observation),
-            Tally::Variable(tally) => tally.observe(observation),
-            Tally::Stalled(tally) => tally.observe(observation),
-        }
+        self.tally.observe(observation);
     }
 
     /// What the measure gives at the end of the run, the summary of which is given as JSON.
     #[must_use]
     pub fn measured(&self, summary: &Value) -> Measured {
-        let now = self.now;
-        let tick_s = self.tick_s;
-        match &self.tally {
-            Tally::Summary(path) => summary_number(summary, path),
-            Tally::Count(tally) => Measured::from(tally.count as f64),
-            Tally::Time(tally) => tally.measured(now, tick_s),
-            Tally::Between(tally) => tally.measured(now, tick_s),
-            Tally::Share(tally) => tally.measured(now),
-            Tally::Variable(tally) => tally.measured(now, tick_s),
-            Tally::Stalled(tally) => tally.measured(now, tick_s),
+        self.tally.measured(summary, self.now, self.tick_s)
+    }
+}
+
+impl<'a> Tally<'a> {
+    fn new(source: &'a MeasureSource, roster: &[RobotName], condition_s: (f64, f64)) -> Self {
+        match source {
+            MeasureSource::Summary(path) => Self::Summary(path),
+            MeasureSource::Count(count) => Self::Count(CountTally {
+                definition: count,
+                condition_s,
+                count: 0,
+            }),
+            MeasureSource::Time(time) => Self::Time(TimeTally {
+                definition: time,
+                begun: time.after.is_none().then_some(0),
+                reached: None,
+            }),
+            MeasureSource::Between(between) => Self::Between(BetweenTally {
+                definition: between,
+                open: None,
+                durations: Durations::default(),
+            }),
+            MeasureSource::Share(share) => Self::Share(ShareTally {
+                definition: share,
+                timeline: Timeline::default(),
+                ticks: 0,
+            }),
+            MeasureSource::Variable(variable) => Self::Variable(VariableTally {
+                definition: variable,
+                values: None,
+            }),
+            MeasureSource::Stalled(stalled) => Self::Stalled(StalledTally {
+                definition: stalled,
+                values: vec![None; stalled.progress.len()],
+                progress: 0,
+            }),
+            MeasureSource::Jain(jain) => {
+                let matching = roster.iter().filter(|robot| jain.robot.matches(robot));
+                Self::Jain(JainTally {
+                    definition: jain,
+                    values: matching.map(|robot| (robot.clone(), None)).collect(),
+                })
+            }
+            MeasureSource::Ratio(ratio) => {
+                let tallies = |parts: &'a Parts| {
+                    let parts = parts.0.iter();
+                    parts
+                        .map(|part| Self::new(part, roster, condition_s))
+                        .collect()
+                };
+                Self::Ratio(RatioTally {
+                    of: tallies(&ratio.of),
+                    by: tallies(&ratio.by),
+                })
+            }
         }
     }
+
+    fn observe(&mut self, observation: &Observation<'_>) {
+        match self {
+            Self::Summary(_) => {}
+            Self::Count(tally) => tally.observe(observation),
+            Self::Time(tally) => tally.observe(observation),
+            Self::Between(tally) => tally.observe(observation),
+            Self::Share(tally) => tally.observe(observation),
+            Self::Variable(tally) => tally.observe(observation),
+            Self::Stalled(tally) => tally.observe(observation),
+            Self::Jain(tally) => tally.observe(observation),
+            Self::Ratio(tally) => {
+                for part in tally.of.iter_mut().chain(&mut tally.by) {
+                    part.observe(observation);
+                }
+            }
+        }
+    }
+
+    fn measured(&self, summary: &Value, now: Tick, tick_s: f64) -> Measured {
+        match self {
+            Self::Summary(path) => summary_number(summary, path),
+            Self::Count(tally) => Measured::from(tally.count as f64),
+            Self::Time(tally) => tally.measured(now, tick_s),
+            Self::Between(tally) => tally.measured(now, tick_s),
+            Self::Share(tally) => tally.measured(now),
+            Self::Variable(tally) => tally.measured(now, tick_s),
+            Self::Stalled(tally) => tally.measured(now, tick_s),
+            Self::Jain(tally) => tally.measured(),
+            Self::Ratio(tally) => {
+                let take = |part: &Tally<'_>| part.measured(summary, now, tick_s);
+                ratio(
+                    tally.of.iter().map(take).collect(),
+                    tally.by.iter().map(take).collect(),
+                )
+            }
+        }
+    }
+}
+
+#[derive(Debug)]
+struct RatioTally<'a> {
+    of: Vec<Tally<'a>>,
+    by: Vec<Tally<'a>>,
+}
+
+/// The sum of numbers over the sum of others, where there are all of them.
+fn ratio(of: Vec<Measured>, by: Vec<Measured>) -> Measured {
+    let missing = |reason: String| Measured::Missing { reason };
+    match (total(of), total(by)) {
+        (Err(none), _) => missing(format!("what is divided is {none}")),
+        (_, Err(none)) => missing(format!("what it is divided by is {none}")),
+        (_, Ok(0.0)) => missing("it would be divided by 0".to_owned()),
+        (Ok(of), Ok(by)) => Measured::from(of / by),
+    }
+}
+
+/// The sum of numbers, or the first that is none.
+fn total(measured: Vec<Measured>) -> Result<f64, Measured> {
+    let mut total = 0.0;
+    for one in measured {
+        total += one.value().ok_or(one)?;
+    }
+    Ok(total)
 }
 
 fn summary_number(summary: &Value, path: &str) -> Measured {
@@ -450,6 +522,44 @@ impl StalledTally<'_> {
     }
 }
 
+#[derive(Debug)]
+struct JainTally<'a> {
+    definition: &'a Jain,
+    /// The robots that match, and the last value of each.
+    values: Vec<(RobotName, Option<f64>)>,
+}
+
+impl JainTally<'_> {
+    fn observe(&mut self, observation: &Observation<'_>) {
+        for (robot, value) in &mut self.values {
+            *value = number_of(observation, robot, &self.definition.name).or(*value);
+        }
+    }
+
+    fn measured(&self) -> Measured {
+        let mut sum = 0.0;
+        let mut squares = 0.0;
+        for (robot, value) in &self.values {
+            let Some(value) = *value else {
+                return no_variable(robot, &self.definition.name);
+            };
+            if value < 0.0 {
+                let name = &self.definition.name;
+                let reason = format!("`{name}` of {robot} is {value}, and shares are 0 or more");
+                return Measured::Missing { reason };
+            }
+            sum += value;
+            squares += value * value;
+        }
+
+        if squares == 0.0 {
+            let reason = "there is nothing that could be spread: every robot has 0".to_owned();
+            return Measured::Missing { reason };
+        }
+        Measured::from(sum * sum / (self.values.len() as f64 * squares))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeMap;
@@ -519,7 +629,7 @@ mod tests {
     /// The same with ticks of another length.
     fn take_at(tick_s: f64, text: &str, ticks: &[Tick]) -> Measured {
         let measure = measure(text);
-        let mut probe = Probe::new(&measure, (1.0, 2.0));
+        let mut probe = Probe::new(&measure, &[name("A")], (1.0, 2.0));
         let mut variables = BTreeMap::new();
         for (tick, happening) in ticks.iter().enumerate() {
             let mut state_variables = StateVariables::new();
@@ -572,13 +682,78 @@ mod tests {
         value
     }
 
+    /// Jain's index of the values that robots of these names have at the end.
+    fn jain(values: &[(&str, f64)]) -> Measured {
+        let measure = measure("jain = { robot = 'S*', name = 'v' }");
+        let mut roster = Vec::new();
+        let mut variables = BTreeMap::new();
+        for (robot, value) in values {
+            roster.push(name(robot));
+            let mut state_variables = StateVariables::new();
+            state_variables.insert("v", Variable::Number(*value));
+            variables.insert(name(robot), state_variables);
+        }
+        let mut probe = Probe::new(&measure, &roster, (0.0, 1.0));
+        observe(&mut probe, TICK_S, 0, &[], &variables);
+        probe.measured(&Value::Null)
+    }
+
+    #[test]
+    fn jains_index_is_one_where_all_have_the_same_and_1_over_n_where_one_has_all() {
+        let of = |values: &[f64]| {
+            let names = ["S1", "S2", "S3", "S4"];
+            let named: Vec<_> = names.into_iter().zip(values.iter().copied()).collect();
+            jain(&named)
+        };
+        assert_eq!(of(&[3.0; 4]), Measured::from(1.0));
+        assert_eq!(of(&[0.0, 7.0, 0.0, 0.0]), Measured::from(0.25));
+        // (1 + 2 + 3)^2 / (3 (1 + 4 + 9))
+        assert_eq!(of(&[1.0, 2.0, 3.0]), Measured::from(36.0 / 42.0));
+        assert_eq!(of(&[5.0]), Measured::from(1.0));
+        let others = [("S1", 1.0), ("Butler", 99.0), ("S2", 1.0)];
+        assert_eq!(jain(&others), Measured::from(1.0), "of those that match");
+
+        assert!(reason_of(of(&[0.0, 0.0])).contains("every robot has 0"));
+        assert!(reason_of(of(&[1.0, -1.0])).contains("`v` of S2 is -1"));
+        let missing = "jain = { robot = 'A', name = 'w' }";
+        assert!(reason_of(take(missing, &[has(1.0)])).contains("A has no number `w`"));
+    }
+
+    #[test]
+    fn a_ratio_is_one_number_over_another() {
+        let variable = "variable = { robot = 'A', name = 'v', as = 'end' }";
+        let ratio = |of: &str, by: &str| format!("ratio = {{ of = {{ {of} }}, by = {{ {by} }} }}");
+        let ticks = [has(2.0), has(8.0)];
+        let largest = "variable = { robot = 'A', name = 'v', as = 'max' }";
+        let area = "variable = { robot = 'A', name = 'v', as = 'area' }";
+        assert_eq!(certain_of(&ratio(variable, largest), &ticks), 1.0);
+        assert_eq!(certain_of(&ratio(variable, area), &ticks), 8.0);
+        let count = "count = { event = 'behavior', to = 'X' }, when = 'after'";
+        assert_eq!(certain_of(&ratio(count, variable), &ticks), 0.0);
+
+        let both =
+            format!("ratio = {{ of = [{{ {variable} }}, {{ {area} }}], by = {{ {largest} }} }}");
+        assert_eq!(certain_of(&both, &ticks), 1.125);
+
+        let time = "time = { to = { event = 'behavior', to = 'X' } }";
+        let none = "summary = 'a.b'";
+        for (of, by, reason) in [
+            (variable, count, "divided by 0"),
+            (time, variable, "what is divided is not reached"),
+            (variable, none, "what it is divided by is missing"),
+        ] {
+            let error = reason_of(take(&ratio(of, by), &ticks));
+            assert!(error.contains(reason), "{error}");
+        }
+    }
+
     #[test]
     fn a_path_in_the_summary_is_followed_and_a_star_is_a_sum() {
         let summary =
             json!({ "robots": { "A": { "sent": { "x": 2, "y": 3 } }, "B": { "sent": {} } } });
         let at = |path: &str| {
             let measure = measure(&format!("summary = '{path}'"));
-            let probe = Probe::new(&measure, (0.0, 1.0));
+            let probe = Probe::new(&measure, &[], (0.0, 1.0));
             probe.measured(&summary)
         };
         assert_eq!(at("robots.A.sent.x"), Measured::from(2.0));
