@@ -240,7 +240,9 @@ impl Live {
             Ok(_) => "the simulator answers late".to_owned(),
             Err(reason) => reason,
         };
-        Err(format!("{reason}; this was not sent, and is not done later"))
+        Err(format!(
+            "{reason}; this was not sent, and is not done later"
+        ))
     }
 
     /// Sends a person's command to a robot and waits for the simulator's answer.

@@ -60,7 +60,7 @@ pub use protocol::messages::{
     Welcome, Widget,
 };
 pub use protocol::random::Stream;
-pub use protocol::{RobotName, RunName, Tick};
+pub use protocol::{RobotName, RobotPattern, RunName, Tick};
 pub use runner::{Runner, TickResult};
 
 /// Rounds an angle to 1e-6 rad, so that languages whose arc tangents differ in the last bit publish the same number.

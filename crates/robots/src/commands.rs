@@ -6,6 +6,12 @@ pub const REFILL: &str = "refill";
 pub const HURRY: &str = "hurry";
 /// The command that sends the refiller home after an exchange \[D\].
 pub const GO_HOME: &str = "go home";
+/// The waiter's call for any refiller \[D\]. [`REFILL`] then assigns one of those who offer \[I\].
+pub const HELP: &str = "help";
+/// The answer of a refiller who would come \[I\].
+pub const OFFER: &str = "offer";
+/// The answer of a refiller who has been assigned \[I\].
+pub const ACCEPT: &str = "accept";
 
 /// The text of a received command, truncated for a log line.
 pub(crate) fn shortened(text: &str) -> String {

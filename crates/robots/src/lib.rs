@@ -29,12 +29,13 @@ mod panel;
 pub mod peer;
 pub mod policy;
 mod published;
+pub mod recruitment;
 pub mod script;
 pub mod switch;
 mod units;
 
 pub use butler::Butler;
 pub use classes::{CLASSES, make};
-pub use commands::{GO_HOME, HURRY, REFILL};
+pub use commands::{ACCEPT, GO_HOME, HELP, HURRY, OFFER, REFILL};
 pub use leguin::Leguin;
 pub use units::FT_M;

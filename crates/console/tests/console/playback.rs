@@ -5,7 +5,9 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use protocol::messages::{Awaited, Cut, Panel, Performative, Point, Reason, Report, Widget};
+use protocol::messages::{
+    Awaited, Cut, DisplayUnit, Panel, Performative, Point, Reason, Report, Widget,
+};
 use protocol::{Event, RobotName, RunName};
 use recording::content::Missed;
 use recording::{Frame, Header, PlacedRobot, RecordedTick, WallTimes, Writer};
@@ -29,6 +31,7 @@ fn header() -> Header {
         duration_s: 600.0,
         field_m: [15.24, 15.24],
         body_m: 0.6096,
+        display_unit: DisplayUnit::Feet,
         obstacles: vec![[1.0, 2.0]],
         robots: vec![robot("Butler")],
     }

@@ -31,7 +31,7 @@ impl Butler {
         let is_let_down = state.need && state.called && behavior != ButlerBehavior::Exchange;
         let is_happy = self.feeling().emotion == StandardEmotion::Happy;
         let agency = if is_let_down && !is_happy {
-            Agency::Other(self.parameters.refiller.clone())
+            Agency::Other(state.refiller.name().to_owned())
         } else {
             Agency::Oneself
         };

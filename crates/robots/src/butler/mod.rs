@@ -4,6 +4,7 @@
 mod appraisal;
 mod deliberation;
 mod parameters;
+mod recruiting;
 mod state;
 mod tables;
 
@@ -15,7 +16,7 @@ use affect::{
 };
 use robot::{
     Action, BadParameters, Cars, CarsRobotInterface, Panel, ParametersCheck, Point, PublicState,
-    Robot, RobotName, StateVariables, Widget, control_cycle, read_parameters,
+    Robot, RobotName, SensedRobot, StateVariables, Widget, control_cycle, read_parameters,
 };
 use serde::{Deserialize, Serialize};
 
@@ -81,11 +82,14 @@ impl CarsRobotInterface for Butler {
 
         let refiller = &self.parameters.refiller;
         let roster = &cars.welcome().roster;
-        if !roster.iter().any(|robot| robot.as_str() == refiller) {
-            cars.log(format!(
-                "error: no robot is called {refiller}; the tray will not be refilled"
-            ));
-        }
+        let reason = if self.recruits() && self.refillers(cars).is_empty() {
+            "no robot is one of the refillers".to_owned()
+        } else if !self.recruits() && !roster.iter().any(|robot| robot.as_str() == refiller) {
+            format!("no robot is called {refiller}")
+        } else {
+            return Ok(());
+        };
+        cars.log(format!("error: {reason}; the tray will not be refilled"));
         Ok(())
     }
 
@@ -94,6 +98,9 @@ impl CarsRobotInterface for Butler {
     }
 
     fn set_command(&mut self, cars: &mut Cars<'_>, from: &RobotName, command: &str) {
+        if self.recruits() && self.state.recruiter.hear(from.as_str(), command) {
+            return;
+        }
         let text = shortened(command);
         cars.log(format!("takes no commands, not even {text:?} from {from}"));
     }
@@ -103,6 +110,9 @@ impl CarsRobotInterface for Butler {
         self.bsg.advance(tick_s);
         self.state.advance(tick_s);
         self.serve(tick_s);
+        if self.recruits() {
+            self.recruit(cars);
+        }
         self.observe_refiller(cars);
         self.measure(cars);
         self.believe(cars);
@@ -125,6 +135,9 @@ impl CarsRobotInterface for Butler {
         let context = self.context(cars);
         for act in self.bsg.update(&context).actions {
             self.perform(act, cars);
+        }
+        if self.behavior() == ButlerBehavior::Exchange {
+            self.state.recruiter.arrive();
         }
     }
 
@@ -150,7 +163,8 @@ impl CarsRobotInterface for Butler {
     }
 
     fn state_variables(&self) -> StateVariables {
-        let variables = self.state.published(self.behavior());
+        let mut variables = self.state.published(self.behavior());
+        self.publish_recruiting(&mut variables);
         publish_variables(self.frame(), variables)
     }
 
@@ -175,6 +189,7 @@ impl Robot for Butler {
     fn resume(&mut self, cars: &mut Cars<'_>, last: &StateVariables) {
         self.state.take_over(last, self.parameters.treat_capacity);
         self.emotion.take_over(last);
+        self.resume_recruiting(last);
 
         // An exchange cannot be resumed in the middle; its need is still there, and the refiller may still be near.
         let was_going_back = text(last, "behavior") == Some(ButlerBehavior::GoBack.name());
@@ -358,14 +373,24 @@ impl Butler {
         state.refiller_came |= state.called && is_coming;
         if state.refiller_came && has_turned && !state.refiller_is_called && !is_exchanging {
             state.forget_calls();
+            state.recruiter.release();
         }
     }
 
-    /// Watches whether the refiller comes nearer by herself while he needs her, and whether he does while he intercepts.
+    /// Watches whether the refiller comes nearer by herself while he needs her, and whether he does while he intercepts or goes
+    /// back.
     fn watch_progress(&mut self, distance_m: Option<f64>, tick_s: f64) {
         let is_intercepting = self.behavior() == ButlerBehavior::Intercept;
+        let is_going_back = self.behavior() == ButlerBehavior::GoBack;
         let progress_m = self.parameters.progress_m;
         let state = &mut self.state;
+
+        if is_going_back {
+            let start_m = state.at.distance_m(state.start);
+            state.way_back.observe(Some(start_m), progress_m, tick_s);
+        } else {
+            state.way_back = Closing::default();
+        }
 
         let behavior = state.refiller.behavior(self.parameters.query_stale_s);
         let mut comes_nearer = false;
@@ -530,19 +555,34 @@ impl Butler {
             need: state.need,
             called: state.called,
             hurried: state.hurried,
-            refiller_is_ready_here: is_here && is_ready,
+            refiller_is_ready_here: is_here && is_ready && self.has_refiller(),
             refiller_comes: refiller == Some("REFILL"),
             refiller_is_busy: matches!(refiller, Some("AWAIT_GO_HOME" | "GO_HOME")),
             intercept_any: parameters.intercept_any,
             is_stuck: state.chase.stalled_s() >= parameters.intercept_patience_s,
-            rests: state.rest_s > 0.0,
+            rests: state.rest_s > 0.0 || !self.has_refiller(),
             exchange_is_over: state.measures.exchange_is_over,
-            is_at_start: cars.location().distance_m(state.start) <= parameters.arrive_m,
+            is_at_start: self.is_at_start(cars),
             repeats_call: repeats_call && refiller == Some("WAIT") && !state.refiller_is_called,
             repeats_go_home: self.is_due(state.since_go_home_s)
                 && refiller == Some("AWAIT_GO_HOME"),
             has_joke: state.jokes.are_due(),
         }
+    }
+
+    /// Whether he is back: at his start, or where he comes no nearer to it and a robot stands nearby. Guests leave, and so does the
+    /// refiller who has just come.
+    fn is_at_start(&self, cars: &Cars<'_>) -> bool {
+        let state = &self.state;
+        let parameters = &self.parameters;
+        let is_kept_away = state.way_back.stalled_s() >= parameters.settle_s;
+        let is_in_the_way = |robot: &SensedRobot| {
+            robot.name.as_str() != state.refiller.name()
+                && state.at.distance_m(robot.location) <= parameters.settle_m
+        };
+
+        state.at.distance_m(state.start) <= parameters.arrive_m
+            || (is_kept_away && cars.sensed_robots().iter().any(is_in_the_way))
     }
 
     /// How far he goes to be refilled, by his policy.
@@ -596,19 +636,27 @@ impl Butler {
             ButlerAct::CallRefill => {
                 state.called = true;
                 state.since_call_s = 0.0;
-                self.send_to_refiller(REFILL, cars);
+                if !self.calls_for_help() {
+                    self.send_to_refiller(REFILL, cars);
+                }
             }
             ButlerAct::CallHurry => {
                 state.called = true;
-                state.hurried = true;
                 state.since_call_s = 0.0;
-                self.send_to_refiller(HURRY, cars);
+                // Until one has accepted there is nobody to hurry.
+                if !self.calls_for_help() {
+                    self.state.hurried = true;
+                    self.send_to_refiller(HURRY, cars);
+                }
             }
             ButlerAct::SendHome => {
                 state.since_go_home_s = 0.0;
                 self.send_to_refiller(GO_HOME, cars);
             }
-            ButlerAct::Replenish => state.replenish(self.parameters.treat_capacity),
+            ButlerAct::Replenish => {
+                state.replenish(self.parameters.treat_capacity);
+                state.recruiter.release();
+            }
             ButlerAct::GiveUp => {
                 state.gave_up = state.gave_up.saturating_add(1);
                 state.rest_s = self.parameters.intercept_again_s;
@@ -622,11 +670,8 @@ impl Butler {
     }
 
     fn send_to_refiller(&mut self, command: &str, cars: &mut Cars<'_>) {
-        // A refiller who is not in the roster was already logged as an error.
-        let sent = cars.set_robot_command(&self.parameters.refiller, command);
-        if sent.is_ok() {
-            self.state.messages += 1;
-        }
+        let refiller = self.state.refiller.name().to_owned();
+        self.send(&refiller, command, cars);
     }
 
     /// The motion that his behavior wants.
@@ -691,7 +736,7 @@ impl Butler {
     fn feeling_widgets(&self) -> Vec<Widget> {
         let amount = format!("{} {}", self.state.treats, self.parameters.goods);
         let circumstances = Circumstances {
-            other: Some(&self.parameters.refiller),
+            other: Some(self.state.refiller.name()),
             goal: Some(&self.parameters.goal),
             amount: Some(&amount),
         };
@@ -712,7 +757,7 @@ impl Butler {
             ("time to empty", panel::seconds(measures.time_to_empty_s)),
             ("time to refill", panel::seconds(measures.time_to_refill_s)),
             ("need ratio", format!("{:.2}", measures.need_ratio)),
-            ("refiller", self.parameters.refiller.clone()),
+            ("refiller", state.refiller.name().to_owned()),
             ("called, hurried", format!("{called}, {hurried}")),
             (
                 "served, missed",

@@ -9,6 +9,7 @@ use super::tables::ButlerBehavior;
 use crate::bounds::{not_negative, positive};
 use crate::drive::LOOK_S;
 use crate::policy::Policy;
+use crate::recruitment::recruiter::RecruiterParameters;
 use crate::script::Script;
 use crate::switch::Switch;
 use crate::units::FT_M;
@@ -18,8 +19,10 @@ use crate::units::FT_M;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ButlerParameters {
-    /// The robot he calls. Default "Leguin" \[D\].
+    /// The robot he calls, unless he recruits. Default "Leguin" \[D\].
     pub refiller: String,
+    /// Whether he calls any refiller for help instead, and how.
+    pub recruitment: RecruiterParameters,
     /// The name of what he offers, for his panel. Default "treats" \[D\]; at the second venue pencils and leaflets.
     pub goods: String,
     /// His goal, as words that follow "I want" in his panel. Default "to serve the guests" \[I\].
@@ -66,6 +69,11 @@ pub struct ButlerParameters {
     pub table: Option<[f64; 2]>,
     /// Distance from the start within which he has come back, m. Default 1.5 ft \[I\].
     pub arrive_m: f64,
+    /// Time without progress on the way back after which he stays where he is, if a robot is in his way, s. Default 5 \[I\], as
+    /// Leguin's.
+    pub settle_s: f64,
+    /// Distance of a robot within which it counts as in his way, m. Default 6 ft \[I\]: three bodies.
+    pub settle_m: f64,
     /// Distance at which he stops before a refiller who could exchange and does not yet, m. Default 3 ft \[I\].
     pub stand_off_m: f64,
     /// Whether he intercepts a refiller who is still at the table. Default true \[I\].
@@ -140,6 +148,7 @@ impl Default for ButlerParameters {
     fn default() -> Self {
         Self {
             refiller: "Leguin".to_owned(),
+            recruitment: RecruiterParameters::default(),
             goods: "treats".to_owned(),
             goal: "to serve the guests".to_owned(),
             affect: Switch::On,
@@ -161,6 +170,8 @@ impl Default for ButlerParameters {
             reload_s: 2.0,
             table: None,
             arrive_m: 1.5 * FT_M,
+            settle_s: 5.0,
+            settle_m: 6.0 * FT_M,
             stand_off_m: 3.0 * FT_M,
             intercept_any: true,
             intercept_patience_s: 15.0,
@@ -205,6 +216,8 @@ impl ButlerParameters {
         not_negative("v_goback_mps", self.v_goback_mps)?;
         not_negative("reload_s", self.reload_s)?;
         not_negative("arrive_m", self.arrive_m)?;
+        not_negative("settle_s", self.settle_s)?;
+        not_negative("settle_m", self.settle_m)?;
         not_negative("stand_off_m", self.stand_off_m)?;
         positive("intercept_patience_s", self.intercept_patience_s)?;
         positive("progress_m", self.progress_m)?;
@@ -215,6 +228,7 @@ impl ButlerParameters {
         not_negative("look_s", self.look_s)?;
 
         self.script.check()?;
+        self.recruitment.check()?;
         if self.treat_capacity == 0 {
             return Err("treat_capacity must be at least 1".to_owned());
         }

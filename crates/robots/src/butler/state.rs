@@ -19,6 +19,11 @@ use crate::jokes::Jokes;
 use crate::panel::SPARKLINE_LEN;
 use crate::peer::Peer;
 use crate::published::{count, flag, location, number, saturated, text};
+use crate::recruitment::Recruitment;
+use crate::recruitment::recruiter::Recruiter;
+
+/// The name of a refiller before one has been recruited: no robot has it.
+const NOBODY: &str = "";
 
 /// Butler's memory.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -60,10 +65,14 @@ pub(super) struct ButlerMemory {
     /// Whether one of the two made progress in this tick.
     pub(super) comes_nearer: bool,
     pub(super) inputs: Inputs,
+    /// The distance of his start on the way back.
+    pub(super) way_back: Closing,
     pub(super) until_tap_s: f64,
     pub(super) rate: RateEstimator,
     pub(super) approach: ApproachEstimator,
     pub(super) refiller: Peer,
+    /// His call for any refiller, where he commands none by name.
+    pub(super) recruiter: Recruiter,
     /// Whether the refiller has left her table on her present errand.
     pub(super) refiller_left: bool,
     /// Whether the refiller has been seen on her way since he called.
@@ -107,10 +116,15 @@ impl ButlerMemory {
             chase: Closing::default(),
             comes_nearer: false,
             inputs: Inputs::default(),
+            way_back: Closing::default(),
             until_tap_s: parameters.treat_mean_s,
             rate: RateEstimator::new(parameters.rate())?,
             approach: ApproachEstimator::new(parameters.approach())?,
-            refiller: Peer::new(&parameters.refiller),
+            refiller: Peer::new(match parameters.recruitment.by {
+                Recruitment::Off => &parameters.refiller,
+                _ => NOBODY,
+            }),
+            recruiter: Recruiter::new(Chance::new(3)),
             refiller_left: false,
             refiller_came: false,
             refiller_is_called: false,
@@ -134,6 +148,22 @@ impl ButlerMemory {
         self.turns = Chance::split(cars.random());
         self.jokes = Jokes::new(Chance::split(cars.random()), parameters.joke_mean_s);
         self.until_tap_s = self.taps.exponential(parameters.treat_mean_s);
+        if parameters.recruitment.by.is_on() {
+            self.recruiter = Recruiter::new(Chance::split(cars.random()));
+        }
+    }
+
+    /// From now on this is the refiller who is to come.
+    pub(super) fn engage(&mut self, refiller: &str) {
+        self.refiller = Peer::new(refiller);
+        self.table = None;
+        self.refiller_left = false;
+        self.refiller_came = false;
+        self.refiller_is_called = false;
+        self.errand = Closing::default();
+        self.chase = Closing::default();
+        self.come_m = 0.0;
+        self.approach.expect_again();
     }
 
     /// Advances the timers by one tick.

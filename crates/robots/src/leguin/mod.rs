@@ -2,6 +2,7 @@
 //! when she is sent home or is frustrated.
 
 mod appraisal;
+mod helping;
 mod parameters;
 mod state;
 mod tables;
@@ -77,6 +78,7 @@ impl CarsRobotInterface for Leguin {
     fn init_robot(&mut self, cars: &mut Cars<'_>) -> Result<(), BadParameters> {
         *self = Self::new(cars.parameters()?).map_err(|reason| cars.bad_parameters(reason))?;
         self.state.begin(&self.parameters, cars);
+        self.begin_helping(cars);
         Ok(())
     }
 
@@ -85,6 +87,10 @@ impl CarsRobotInterface for Leguin {
     }
 
     fn set_command(&mut self, cars: &mut Cars<'_>, from: &RobotName, command: &str) {
+        if self.answer(cars, from, command) {
+            return;
+        }
+
         let behavior = self.behavior();
         let state = &mut self.state;
         match (command, behavior) {
@@ -151,7 +157,8 @@ impl CarsRobotInterface for Leguin {
     }
 
     fn state_variables(&self) -> StateVariables {
-        let variables = self.state.published(self.behavior(), self.goal());
+        let mut variables = self.state.published(self.behavior(), self.goal());
+        self.publish_shame(&mut variables);
         publish_variables(self.frame(), variables)
     }
 
@@ -176,6 +183,7 @@ impl Robot for Leguin {
     fn resume(&mut self, cars: &mut Cars<'_>, last: &StateVariables) {
         self.state.take_over(last);
         self.emotion.take_over(last);
+        self.resume_shame(last);
 
         let name = text(last, "behavior");
         let behavior = LeguinBehavior::ALL

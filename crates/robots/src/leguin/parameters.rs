@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::bounds::{not_negative, positive};
 use crate::drive::LOOK_S;
 use crate::policy::Policy;
+use crate::recruitment::shame::HelperParameters;
 use crate::script::Script;
 use crate::switch::Switch;
 use crate::units::FT_M;
@@ -79,6 +80,8 @@ pub struct LeguinParameters {
     pub look_s: f64,
     /// Mean time from one joke to the next while she is HAPPY and waits, s. Default 60 \[I\]; that she jokes \[D\].
     pub joke_mean_s: f64,
+    /// How she answers a waiter who calls for help.
+    pub recruitment: HelperParameters,
     /// Constants of her emotions.
     pub dynamics: DynamicsParameters,
 }
@@ -114,6 +117,7 @@ impl Default for LeguinParameters {
             turn_mean_s: 5.0,
             look_s: LOOK_S,
             joke_mean_s: 60.0,
+            recruitment: HelperParameters::default(),
             dynamics: DynamicsParameters::default(),
         }
     }
@@ -148,6 +152,7 @@ impl LeguinParameters {
         not_negative("errand_pressure", self.errand_pressure)?;
         not_negative("hurry_pressure", self.hurry_pressure)?;
         self.script.check()?;
+        self.recruitment.check()?;
         not_negative("arrive_m", self.arrive_m)?;
         not_negative("settle_s", self.settle_s)?;
         not_negative("settle_m", self.settle_m)?;

@@ -14,6 +14,7 @@ use crate::input::Inputs;
 use crate::jokes::Jokes;
 use crate::peer::Peer;
 use crate::published::{count, flag, location, text};
+use crate::recruitment::shame::Shame;
 
 /// Leguin's memory.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -44,6 +45,8 @@ pub(super) struct LeguinMemory {
     pub(super) waiter_needs: bool,
     /// Whom he called for.
     pub(super) waiter_calls: Option<String>,
+    /// Her shame at calls for help.
+    pub(super) shame: Shame,
     pub(super) measures: LeguinMeasures,
     pub(super) appraisal: Appraisal,
     pub(super) turns: Chance,
@@ -69,6 +72,7 @@ impl LeguinMemory {
             waiter: Peer::new(&parameters.waiter),
             waiter_needs: false,
             waiter_calls: None,
+            shame: Shame::default(),
             measures: LeguinMeasures::default(),
             appraisal: Appraisal::default(),
             turns: Chance::new(0),
