@@ -41,6 +41,7 @@ mod protocol;
 mod python;
 mod record;
 mod recording;
+mod recruitment;
 mod replay;
 mod replayed;
 mod report;
