@@ -39,6 +39,7 @@ const FILES: &[(&str, &str)] = &texts![
     "configs/hors_doeuvres.toml",
     "configs/links/cut_leguin.toml",
     "configs/museum.toml",
+    "configs/pantry.toml",
     "configs/partition.toml",
     "configs/recruitment.toml",
     "configs/robots/butler.toml",

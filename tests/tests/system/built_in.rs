@@ -167,6 +167,7 @@ fn every_name_can_be_checked_and_an_unknown_one_shows_them() {
         "crowded_hall",
         "walled_hall",
         "deliberate",
+        "pantry",
         "affect",
         "crowd",
     ] {
