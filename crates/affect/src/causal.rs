@@ -177,7 +177,14 @@ pub struct Circumstances<'a> {
     pub amount: Option<&'a str>,
 }
 
-impl Circumstances<'_> {
+impl<'a> Circumstances<'a> {
+    /// These circumstances with an amount left.
+    #[must_use]
+    pub fn with_amount(mut self, amount: &'a str) -> Self {
+        self.amount = Some(amount);
+        self
+    }
+
     fn word(&self, slot: &str) -> Option<&str> {
         match slot {
             "g" => self.goal,

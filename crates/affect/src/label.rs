@@ -56,6 +56,11 @@ impl StandardEmotion {
         Self::Hopeful,
     ];
 
+    /// The emotion with this name, if there is one.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|emotion| emotion.name() == name)
+    }
+
     /// Whether this emotion is at least as serious as `other`.
     ///
     /// The scale is HAPPY, CONFIDENT, CONCERNED, FRUSTRATED, ANGRY: the order of the paper's Table 2, with ANGRY
@@ -167,6 +172,7 @@ mod tests {
         for emotion in StandardEmotion::ALL {
             let json = serde_json::to_string(&emotion).unwrap();
             assert_eq!(json, format!("\"{}\"", emotion.name()));
+            assert_eq!(StandardEmotion::named(emotion.name()), Some(emotion));
         }
     }
 }

@@ -9,6 +9,7 @@
 //! | --- | --- |
 //! | Describe a personality, appraise a situation | [`akr`] |
 //! | Describe the tree of personality, affect, moods and emotions, and explain an emotion in words | [`Schemata`], [`CausalChain`] |
+//! | Follow an emotion from its beginning to its end, appraise it | [`Episode`], [`Prediction`], [`RecentShare`] |
 //! | Describe an emotion with all its components, publish it | [`AffectFrame`] |
 //! | Measure progress | [`progress`] |
 //! | Change a feeling over time with progress, events and beliefs | [`Dynamics`], [`Ladder`] |
@@ -40,7 +41,7 @@
 //! use affect::akr::{Agency, Appraisal, Valence};
 //! use affect::behavior::{BehaviorGenerator, Row, Then::{Go, Stay}};
 //! use affect::{Caution, Circumstances, Dynamics, DynamicGenerator, DynamicsParameters};
-//! use affect::{EmotionGenerator, EmotionLabel, Feeling, Ladder, ProgressEvent, Rung, Schemata, Stimulus};
+//! use affect::{EmotionGenerator, EmotionLabel, Episode, Feeling, Ladder, ProgressEvent, Rung, Schemata, Stimulus};
 //!
 //! #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 //! enum Mind { Content, Restless, Bored }
@@ -124,19 +125,23 @@
 //!
 //! let feeling = esg.feeling();
 //! let alone = (measures.alone_s / measures.bearable_s).min(1.0);
-//! let group = Agency::Other("the group".to_owned());
-//! let appraisal = Appraisal::new(1.0 - 2.0 * alone, 0.0, 1.0, group);
-//!
-//! let schemata = Schemata::from_toml(SCHEMA)?;
-//! let bored = schemata.frame(feeling.emotion.name(), feeling.urgency, appraisal).ok_or("no schema")?;
+//! let appraisal = Appraisal::new(1.0 - 2.0 * alone, 0.0, 1.0);
 //! let circumstances = Circumstances {
 //!     other: Some("the group"),
 //!     goal: Some("to show the exhibits"),
 //!     ..Default::default()
 //! };
+//!
+//! let schemata = Schemata::from_toml(SCHEMA)?;
+//! let name = feeling.emotion.name();
+//! let mut episode = Episode::default();
+//! episode.update(name, 0.5, |_| {
+//!     schemata.cause(name, Agency::Other("the group".to_owned()), "the wait", &circumstances)
+//! });
+//! let bored = schemata.frame(name, feeling.urgency, appraisal).ok_or("no schema")?.during(&episode);
 //! assert!(bored.valence() < -0.7);
 //! assert_eq!(
-//!     bored.why(&circumstances),
+//!     episode.cause().spoken(),
 //!     "I want to show the exhibits; the group did not come; because of this I want to be somewhere else."
 //! );
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -147,6 +152,7 @@ pub mod akr;
 pub mod behavior;
 mod causal;
 mod dynamics;
+mod episode;
 pub mod frame;
 mod generator;
 mod label;
@@ -159,6 +165,7 @@ mod schema;
 
 pub use causal::{CausalChain, Circumstances, Clause, ClauseError, ClauseKind};
 pub use dynamics::{Belief, Dynamics, EmotionState, Progress, ProgressEvent, StepInput, Stimulus};
+pub use episode::{Cause, Episode, Prediction, RecentShare};
 pub use frame::AffectFrame;
 pub use generator::{DynamicGenerator, EmotionGenerator};
 pub use label::{EmotionLabel, Feeling, StandardEmotion};

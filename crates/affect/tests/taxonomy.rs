@@ -8,9 +8,10 @@
 use affect::akr::{
     Agency, Appraisal, Duration, Focality, Level, Personality, Preference, TABLE_2, Valence,
 };
-use affect::frame::{AGENCY, CERTAINTY, CONTROLLABILITY, GOAL_CONGRUENCE, INTENSITY, VALENCE};
+use affect::frame::{ACTION_TENDENCY, DURATION, FACIAL_EXPRESSION};
 use affect::{
-    AffectFrame, Circumstances, EmotionLabel, SchemaError, Schemata, StandardEmotion, Urgency,
+    AffectFrame, Cause, Circumstances, EmotionLabel, Episode, SchemaError, Schemata,
+    StandardEmotion, Urgency,
 };
 
 fn frame(name: &str, urgency: f64, appraisal: Appraisal) -> AffectFrame<'_> {
@@ -48,39 +49,44 @@ fn schemata_have_the_tendencies_of_table_2() {
 }
 
 #[test]
-fn two_episodes_of_an_emotion_differ_in_their_appraisals() {
-    let blocked = Appraisal::new(-0.9, 0.0, 1.0, Agency::Other("Leguin".to_owned()));
-    let cut_off = Appraisal::new(-0.7, 1.0, 0.2, Agency::Oneself);
-    let first = frame("FRUSTRATED", 0.8, blocked);
-    let second = frame("FRUSTRATED", 0.9, cut_off);
+fn two_episodes_of_an_emotion_differ_in_their_components() {
+    let blocked = Appraisal::new(-0.9, 0.0, 1.0)
+        .with_novelty(0.9)
+        .with_modifiability(0.0)
+        .with_standards(0.5, 0.4);
+    let cut_off = Appraisal::new(-0.7, 1.0, 0.2)
+        .with_novelty(0.1)
+        .with_modifiability(0.5)
+        .with_standards(1.0, 0.9);
+    let began = |agency, name| {
+        let mut episode = Episode::default();
+        episode.update("FRUSTRATED", 0.5, |_| Cause {
+            agency,
+            focality: format!("event: {name}"),
+            causal_chain: format!("belief: {name}"),
+        });
+        episode
+    };
+    let mut one = began(Agency::Other("Leguin".to_owned()), "the delay");
+    let other = began(Agency::Oneself, "the way");
+    one.update("FRUSTRATED", 0.5, |_| Cause::default());
 
-    let [first_agency, ..] = first.texts();
-    let [second_agency, ..] = second.texts();
-    assert_eq!(first_agency, (AGENCY, "Leguin"));
-    assert_eq!(second_agency, (AGENCY, "self"));
-
-    let names = [
-        VALENCE,
-        INTENSITY,
-        GOAL_CONGRUENCE,
-        CONTROLLABILITY,
-        CERTAINTY,
-    ];
-    for name in names {
-        let value = |frame: &AffectFrame<'_>| {
-            let all = frame.numbers();
-            all.iter().find(|(own, _)| *own == name).unwrap().1
-        };
-        assert_ne!(value(&first), value(&second), "{name}");
+    let first = frame("FRUSTRATED", 0.8, blocked).during(&one);
+    let second = frame("FRUSTRATED", 0.9, cut_off).during(&other);
+    let shared = [ACTION_TENDENCY, DURATION, FACIAL_EXPRESSION];
+    for ((name, one), (_, other)) in first.components().zip(second.components()) {
+        assert_eq!(one == other, shared.contains(&name), "{name}");
     }
 }
 
 #[test]
 fn an_appraisal_stays_within_its_scales() {
-    let beyond = Appraisal::new(7.0, -1.0, f64::INFINITY, Agency::Oneself);
+    let beyond = Appraisal::new(7.0, -1.0, f64::INFINITY).with_standards(2.0, f64::NAN);
     assert_eq!(beyond.goal_congruence(), 1.0);
     assert_eq!(beyond.controllability(), 0.0);
     assert_eq!(beyond.certainty(), 1.0);
+    assert_eq!(beyond.external_norms(), Some(1.0));
+    assert_eq!(beyond.internal_standards(), Some(0.0));
 
     let text = serde_json::to_string(&beyond).unwrap();
     assert_eq!(serde_json::from_str::<Appraisal>(&text).unwrap(), beyond);

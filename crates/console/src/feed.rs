@@ -450,6 +450,7 @@ mod tests {
             display_unit: DisplayUnit::default(),
             robots: Vec::new(),
             guests: vec![[1.0, 2.0]],
+            guest_moods: BTreeMap::new(),
             obstacles: Vec::new(),
             flights: vec![flight],
             cuts: Vec::new(),

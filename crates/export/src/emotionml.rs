@@ -5,7 +5,7 @@
 //! would count every emotion twice. There are therefore two views of a run: one in the robots' own names, which the document
 //! declares together with the nearest terms of W3C, and one in W3C's vocabularies only.
 //!
-//! The record is read tick by tick. Only emotions in progress are in memory, seven numbers a tick of each.
+//! The record is read tick by tick. Only emotions in progress are in memory, nine numbers a tick of each.
 
 mod terms;
 
@@ -14,8 +14,8 @@ use std::io::Write;
 
 use affect::Schemata;
 use affect::frame::{
-    ACTION_TENDENCY, AGENCY, CERTAINTY, CONTROLLABILITY, FACIAL_EXPRESSION, GOAL_CONGRUENCE,
-    INTENSITY, URGENCY, VALENCE,
+    ACTION_TENDENCY, AGENCY, CAUSAL_CHAIN, CERTAINTY, CONTROLLABILITY, FACIAL_EXPRESSION, FOCALITY,
+    GOAL_CONGRUENCE, INTENSITY, MODIFIABILITY, NOVELTY, URGENCY, VALENCE,
 };
 use config::FileError;
 use protocol::keys::Keys;
@@ -49,7 +49,7 @@ const TENDENCY: usize = 1;
 /// State variables of the affect frame, and what they are in EmotionML: kind of descriptor, name, and offset and factor that make
 /// a number from 0 to 1 of them. One that is out of this range has another meaning, and is not exported. The first one is
 /// written tick by tick, and of all others the mean.
-const MEASURES: [(&str, &str, &str, f64, f64); 7] = [
+const MEASURES: [(&str, &str, &str, f64, f64); 9] = [
     (INTENSITY, "dimension", "intensity", 0.0, 1.0),
     (VALENCE, "dimension", "valence", 0.5, 0.5),
     (CERTAINTY, "dimension", "unpredictability", 1.0, -1.0),
@@ -57,6 +57,8 @@ const MEASURES: [(&str, &str, &str, f64, f64); 7] = [
     (CONTROLLABILITY, "appraisal", "controllability", 0.0, 1.0),
     (URGENCY, "appraisal", "urgency", 0.0, 1.0),
     (GOAL_CONGRUENCE, "appraisal", "desirability", 0.5, 0.5),
+    (NOVELTY, "appraisal", "unexpectedness", 0.0, 1.0),
+    (MODIFIABILITY, "appraisal", "changeability", 0.0, 1.0),
 ];
 
 /// What a robot publishes in a tick, in the order of [`MEASURES`].
@@ -243,9 +245,15 @@ impl<W: Write> Document<'_, W> {
         write!(
             self.out,
             "  <emotion id=\"emotion.{robot}.{}\" time-ref-uri=\"{clock}\" offset-to-start=\"{begin_ms}\" \
-             duration=\"{duration_ms}\"{sets}{face}>\n{descriptors}",
+             duration=\"{duration_ms}\"{sets}{face}>\n",
             stay.period.begin
         )?;
+        let about = [FOCALITY, CAUSAL_CHAIN].map(|name| published.text(name));
+        let about: Vec<&str> = about.into_iter().flatten().collect();
+        if !about.is_empty() {
+            writeln!(self.out, "    <info>{}</info>", escape(&about.join("; ")))?;
+        }
+        self.out.write_all(descriptors.as_bytes())?;
         self.reference(robot, "experiencedBy")?;
         if let Some(other) = published
             .other

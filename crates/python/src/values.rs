@@ -84,7 +84,7 @@ pub(crate) fn variables<'py>(
         match value {
             Variable::Flag(flag) => all.set_item(name, flag)?,
             Variable::Number(number) => all.set_item(name, number)?,
-            Variable::Text(text) => all.set_item(name, text)?,
+            Variable::Text(text) => all.set_item(name, text.as_str())?,
         }
     }
     Ok(all)
@@ -107,7 +107,7 @@ fn read_variable(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Variable> {
         return Ok(Variable::Flag(value.is_truthy()?));
     }
     if let Ok(text) = value.cast::<PyString>() {
-        return Ok(Variable::Text(text.to_string()));
+        return Ok(Variable::from(text.to_string()));
     }
 
     match value.extract() {

@@ -1,7 +1,7 @@
 //! Vera likes parties and is shy: if too many bodies are around her, she returns to her start until she is calm.
 
 use affect::akr::{Agency, Appraisal};
-use affect::{AffectFrame, Circumstances, Schemata, Urgency};
+use affect::{AffectFrame, Circumstances, Episode, Schemata, Urgency};
 use robot::{Action, BadParameters, Cars, Panel, Point, Robot, Widget};
 use robots::drive::{Drive, StraightDrive};
 
@@ -15,8 +15,6 @@ struct Parameters {
 
 const CALM: &str = "CALM";
 const SHY: &str = "SHY";
-const MINGLE: &str = "MINGLE";
-const HIDE: &str = "HIDE";
 
 /// The emotion state generator. Progress is one number: bodies around her, as a share of those that are too many.
 fn feel(emotion: &'static str, crowding: f64) -> &'static str {
@@ -34,6 +32,7 @@ pub(crate) struct Vera {
     drive: Drive,
     near: f64, // bodies around her
     emotion: &'static str,
+    episode: Episode, // of her emotion
 }
 
 impl Robot for Vera {
@@ -52,11 +51,18 @@ impl Robot for Vera {
         self.near = cars.bodies().len() as f64;
         let crowding = self.near / self.parameters.bearable;
         self.emotion = feel(self.emotion, crowding);
+        self.episode.update(self.emotion, cars.tick_s(), |_| {
+            let near = self.near.to_string();
+            let words = Circumstances::default().with_amount(&near);
+            let crowd = Agency::Other("the crowd".into());
+            self.schemata
+                .cause(self.emotion, crowd, "the party", &words)
+        });
 
         // The behavior state generator.
         let (behavior, goal) = match self.emotion {
-            SHY => (HIDE, cars.welcome().location),
-            _ => (MINGLE, self.parameters.party_m),
+            SHY => ("HIDE", cars.welcome().location),
+            _ => ("MINGLE", self.parameters.party_m),
         };
         let course = StraightDrive::to(goal, self.parameters.speed_mps);
         let action = self.drive.follow(cars, course);
@@ -68,28 +74,22 @@ impl Robot for Vera {
     }
 
     fn panel(&self) -> Panel {
-        let near = self.near.to_string();
-        let words = Circumstances {
-            amount: Some(&near),
-            ..Circumstances::default()
-        };
-        let text = self.frame().map(|frame| frame.why(&words));
         let widgets = vec![Widget::Text {
             label: "why".into(),
-            text: text.unwrap_or_default(),
+            text: self.episode.cause().spoken(),
         }];
         Panel { widgets }
     }
 }
 
 impl Vera {
-    /// What she feels, and how she judges it: the crowd is to blame, and she can always leave.
+    /// What she feels, and how she judges it: she can always leave, and sees all of it.
     fn frame(&self) -> Option<AffectFrame<'_>> {
         let crowding = self.near / self.parameters.bearable;
-        let crowd = Agency::Other("the crowd".into());
-        let appraisal = Appraisal::new(1.0 - 2.0 * crowding, 1.0, 1.0, crowd);
-        self.schemata
-            .frame(self.emotion, Urgency::saturating(crowding), appraisal)
+        let appraisal = Appraisal::new(1.0 - 2.0 * crowding, 1.0, 1.0);
+        let urgency = Urgency::saturating(crowding);
+        let frame = self.schemata.frame(self.emotion, urgency, appraisal)?;
+        Some(frame.during(&self.episode))
     }
 }
 

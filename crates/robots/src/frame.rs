@@ -1,18 +1,22 @@
 //! The affect frame of a robot with the standard emotions, and how a frame is published.
 
 use affect::akr::Appraisal;
-use affect::{AffectFrame, EmotionLabel, Feeling, Schemata, StandardEmotion};
-use robot::{Action, StateVariables};
+use affect::frame::Value;
+use affect::{AffectFrame, Caution, EmotionLabel, Episode, Feeling, Schemata, StandardEmotion};
+use robot::{Action, StateVariables, Variable};
 
 /// The frame of a feeling; `None` for a robot without emotions.
-pub(crate) fn of(
+pub(crate) fn of<'a>(
     feeling: Option<Feeling<StandardEmotion>>,
-    appraisal: &Appraisal,
-) -> Option<AffectFrame<'static>> {
+    appraisal: Appraisal,
+    episode: &'a Episode,
+    caution: Caution,
+) -> Option<AffectFrame<'a>> {
     let feeling = feeling?;
     let name = feeling.emotion.name();
+    let frame = Schemata::standard().frame(name, feeling.urgency, appraisal)?;
 
-    Schemata::standard().frame(name, feeling.urgency, appraisal.clone())
+    Some(frame.during(episode).with_caution(caution))
 }
 
 /// The action of a robot with this frame: its emotion, and the state variables of [`publish_variables`].
@@ -31,17 +35,18 @@ pub fn publish(frame: Option<AffectFrame<'_>>, action: Action) -> Action {
 #[must_use]
 pub fn publish_variables(
     frame: Option<AffectFrame<'_>>,
-    mut variables: StateVariables,
+    variables: StateVariables,
 ) -> StateVariables {
     let Some(frame) = frame else {
         return variables;
     };
 
-    for (name, number) in frame.numbers() {
-        variables.insert(name, number.into());
-    }
-    for (name, text) in frame.texts() {
-        variables.insert(name, text.into());
-    }
-    variables
+    let components = frame.components().map(|(name, value)| {
+        let value = match value {
+            Value::Number(number) => Variable::from(number),
+            Value::Text(text) => Variable::from(text),
+        };
+        (name, value)
+    });
+    variables.with(components)
 }

@@ -16,6 +16,7 @@
 mod bounds;
 pub mod butler;
 pub mod chance;
+mod checks;
 mod classes;
 pub mod closing;
 mod commands;

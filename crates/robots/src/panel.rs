@@ -1,7 +1,7 @@
 //! Widgets that the panels of the robots share.
 
 use affect::akr::{FacialExpression, Valence};
-use affect::{AffectFrame, Circumstances};
+use affect::{AffectFrame, Cause, Episode};
 use robot::{Face, Tone, Widget};
 
 use crate::emotion::NEUTRAL;
@@ -9,12 +9,9 @@ use crate::emotion::NEUTRAL;
 /// Values in a panel's curve: a minute of ticks of half a second.
 pub(crate) const SPARKLINE_LEN: usize = 120;
 
-/// Face, name, intensity and cause of an emotion, and the appraisal that comes with it; `None` without emotions.
-pub(crate) fn affect(
-    frame: Option<&AffectFrame<'_>>,
-    label_cuts: &[f64; 4],
-    circumstances: &Circumstances<'_>,
-) -> Vec<Widget> {
+/// Face, name and intensity of an emotion, what it inclines the robot to do, and why; `None` without emotions. The other
+/// components are state variables, which the console shows of every robot.
+pub(crate) fn affect(frame: Option<&AffectFrame<'_>>, label_cuts: &[f64; 4]) -> Vec<Widget> {
     let Some(frame) = frame else {
         return vec![
             Widget::Face {
@@ -26,7 +23,7 @@ pub(crate) fn affect(
     };
 
     let intensity = frame.intensity();
-    let appraisal = frame.appraisal();
+    let cause = frame.episode().map(Episode::cause);
     vec![
         Widget::Face {
             face: face(frame.schema().facial_expression),
@@ -40,21 +37,13 @@ pub(crate) fn affect(
             max: 1.0,
         },
         Widget::Text {
-            label: "why".to_owned(),
-            text: frame.why(circumstances),
+            label: "inclined to".to_owned(),
+            text: frame.schema().action_tendency.name().replace('-', " "),
         },
-        table([
-            (
-                "goal congruence",
-                format!("{:.2}", appraisal.goal_congruence()),
-            ),
-            (
-                "controllability",
-                format!("{:.2}", appraisal.controllability()),
-            ),
-            ("certainty", format!("{:.2}", appraisal.certainty())),
-            ("agency", appraisal.agency().name().to_owned()),
-        ]),
+        Widget::Text {
+            label: "why".to_owned(),
+            text: cause.map(Cause::spoken).unwrap_or_default(),
+        },
     ]
 }
 

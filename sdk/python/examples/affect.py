@@ -57,8 +57,85 @@ class Appraisal:
     """How much can be done about it, 0 to 1."""
     certainty: float = 0.0
     """How much is known of it, 0 to 1."""
+    novelty: float = 0.0
+    """How far the situation is from what was predicted, 0 to 1."""
+    modifiability: float = 0.5
+    """Whether it can change without oneself: 1 another one acts on it, 0.5 unknown, 0 none does."""
+    external_norms: float = 1.0
+    """How far one does what one owes others, 0 to 1."""
+    internal_standards: float = 1.0
+    """How far one does what one expects of oneself, 0 to 1."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cause:
+    """Why an episode began; kept until it ends."""
+
     agency: str = "self"
     """Who is responsible: oneself, or another one by name."""
+    focality: str = ""
+    """What it is about."""
+    causal_chain: str = ""
+    """The beliefs and goals behind it, each with its kind."""
+
+
+class Episode:
+    """A time without a break in one emotion."""
+
+    def __init__(self) -> None:
+        self.emotion: Emotion | None = None
+        self.lasted_s = 0.0
+        self.cause = Cause()
+
+    def update(self, emotion: Emotion, dt_s: float, begin: Callable[[Cause], Cause]) -> None:
+        """Goes on, or begins another one, with the cause that ``begin`` finds, given the one before."""
+        if emotion is self.emotion:
+            self.lasted_s += dt_s
+        else:
+            self.emotion, self.lasted_s, self.cause = emotion, 0.0, begin(self.cause)
+
+
+def ticks_in(time_s: float, dt_s: float) -> int:
+    """How many ticks a memory of this time has."""
+    return min(max(int(time_s / dt_s + 0.5), 1), 10_000)
+
+
+class Prediction:
+    """How new the value of a measure is: how far it is from what its trend predicted one horizon ago."""
+
+    def __init__(self, horizon_s: float) -> None:
+        self.horizon_s = horizon_s
+        self.novelty = 0.0
+        self._values: list[float] = []
+
+    def observe(self, value: float, dt_s: float) -> None:
+        """Adds the value of a tick, 0 to 1."""
+        ticks = ticks_in(self.horizon_s, dt_s)
+        self._values = [*self._values, value][-(2 * ticks + 1) :]
+        base = len(self._values) - 1 - ticks
+        if base < 0:
+            self.novelty = 0.0
+            return
+        known = min(base, ticks)
+        change = (self._values[base] - self._values[base - known]) / known * ticks if known else 0.0
+        self.novelty = abs(value - min(max(self._values[base] + change, 0.0), 1.0))
+
+
+class RecentShare:
+    """The share of recent ticks that were good."""
+
+    def __init__(self, recent_s: float) -> None:
+        self.recent_s = recent_s
+        self._ticks: list[bool] = []
+
+    def add(self, is_good: bool, dt_s: float) -> None:
+        """Adds a tick."""
+        self._ticks = [*self._ticks, is_good][-ticks_in(self.recent_s, dt_s) :]
+
+    @property
+    def share(self) -> float:
+        """0 to 1."""
+        return sum(self._ticks) / len(self._ticks) if self._ticks else 1.0
 
 
 B = TypeVar("B")

@@ -18,11 +18,15 @@ from typing import Literal
 from affect import (
     Appraisal,
     BehaviorGenerator,
+    Cause,
     DynamicGenerator,
     DynamicsParameters,
     Emotion,
+    Episode,
     Event,
     Feeling,
+    Prediction,
+    RecentShare,
     Row,
     intensity_label,
     motor_gain,
@@ -184,12 +188,23 @@ TABLE: tuple[Row[Behavior, Context, Act], ...] = (
     Row((WAIT, HOME),   lambda c: c.is_happy and c.has_joke,          (Act.JOKE,),          None),
 )
 
-EXPRESSIONS: dict[Emotion, tuple[FaceName, Tone, str]] = {
+EXPRESSIONS: dict[Emotion, tuple[FaceName, Tone, tuple[str, ...]]] = {
     # What people see of an emotion, and how she accounts for it: {g} is her goal, {a} who is in the way of it.
-    HAPPY:      ("happy",   "good",    "something good is happening; I wanted this: {g}; because of this I feel good"),
-    CONFIDENT:  ("neutral", "neutral", "I want {g}; I think this will happen; I know what to do"),
-    CONCERNED:  ("fearful", "warning", "I want {g}; {a} is not here; something bad can happen soon"),
-    FRUSTRATED: ("angry",   "bad",     "I want {g}; I cannot do this now; {a} is not here; I tried"),
+    HAPPY: ("happy", "good", (
+        "belief: something good is happening", "achieved goal: I wanted this: {g}", "effect: because of this I feel good",
+    )),
+    CONFIDENT: ("neutral", "neutral", (
+        "goal: I want {g}", "belief: I think this will happen", "belief: I know what to do",
+        "effect: because of this I feel good",
+    )),
+    CONCERNED: ("fearful", "warning", (
+        "goal: I want {g}", "belief: {a} is not here", "belief: something bad can happen soon", "belief: I do not want it",
+        "belief: I do not know if it will happen", "effect: because of this I feel bad",
+    )),
+    FRUSTRATED: ("angry", "bad", (
+        "goal: I want {g}", "belief: I cannot do this now", "belief: {a} is not here", "belief: I tried",
+        "effect: because of this I feel bad and want to do something else",
+    )),
 }
 # fmt: on
 
@@ -204,6 +219,12 @@ TENDENCIES = {
 
 CROWD = "the crowd"
 """The name of what blocks her way."""
+
+ANSWER_S, PREDICTION_S, RECENT_S = 20.0, 5.0, 60.0
+"""Time in which she is to answer a call; how far ahead she predicts, and how far back she judges what she does."""
+
+EVENTS = {WAIT: "the rest", DRIVE: "the call", EXCHANGE: "the exchange", AWAIT: "the wait", HOME: "the way home"}
+"""What an emotion that begins is about, if the crowd does not block her way."""
 
 
 def urgency(measures: Measures, behavior: Behavior) -> float:
@@ -230,6 +251,12 @@ class Leguin(CarsRobotInterface):
         self.bsg = BehaviorGenerator(TABLE, WAIT)
         self.measures = Measures()
         self.appraisal = Appraisal()
+        self.episode = Episode()
+        self.pressure = Prediction(PREDICTION_S)
+        self.owed_s: float | None = None  # How long ago she was first called, until she comes.
+        self.duty = RecentShare(RECENT_S)
+        self.is_on_errand = False
+        self.ended = self.completed = 0  # Errands, and those of them that she completed.
         self.at = self.home = cars.welcome.location
         self.legs = Legs()
         self.hurried = self.sent_home = False
@@ -243,6 +270,7 @@ class Leguin(CarsRobotInterface):
         self.waiter_calls: str | None = None
         self.turns, self.jokes = Chance.split(cars.random), Chance.split(cars.random)
         self.until_joke_s = self.jokes.exponential(self.parameters.joke_mean_s)
+        self.episode.update(HAPPY, 0.0, self.cause)
 
     @property
     def feeling(self) -> Feeling:
@@ -256,6 +284,8 @@ class Leguin(CarsRobotInterface):
 
     def set_command(self, cars: Cars, sender: str, command: str) -> None:
         behavior = self.bsg.current
+        if command in (REFILL, HURRY) and behavior is not EXCHANGE and self.owed_s is None:
+            self.owed_s = 0.0
         if command in (REFILL, HURRY) and behavior is EXCHANGE:
             pass  # What was meant to bring her about is over once she is there.
         elif command == REFILL:
@@ -275,6 +305,9 @@ class Leguin(CarsRobotInterface):
         self.bsg.advance(cars.tick_s)
         self.until_joke_s -= cars.tick_s
         self.waiting_s = self.waiting_s + cars.tick_s if behavior is AWAIT else 0.0
+        if self.owed_s is not None:
+            self.owed_s += cars.tick_s
+        self.duty.add(self.owed_s is None or self.owed_s <= ANSWER_S, cars.tick_s)
         self.observe_waiter(cars)
         self.observe_way(behavior, cars.tick_s)
         self.measures = Measures(
@@ -285,23 +318,49 @@ class Leguin(CarsRobotInterface):
             th_concerned=parameters.dynamics.th_concerned,
         )
 
-        self.appraisal = self.appraise()
-
     def appraise(self) -> Appraisal:
-        """Her judgment of this moment. The waiter is responsible if he told her to hurry or keeps her waiting, and the crowd
-        if it blocks her."""
+        """Her judgment of this moment."""
         measures = self.measures
-        agency = "self"
-        if measures.hurried or measures.waiting >= 0.5:
-            agency = self.waiter.name
-        elif measures.blocked >= measures.th_concerned:
-            agency = CROWD
         return Appraisal(
             goal_congruence=1.0 - 2.0 * urgency(measures, self.bsg.current),
             controllability=1.0 - min(measures.blocked, 1.0),
             certainty=self.waiter.location_certainty(self.parameters.query_stale_s),
-            agency=agency,
+            novelty=self.pressure.novelty,
+            modifiability=self.modifiability(),
+            external_norms=self.duty.share,
+            internal_standards=self.completed / self.ended if self.ended else 1.0,
         )
+
+    def modifiability(self) -> float:
+        """Whether the situation can change without her: the waiter comes, takes treats, or may call; a crowd may move."""
+        measures, behavior = self.measures, self.bsg.current
+        waiter = self.waiter.behavior(self.parameters.query_stale_s)
+        if behavior is EXCHANGE:
+            return 1.0
+        if waiter is None:
+            return 0.5
+        if waiter in ("INTERCEPT", "EXCHANGE") or behavior is WAIT:
+            return 1.0
+        return 0.5 if measures.blocked >= measures.th_concerned else 0.0
+
+    def cause(self, before: Cause) -> Cause:
+        """Why an emotion begins. The crowd is responsible if it blocks her, and the waiter if he told her to hurry or keeps her
+        waiting."""
+        measures, emotion, behavior = self.measures, self.feeling.emotion, self.bsg.current
+        is_blocked = measures.blocked >= measures.th_concerned
+        agency = "self"
+        if emotion is not HAPPY:
+            if is_blocked:
+                agency = CROWD
+            elif measures.hurried or measures.waiting > 0.0:
+                agency = self.waiter.name
+            elif emotion.is_negative:
+                agency = before.agency
+        event = "the blocked way" if is_blocked and behavior is DRIVE else EVENTS[behavior]
+        goal = f"to bring {self.parameters.goods} to {self.parameters.waiter}"
+        other = self.waiter.name if agency == "self" else agency
+        chain = "; ".join(EXPRESSIONS[emotion][2]).format(g=goal, a=other)
+        return Cause(agency, f"event: {event}", chain)
 
     def observe_waiter(self, cars: Cars) -> None:
         """What his answer says of what he needs, and of whom."""
@@ -325,13 +384,15 @@ class Leguin(CarsRobotInterface):
 
     def update_emotion_state(self, cars: Cars) -> None:
         behavior, event = self.bsg.current, self.event()
-        if self.parameters.affect != "on":
-            return
         pressure = None if behavior is EXCHANGE else urgency(self.measures, behavior)
-        self.esg.update(pressure, event, cars.tick_s)
-        if self.esg.progress is not None:
-            signed, is_event = self.esg.progress
-            self.progress = (self.shown if is_event else "falls behind", signed)
+        if self.parameters.affect == "on":
+            self.esg.update(pressure, event, cars.tick_s)
+            if self.esg.progress is not None:
+                signed, is_event = self.esg.progress
+                self.progress = (self.shown if is_event else "falls behind", signed)
+        self.pressure.observe(urgency(self.measures, behavior), cars.tick_s)
+        self.appraisal = self.appraise()
+        self.episode.update(self.feeling.emotion, cars.tick_s, self.cause)
 
     def event(self) -> Event | None:
         """What happened since the last emotion, or else what this tick's measures say."""
@@ -410,11 +471,15 @@ class Leguin(CarsRobotInterface):
             case Act.TAKE_ERRAND:
                 self.hurried, self.pending = self.pending == HURRY, ""
                 self.noted = "hurry" if self.hurried else "new errand"
+                self.is_on_errand = True
             case Act.HURRY:
                 self.hurried, self.pending = True, ""
                 self.noted = "hurry"
             case Act.FINISH_ERRAND:
                 self.hurried, self.pending, self.sent_home = False, "", False
+                self.owed_s = None
+                self.completed += self.is_on_errand
+                self.end_errand()
             case Act.TURN_HOME:
                 self.trips, self.sent_home = self.trips + 1, False
                 self.noted = "sent home"
@@ -422,11 +487,17 @@ class Leguin(CarsRobotInterface):
                 self.noted = "home"
             case Act.GIVE_UP:
                 self.given_up, self.hurried = self.given_up + 1, False
+                self.end_errand()
                 self.way = Closing()
                 self.noted = "gives up"
             case Act.JOKE:
                 cars.log(f"jokes: {JOKES[self.jokes.one_of(len(JOKES))]}")
                 self.until_joke_s = self.jokes.exponential(self.parameters.joke_mean_s)
+
+    def end_errand(self) -> None:
+        """She turns back, or her errand is completed."""
+        self.ended += self.is_on_errand
+        self.is_on_errand = False
 
     # Motion.
 
@@ -503,7 +574,7 @@ class Leguin(CarsRobotInterface):
 
     def frame(self) -> StateVariables:
         """What she feels and how she appraises it, under the names that robots with emotions share."""
-        emotion, appraisal = self.feeling.emotion, self.appraisal
+        emotion, appraisal, episode = self.feeling.emotion, self.appraisal, self.episode
         return {
             "valence": self.feeling.valence,
             "intensity": self.feeling.intensity,
@@ -511,7 +582,16 @@ class Leguin(CarsRobotInterface):
             "goal_congruence": appraisal.goal_congruence,
             "controllability": appraisal.controllability,
             "certainty": appraisal.certainty,
-            "agency": appraisal.agency,
+            "novelty": appraisal.novelty,
+            "modifiability": appraisal.modifiability,
+            "external_norms": appraisal.external_norms,
+            "internal_standards": appraisal.internal_standards,
+            "agency": episode.cause.agency,
+            "focality": episode.cause.focality,
+            "causal_chain": episode.cause.causal_chain,
+            "duration": "minutes",
+            "duration_s": episode.lasted_s,
+            "caution": self.parameters.caution,
             "action_tendency": TENDENCIES[emotion],
             "facial_expression": EXPRESSIONS[emotion][0],
         }
@@ -536,26 +616,17 @@ class Leguin(CarsRobotInterface):
         cars.log("is back, and takes over where the last one was lost")
 
     def panel(self) -> Panel:
-        appraisal = self.appraisal
-        goal = f"to bring {self.parameters.goods} to {self.parameters.waiter}"
-        face, tone, account = EXPRESSIONS[self.feeling.emotion]
+        face, tone, _ = EXPRESSIONS[self.feeling.emotion]
         strength = self.feeling.intensity
-        other = self.parameters.waiter if appraisal.agency == "self" else appraisal.agency
-        account = account.format(g=goal, a=other)
+        clauses = self.episode.cause.causal_chain.split("; ")
+        account = "; ".join(clause.split(": ", 1)[-1] for clause in clauses)
         label = intensity_label(strength, self.parameters.dynamics.label_cuts)
         feeling: list[Widget] = [
             Face(face, strength),
             Badge("emotion", self.emotion_state(), tone),
             Bar(f"intensity ({label})", strength),
+            Text("inclined to", TENDENCIES[self.feeling.emotion].replace("-", " ")),
             Text("why", account[0].upper() + account[1:] + "."),
-            Table(
-                [
-                    ("goal congruence", f"{appraisal.goal_congruence:.2f}"),
-                    ("controllability", f"{appraisal.controllability:.2f}"),
-                    ("certainty", f"{appraisal.certainty:.2f}"),
-                    ("agency", appraisal.agency),
-                ]
-            ),
         ]
         if self.parameters.affect != "on":
             feeling = [Face("neutral", 0.0), Badge("emotion", self.emotion_state())]

@@ -16,6 +16,7 @@ class Peer:
         """Whether it was looked for where it was last known to be, and not found."""
         self._is_sensed = False  # Whether that place was sensed in this tick.
         self._has_answered = False
+        self._behavior = ""  # In its last answer.
         self._unheard_s = 0.0  # How long ago it last answered.
         self._unseen_s = 0.0  # How long ago its place was last known.
 
@@ -44,6 +45,7 @@ class Peer:
         except CallError:
             return None
         self._has_answered = True
+        self._behavior = state.behavior_state
         self._unheard_s = 0.0
         return state
 
@@ -56,6 +58,10 @@ class Peer:
     def is_unknown(self, stale_s: float) -> bool:
         """Whether what goes on inside it cannot be known: it never answered, or not for longer than ``stale_s``."""
         return not self._has_answered or self._unheard_s > stale_s
+
+    def behavior(self, stale_s: float) -> str | None:
+        """Its behavior, unless its last answer is older than ``stale_s``."""
+        return None if self.is_unknown(stale_s) else self._behavior
 
     def location_certainty(self, stale_s: float) -> float:
         """How recent its last known place is: from 1, of this tick, to 0, older than ``stale_s`` or none."""

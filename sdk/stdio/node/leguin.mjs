@@ -67,12 +67,22 @@ const JOKES = [
   "My favorite distance is four feet.",
   "They say a watched pot never boils. Nobody has tried it with a watched robot.",
 ];
-/** Whether an emotion is unpleasant, its face, and what it inclines her to (Table 2 of the paper). */
+/** Whether an emotion is unpleasant, its face, what it inclines her to (Table 2 of the paper), and its causal chain. */
 const FEELINGS = {
-  HAPPY: [false, "happy", "free-activate"],
-  CONFIDENT: [false, "neutral", "continue-normal-activity"],
-  CONCERNED: [true, "fearful", "monitor-progress-closely"],
-  FRUSTRATED: [true, "angry", "change-current-strategy"],
+  HAPPY: [false, "happy", "free-activate", [
+    "belief: something good is happening", "achieved goal: I wanted this: {g}", "effect: because of this I feel good",
+  ]],
+  CONFIDENT: [false, "neutral", "continue-normal-activity", [
+    "goal: I want {g}", "belief: I think this will happen", "belief: I know what to do", "effect: because of this I feel good",
+  ]],
+  CONCERNED: [true, "fearful", "monitor-progress-closely", [
+    "goal: I want {g}", "belief: {a} is not here", "belief: something bad can happen soon", "belief: I do not want it",
+    "belief: I do not know if it will happen", "effect: because of this I feel bad",
+  ]],
+  FRUSTRATED: [true, "angry", "change-current-strategy", [
+    "goal: I want {g}", "belief: I cannot do this now", "belief: {a} is not here", "belief: I tried",
+    "effect: because of this I feel bad and want to do something else",
+  ]],
 };
 /** Emotions in the order in which the urgency leads to them, and the parameters with their thresholds. */
 const LADDER = [
@@ -81,14 +91,24 @@ const LADDER = [
   ["CONCERNED", "th_concerned"],
   ["FRUSTRATED", "th_frustrated"],
 ];
+/** How far ahead she predicts, how far back she judges, and how long a call may wait, seconds. */
+const [PREDICTION_S, RECENT_S, ANSWER_S] = [5, 60, 20];
 /** What she has done before on a way counts no more. */
 const NO_WAY = { stalledS: 0, nearestM: null, comesNearer: false };
-const finishErrand = () => set({ hurried: false, pending: "", sentHome: false });
+const endErrand = () => set({ ended: her.ended + her.isOnErrand, isOnErrand: 0 });
+const finishErrand = () => {
+  set({ owedS: null, completed: her.completed + her.isOnErrand });
+  endErrand();
+  set({ hurried: false, pending: "", sentHome: false });
+};
 const turnHome = () => set({ trips: her.trips + 1, sentHome: false, noted: "sent home" });
-const giveUp = () => set({ givenUp: her.givenUp + 1, hurried: false, noted: "gives up", ...NO_WAY });
+const giveUp = () => {
+  endErrand();
+  set({ givenUp: her.givenUp + 1, hurried: false, noted: "gives up", ...NO_WAY });
+};
 const takeErrand = ({ pending }) => {
   const hurried = pending === "hurry";
-  set({ hurried, pending: "", noted: hurried ? "hurry" : "new errand" });
+  set({ hurried, pending: "", noted: hurried ? "hurry" : "new errand", isOnErrand: 1 });
 };
 /** Behavior state generator: a row that applies acts, and goes where it says; without a place it reads on. */
 const BEHAVIORS = [
@@ -288,7 +308,7 @@ async function observeWaiter(sensed) {
   const state = await ask({ type: "query", of: parameters.waiter, what: "state" });
   if (state) {
     const { need, refiller } = state.state_variables ?? {};
-    set({ hasAnswered: true, unheardS: 0, waiterNeeds: need === true });
+    set({ hasAnswered: true, unheardS: 0, waiterNeeds: need === true, waiterBehavior: state.behavior_state });
     her.waiterCalls = typeof refiller === "string" ? refiller : null;
   }
   const seen = sensed.find(({ name }) => name === parameters.waiter)?.location;
@@ -336,16 +356,76 @@ function pressure() {
   return her.behavior === "AWAIT_GO_HOME" ? Math.min(waiting, 1) : 0;
 }
 
-/** How she judges the moment: who is responsible is the waiter if he hurries her or keeps her waiting, or the crowd. */
-function appraisal() {
-  const { hurried, blocked, waiting } = her.measures;
-  const isOfCrowd = blocked >= dynamics.th_concerned;
+const ticksIn = (seconds) => Math.min(Math.max(Math.round(seconds / told.tick_s), 1), 10000);
+
+/** How far the pressure is from what its trend predicted. */
+function novelty(value) {
+  const ticks = ticksIn(PREDICTION_S);
+  her.pressures.push(value);
+  her.pressures = her.pressures.slice(-(2 * ticks + 1));
+  const base = her.pressures.length - 1 - ticks;
+  if (base < 0) return 0;
+  const known = Math.min(base, ticks);
+  const change = known ? ((her.pressures[base] - her.pressures[base - known]) / known) * ticks : 0;
+  return Math.abs(value - Math.min(Math.max(her.pressures[base] + change, 0), 1));
+}
+
+/** Whether calls wait for too long. */
+function checkDuty() {
+  if (her.owedS !== null) her.owedS += told.tick_s;
+  her.duty.push(her.owedS !== null && her.owedS > ANSWER_S ? 0 : 1);
+  her.duty = her.duty.slice(-ticksIn(RECENT_S));
+}
+
+/** Whether the situation can change without her. */
+function modifiability() {
+  const isUnknown = !her.hasAnswered || her.unheardS > parameters.query_stale_s;
+  if (her.behavior === "EXCHANGE") return 1;
+  if (isUnknown) return 0.5;
+  if (["INTERCEPT", "EXCHANGE"].includes(her.waiterBehavior) || her.behavior === "WAIT") return 1;
+  return her.measures.blocked >= dynamics.th_concerned ? 0.5 : 0;
+}
+
+/** How she judges the moment. */
+function appraise() {
+  const { blocked } = her.measures;
+  const urgency = pressure();
   const age = her.unseenS === 0 ? 0 : Math.min(her.unseenS / parameters.query_stale_s, 1);
-  return {
-    goal_congruence: 1 - 2 * her.judgedPressure,
+  her.appraisal = {
+    goal_congruence: 1 - 2 * urgency,
     controllability: 1 - Math.min(blocked, 1),
     certainty: her.waiter === null ? 0 : 1 - age,
-    agency: hurried || waiting >= 0.5 ? parameters.waiter : isOfCrowd ? "the crowd" : "self",
+    novelty: novelty(urgency),
+    modifiability: modifiability(),
+    external_norms: her.duty.reduce((sum, one) => sum + one, 0) / her.duty.length,
+    internal_standards: her.ended ? her.completed / her.ended : 1,
+  };
+}
+
+/** Goes on with the episode of her emotion, or begins another one: who is responsible, and for what, is decided then. */
+function followEpisode(tickS) {
+  if (her.episode.of === her.emotion) {
+    her.episode.duration_s += tickS;
+    return;
+  }
+  const { hurried, blocked, waiting } = her.measures;
+  const isOfCrowd = blocked >= dynamics.th_concerned;
+  let agency = "self";
+  if (her.emotion !== "HAPPY") {
+    if (isOfCrowd) agency = "the crowd";
+    else if (hurried || waiting > 0) agency = parameters.waiter;
+    else if (isNegative()) agency = her.episode.agency;
+  }
+  const events = { WAIT: "the rest", EXCHANGE: "the exchange", AWAIT_GO_HOME: "the wait", GO_HOME: "the way home" };
+  const event = events[her.behavior] ?? (isOfCrowd ? "the blocked way" : "the call");
+  const words = { g: `to bring ${parameters.goods} to ${parameters.waiter}`, a: agency === "self" ? parameters.waiter : agency };
+  const chain = FEELINGS[her.emotion][3].map((clause) => clause.replace(/{([ga])}/, (_, slot) => words[slot]));
+  her.episode = {
+    of: her.emotion,
+    agency,
+    causal_chain: chain.join("; "),
+    duration_s: 0,
+    focality: `event: ${event}`,
   };
 }
 
@@ -391,7 +471,6 @@ function respond(shown, target, before, gain) {
     only, as far as they are important. */
 function updateEmotion() {
   const shown = input();
-  her.judgedPressure = pressure();
   if (!hasAffect()) return;
   her.unchangedS += told.tick_s;
   const rung = rungOf(her.emotion);
@@ -484,6 +563,7 @@ function haste() {
 
 function take({ from, command }) {
   const isThere = her.behavior === "EXCHANGE";
+  if (!isThere && (command === "refill" || command === "hurry")) her.owedS ??= 0;
   if (command === "refill") {
     if (!isThere && her.behavior !== "REFILL") her.pending ||= "refill";
   } else if (command === "hurry") {
@@ -510,12 +590,16 @@ async function finishTick() {
   const proposal = await projectLocation();
   const to = goal();
   const [, face, action_tendency] = FEELINGS[her.emotion];
+  const { of: _, ...episode } = her.episode;
   const frame = {
     valence: isNegative() ? -intensity() : intensity(),
     intensity: intensity(),
     urgency: her.urgency,
-    ...appraisal(),
+    ...her.appraisal,
+    ...episode,
     action_tendency,
+    caution: parameters.caution,
+    duration: "minutes",
     facial_expression: face,
   };
   send({
@@ -584,8 +668,23 @@ async function begin(init) {
     unchangedS: 0,
     noted: "", // What happened, for the next emotion.
     progress: null, // The last input that counted: its name, and its importance with its sign.
-    judgedPressure: 0,
     measures: { hurried: false, errand: 0, blocked: 0, waiting: 0 },
+    pressures: [], // Of the ticks from which she predicts.
+    owedS: null, // How long ago she was first called, until she comes.
+    duty: [], // Of recent ticks, whether no call waited for too long.
+    isOnErrand: 0,
+    ended: 0, // Errands, and those of them that she completed.
+    completed: 0,
+    appraisal: {
+      goal_congruence: 1,
+      controllability: 1,
+      certainty: 0,
+      novelty: 0,
+      modifiability: 0.5,
+      external_norms: 1,
+      internal_standards: 1,
+    },
+    episode: { of: "", agency: "self" },
     hurried: false,
     sentHome: false,
     pending: "",
@@ -596,6 +695,7 @@ async function begin(init) {
     ...NO_WAY,
   };
   her.untilJokeS = her.jokes.exponential(parameters.joke_mean_s);
+  followEpisode(0);
   if (init.tick === 0) return finishTick();
 
   const last = init.last_state_variables;
@@ -619,10 +719,13 @@ async function tick({ location, blocked = false, sensed = [], commands = [] }) {
   her.lastingS += told.tick_s;
   her.untilJokeS -= told.tick_s;
   her.waitingS = her.behavior === "AWAIT_GO_HOME" ? her.waitingS + told.tick_s : 0;
+  checkDuty();
   await observeWaiter(sensed);
   observeWay();
   measure();
   updateEmotion();
+  appraise();
+  followEpisode(told.tick_s);
   updateBehavior();
   await finishTick();
 }

@@ -26,41 +26,73 @@ impl Agency {
 
 /// A robot's judgment of its present situation.
 ///
-/// That emotions have controllability, certainty and agency is documented, and that valence follows from progress
-/// toward the goal [D: S]. No values or formulas have been published; the scales are chosen here \[I\]. A robot computes
-/// each value from what it perceives, so two episodes of the same emotion can differ in all of them.
+/// That emotions have these components is documented, and that valence follows from progress toward the goal [D: S]. No
+/// values or formulas have been published; the scales are chosen here \[I\]. A robot computes each value from what it
+/// perceives, so two episodes of the same emotion can differ in all of them. The last four are known only of robots that
+/// compute them. Numbers out of range are clamped, and NaN becomes 0.
 ///
 /// ```
-/// use affect::akr::{Agency, Appraisal};
-/// let appraisal = Appraisal::new(-3.0, 0.5, f64::NAN, Agency::Other("Leguin".to_owned()));
+/// use affect::akr::Appraisal;
+/// let appraisal = Appraisal::new(-3.0, 0.5, f64::NAN).with_novelty(0.25);
 /// assert_eq!(appraisal.goal_congruence(), -1.0);
 /// assert_eq!(appraisal.certainty(), 0.0);
+/// assert_eq!(appraisal.novelty(), Some(0.25));
+/// assert_eq!(appraisal.modifiability(), None);
 /// ```
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Appraisal {
     goal_congruence: f64,
     controllability: f64,
     certainty: f64,
-    agency: Agency,
+    novelty: Option<f64>,
+    modifiability: Option<f64>,
+    external_norms: Option<f64>,
+    internal_standards: Option<f64>,
 }
 
 impl Default for Appraisal {
     /// The appraisal of a robot that has perceived nothing yet: nothing is in its way, and nothing is certain.
     fn default() -> Self {
-        Self::new(1.0, 1.0, 0.0, Agency::Oneself)
+        Self::new(1.0, 1.0, 0.0)
     }
 }
 
 impl Appraisal {
-    /// Creates an appraisal. Numbers out of range are clamped, and NaN becomes 0.
-    pub fn new(goal_congruence: f64, controllability: f64, certainty: f64, agency: Agency) -> Self {
+    /// Creates an appraisal of a goal congruence, a controllability and a certainty.
+    pub fn new(goal_congruence: f64, controllability: f64, certainty: f64) -> Self {
         Self {
             goal_congruence: clamped(goal_congruence, -1.0),
             controllability: clamped(controllability, 0.0),
             certainty: clamped(certainty, 0.0),
-            agency,
+            novelty: None,
+            modifiability: None,
+            external_norms: None,
+            internal_standards: None,
         }
+    }
+
+    /// Adds how new the situation is: [`novelty`](Self::novelty).
+    #[must_use]
+    pub fn with_novelty(mut self, novelty: f64) -> Self {
+        self.novelty = Some(clamped(novelty, 0.0));
+        self
+    }
+
+    /// Adds whether the situation can change without the robot: [`modifiability`](Self::modifiability).
+    #[must_use]
+    pub fn with_modifiability(mut self, modifiability: f64) -> Self {
+        self.modifiability = Some(clamped(modifiability, 0.0));
+        self
+    }
+
+    /// Adds how far the robot does what it owes others, and what it expects of itself:
+    /// [`external_norms`](Self::external_norms), [`internal_standards`](Self::internal_standards).
+    #[must_use]
+    pub fn with_standards(mut self, external_norms: f64, internal_standards: f64) -> Self {
+        self.external_norms = Some(clamped(external_norms, 0.0));
+        self.internal_standards = Some(clamped(internal_standards, 0.0));
+        self
     }
 
     /// How well the situation fits the goal: from -1 (it prevents the goal) to 1 (nothing is in the way).
@@ -78,9 +110,25 @@ impl Appraisal {
         self.certainty
     }
 
-    /// The agent responsible for the situation.
-    pub fn agency(&self) -> &Agency {
-        &self.agency
+    /// How far the situation is from what was predicted, from 0 (as predicted) to 1.
+    pub fn novelty(&self) -> Option<f64> {
+        self.novelty
+    }
+
+    /// Whether the situation can change without the robot: 1 if another agent acts on it as far as is known, 0.5 if that is
+    /// not known, and 0 if none does.
+    pub fn modifiability(&self) -> Option<f64> {
+        self.modifiability
+    }
+
+    /// How far the robot does what it owes others, from 0 (not at all) to 1 (compatible with external norms).
+    pub fn external_norms(&self) -> Option<f64> {
+        self.external_norms
+    }
+
+    /// How far the robot does what it expects of itself, from 0 (not at all) to 1 (compatible with internal standards).
+    pub fn internal_standards(&self) -> Option<f64> {
+        self.internal_standards
     }
 }
 

@@ -383,7 +383,7 @@ fn check_done(raw: RawDone) -> Result<DoneLine, String> {
 fn variable(name: &str, value: Value) -> Result<Variable, String> {
     match value {
         Value::Bool(flag) => Ok(Variable::Flag(flag)),
-        Value::String(text) => Ok(Variable::Text(text)),
+        Value::String(text) => Ok(text.into()),
         Value::Number(number) => Ok(Variable::Number(number.as_f64().unwrap_or(f64::NAN))),
         _ => Err(format!(
             "field state_variables.{name}: a number, a text, true or false is expected"

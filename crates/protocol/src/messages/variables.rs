@@ -21,8 +21,8 @@ pub enum Variable {
     Flag(bool),
     /// A finite number, in SI units where it has one.
     Number(f64),
-    /// Text.
-    Text(String),
+    /// Text. A short one needs no memory of its own, and copies of a long one share it.
+    Text(#[schemars(with = "String")] SmolStr),
 }
 
 /// Derived, it would be tried as one kind after the other, and an error would be written for each that it is not: this runs
@@ -59,11 +59,11 @@ impl Visitor<'_> for VariableVisitor {
     }
 
     fn visit_str<E>(self, value: &str) -> Result<Variable, E> {
-        Ok(Variable::Text(value.to_owned()))
+        Ok(Variable::Text(SmolStr::new(value)))
     }
 
     fn visit_string<E>(self, value: String) -> Result<Variable, E> {
-        Ok(Variable::Text(value))
+        Ok(Variable::Text(SmolStr::new(value)))
     }
 }
 
@@ -84,12 +84,12 @@ impl From<bool> for Variable {
 }
 impl From<&str> for Variable {
     fn from(value: &str) -> Self {
-        Self::Text(value.to_owned())
+        Self::Text(SmolStr::new(value))
     }
 }
 impl From<String> for Variable {
     fn from(value: String) -> Self {
-        Self::Text(value)
+        Self::Text(SmolStr::new(value))
     }
 }
 
@@ -183,6 +183,28 @@ impl StateVariables {
                 None
             }
         }
+    }
+
+    /// Adds variables whose names are in alphabetical order, as fast as copying both. Of two with the same name the added one
+    /// counts.
+    #[must_use]
+    pub fn with(self, added: impl IntoIterator<Item = (&'static str, Variable)>) -> Self {
+        let added = added.into_iter();
+        let mut entries = Vec::with_capacity(self.len() + added.size_hint().1.unwrap_or(USUAL));
+        let mut own = match Arc::try_unwrap(self.0) {
+            Ok(own) => own.into_iter().peekable(),
+            Err(shared) => shared.to_vec().into_iter().peekable(),
+        };
+
+        for (name, value) in added {
+            while let Some(entry) = own.next_if(|(entry, _)| entry.as_str() < name) {
+                entries.push(entry);
+            }
+            let _replaced = own.next_if(|(entry, _)| entry.as_str() == name);
+            entries.push((SmolStr::new_static(name), value));
+        }
+        entries.extend(own);
+        Self::from_entries(entries)
     }
 
     /// Keeps the variables for which `is_kept` returns true. It is called once for each, in the order of the names.
@@ -373,6 +395,22 @@ mod tests {
             expected.retain(|name| !dropped.contains(name));
             assert_eq!(names, expected);
         }
+    }
+
+    #[test]
+    fn added_variables_are_merged() {
+        let own = variables(&[("b", 2.0), ("d", 4.0)]);
+        let copy = own.clone();
+        let number = Variable::Number;
+
+        let added = [("a", number(1.0)), ("b", number(9.0)), ("e", number(5.0))];
+        let expected = variables(&[("a", 1.0), ("b", 9.0), ("d", 4.0), ("e", 5.0)]);
+        assert_eq!(own.with(added), expected);
+        assert_eq!(copy, variables(&[("b", 2.0), ("d", 4.0)]));
+
+        // Another order is slower, and gives the same.
+        let added = [("e", number(5.0)), ("b", number(9.0)), ("a", number(1.0))];
+        assert_eq!(copy.with(added), expected);
     }
 
     #[test]

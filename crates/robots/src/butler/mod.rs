@@ -2,6 +2,7 @@
 //! time, asks her to hurry, or drives to meet her.
 
 mod appraisal;
+mod checks;
 mod deliberation;
 mod parameters;
 mod recruiting;
@@ -11,8 +12,7 @@ mod tables;
 use affect::behavior::{BehaviorGenerator, BehaviorState};
 use affect::progress::{need_ratio, time_to_arrive_by_depot_s, time_to_arrive_s, time_to_empty_s};
 use affect::{
-    AffectFrame, Circumstances, DynamicGenerator, Dynamics, EmotionState, Feeling, StandardEmotion,
-    Urgency,
+    AffectFrame, DynamicGenerator, Dynamics, EmotionState, Feeling, StandardEmotion, Urgency,
 };
 use robot::{
     Action, BadParameters, Cars, CarsRobotInterface, Panel, ParametersCheck, Point, PublicState,
@@ -79,6 +79,7 @@ impl CarsRobotInterface for Butler {
     fn init_robot(&mut self, cars: &mut Cars<'_>) -> Result<(), BadParameters> {
         *self = Self::new(cars.parameters()?).map_err(|reason| cars.bad_parameters(reason))?;
         self.state.begin(&self.parameters, cars);
+        self.follow_episode(0.0);
 
         let refiller = &self.parameters.refiller;
         let roster = &cars.welcome().roster;
@@ -109,10 +110,15 @@ impl CarsRobotInterface for Butler {
         let tick_s = cars.tick_s();
         self.bsg.advance(tick_s);
         self.state.advance(tick_s);
+        let [served, missed] = [self.state.served, self.state.missed];
         self.serve(tick_s);
         if self.recruits() {
             self.recruit(cars);
         }
+        let state = &mut self.state;
+        let [served, missed] = [state.served - served, state.missed - missed];
+        let has_treats = state.treats > 0;
+        state.checks.count(served, missed, has_treats, tick_s);
         self.observe_refiller(cars);
         self.measure(cars);
         self.believe(cars);
@@ -123,7 +129,7 @@ impl CarsRobotInterface for Butler {
             .emotion
             .update(&self.state.measures, self.bsg.current(), cars);
         self.state.inputs.record(progress);
-        self.state.appraisal = self.appraisal(cars);
+        self.check(cars);
         // A plan is a matter of what he feels.
         if self.deliberator.plans() && self.parameters.policy() == Policy::Emotion {
             self.plan(cars);
@@ -215,7 +221,8 @@ impl Robot for Butler {
     }
 
     fn panel(&self) -> Panel {
-        let mut widgets = self.feeling_widgets();
+        let cuts = &self.parameters.dynamics.label_cuts;
+        let mut widgets = panel::affect(self.frame().as_ref(), cuts);
         widgets.push(panel::behavior(self.behavior().name()));
         widgets.push(Widget::Bar {
             label: self.parameters.goods.clone(),
@@ -270,8 +277,15 @@ impl Butler {
 
     /// What he feels and why, as he publishes it; `None` without emotions.
     #[must_use]
-    pub fn frame(&self) -> Option<AffectFrame<'static>> {
-        frame::of(self.emotion.shown(), &self.state.appraisal)
+    pub fn frame(&self) -> Option<AffectFrame<'_>> {
+        let state = &self.state;
+        let feeling = self.emotion.shown();
+        frame::of(
+            feeling,
+            state.appraisal,
+            &state.checks.episode,
+            self.parameters.caution,
+        )
     }
 
     /// His behavior.
@@ -731,20 +745,6 @@ impl Butler {
         } else {
             refiller.location().or(self.table())
         }
-    }
-
-    fn feeling_widgets(&self) -> Vec<Widget> {
-        let amount = format!("{} {}", self.state.treats, self.parameters.goods);
-        let circumstances = Circumstances {
-            other: Some(self.state.refiller.name()),
-            goal: Some(&self.parameters.goal),
-            amount: Some(&amount),
-        };
-        panel::affect(
-            self.frame().as_ref(),
-            &self.parameters.dynamics.label_cuts,
-            &circumstances,
-        )
     }
 
     fn progress_table(&self) -> Widget {

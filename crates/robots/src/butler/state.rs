@@ -8,10 +8,12 @@ use affect::{Feeling, ParameterError, StandardEmotion};
 use robot::{Cars, Point, StateVariables};
 use serde::{Deserialize, Serialize};
 
+use super::checks::Checks;
 use super::deliberation::Mind;
 use super::parameters::ButlerParameters;
 use super::tables::{ButlerBehavior, ButlerMeasures};
 use crate::chance::Chance;
+use crate::checks;
 use crate::closing::Closing;
 use crate::drive::Drive;
 use crate::input::Inputs;
@@ -84,6 +86,7 @@ pub(super) struct ButlerMemory {
     pub(super) turns: Chance,
     pub(super) jokes: Jokes,
     pub(super) appraisal: Appraisal,
+    pub(super) checks: Checks,
     pub(super) mind: Mind,
     /// The curve of the panel.
     pub(super) valences: VecDeque<f64>,
@@ -132,7 +135,8 @@ impl ButlerMemory {
             taps: Chance::new(0),
             turns: Chance::new(1),
             jokes: Jokes::new(Chance::new(2), parameters.joke_mean_s),
-            appraisal: Appraisal::default(),
+            appraisal: checks::initial(),
+            checks: Checks::default(),
             mind: Mind::default(),
             valences: VecDeque::new(),
         })

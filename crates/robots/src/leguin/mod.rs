@@ -2,17 +2,15 @@
 //! when she is sent home or is frustrated.
 
 mod appraisal;
+mod checks;
 mod helping;
 mod parameters;
 mod state;
 mod tables;
 
-use affect::akr::Agency;
 use affect::behavior::{BehaviorGenerator, BehaviorState};
 use affect::levels::{SensoryMotor, SensoryMotorParameters};
-use affect::{
-    AffectFrame, Circumstances, DynamicGenerator, Dynamics, EmotionState, Feeling, StandardEmotion,
-};
+use affect::{AffectFrame, DynamicGenerator, Dynamics, EmotionState, Feeling, StandardEmotion};
 use robot::{
     Action, BadParameters, Cars, CarsRobotInterface, Panel, ParametersCheck, Point, Robot,
     RobotName, StateVariables, Widget, control_cycle, read_parameters,
@@ -79,6 +77,7 @@ impl CarsRobotInterface for Leguin {
         *self = Self::new(cars.parameters()?).map_err(|reason| cars.bad_parameters(reason))?;
         self.state.begin(&self.parameters, cars);
         self.begin_helping(cars);
+        self.follow_episode(0.0);
         Ok(())
     }
 
@@ -93,6 +92,9 @@ impl CarsRobotInterface for Leguin {
 
         let behavior = self.behavior();
         let state = &mut self.state;
+        if matches!(command, REFILL | HURRY) && behavior != LeguinBehavior::Exchange {
+            state.checks.owe();
+        }
         match (command, behavior) {
             // A call to come is obsolete once she is there.
             (REFILL | HURRY, LeguinBehavior::Exchange) | (REFILL, LeguinBehavior::Refill) => {}
@@ -115,6 +117,7 @@ impl CarsRobotInterface for Leguin {
         let tick_s = cars.tick_s();
         self.bsg.advance(tick_s);
         self.state.advance(behavior, tick_s);
+        self.state.checks.advance(tick_s);
         self.observe_waiter(cars);
         self.observe_way(tick_s);
         self.measure(behavior);
@@ -125,7 +128,7 @@ impl CarsRobotInterface for Leguin {
             .emotion
             .update(&self.state.measures, self.bsg.current(), cars);
         self.state.inputs.record(progress);
-        self.state.appraisal = self.appraisal();
+        self.check(cars);
     }
 
     fn update_behavior_state(&mut self, cars: &mut Cars<'_>) {
@@ -206,7 +209,8 @@ impl Robot for Leguin {
     }
 
     fn panel(&self) -> Panel {
-        let mut widgets = self.feeling_widgets();
+        let cuts = &self.parameters.dynamics.label_cuts;
+        let mut widgets = panel::affect(self.frame().as_ref(), cuts);
         widgets.push(panel::behavior(self.behavior().name()));
         widgets.push(self.progress_table());
         widgets.extend([REFILL, HURRY, GO_HOME].map(|command| Widget::Button {
@@ -255,8 +259,15 @@ impl Leguin {
 
     /// What she feels and why, as she publishes it; `None` without emotions.
     #[must_use]
-    pub fn frame(&self) -> Option<AffectFrame<'static>> {
-        frame::of(self.emotion.shown(), &self.state.appraisal)
+    pub fn frame(&self) -> Option<AffectFrame<'_>> {
+        let state = &self.state;
+        let feeling = self.emotion.shown();
+        frame::of(
+            feeling,
+            state.appraisal,
+            &state.checks.episode,
+            self.parameters.caution,
+        )
     }
 
     /// Her behavior.
@@ -410,6 +421,7 @@ impl Leguin {
                 } else {
                     Input::NewErrand
                 });
+                state.checks.begin_errand();
             }
             LeguinAct::Hurry => {
                 state.hurried = true;
@@ -417,6 +429,7 @@ impl Leguin {
                 state.inputs.note(Input::Hurry);
             }
             LeguinAct::FinishErrand => {
+                state.checks.complete_errand();
                 state.hurried = false;
                 state.pending = None;
                 state.sent_home = false;
@@ -428,6 +441,7 @@ impl Leguin {
             }
             LeguinAct::ComeHome => state.inputs.note(Input::Home),
             LeguinAct::GiveUp => {
+                state.checks.end_errand();
                 state.given_up += 1;
                 state.hurried = false;
                 state.way = Closing::default();
@@ -506,26 +520,6 @@ impl Leguin {
             Policy::Timer if self.state.hurried => parameters.hurry_mult,
             Policy::Emotion | Policy::Rules | Policy::Timer | Policy::Neither => 1.0,
         }
-    }
-
-    fn feeling_widgets(&self) -> Vec<Widget> {
-        let waiter = self.parameters.waiter.as_str();
-        let other = match self.state.appraisal.agency() {
-            Agency::Oneself => waiter,
-            Agency::Other(name) => name.as_str(),
-        };
-        let goal = format!("to bring {} to {waiter}", self.parameters.goods);
-        let circumstances = Circumstances {
-            other: Some(other),
-            goal: Some(&goal),
-            ..Circumstances::default()
-        };
-
-        panel::affect(
-            self.frame().as_ref(),
-            &self.parameters.dynamics.label_cuts,
-            &circumstances,
-        )
     }
 
     fn progress_table(&self) -> Widget {

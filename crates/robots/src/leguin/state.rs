@@ -4,9 +4,11 @@ use affect::akr::Appraisal;
 use robot::{Cars, Point, StateVariables};
 use serde::{Deserialize, Serialize};
 
+use super::checks::Checks;
 use super::parameters::LeguinParameters;
 use super::tables::{Errand, LeguinBehavior, LeguinMeasures};
 use crate::chance::Chance;
+use crate::checks;
 use crate::closing::Closing;
 use crate::commands::{HURRY, REFILL};
 use crate::drive::Drive;
@@ -49,6 +51,7 @@ pub(super) struct LeguinMemory {
     pub(super) shame: Shame,
     pub(super) measures: LeguinMeasures,
     pub(super) appraisal: Appraisal,
+    pub(super) checks: Checks,
     pub(super) turns: Chance,
     pub(super) jokes: Jokes,
 }
@@ -74,7 +77,8 @@ impl LeguinMemory {
             waiter_calls: None,
             shame: Shame::default(),
             measures: LeguinMeasures::default(),
-            appraisal: Appraisal::default(),
+            appraisal: checks::initial(),
+            checks: Checks::default(),
             turns: Chance::new(0),
             jokes: Jokes::new(Chance::new(1), parameters.joke_mean_s),
         }

@@ -73,9 +73,6 @@ pub struct LeguinMeasures {
     pub th_concerned: f64,
 }
 
-/// Share of her patience with being sent home from which she is kept waiting \[I\].
-pub(super) const KEPT_WAITING: f64 = 0.5;
-
 /// How pressing her errand is, 0 to 1 \[I\]: what is asked of her and how long her way is blocked; then how long she is kept
 /// waiting. Nothing presses at the table, on the way there and while treats are handed over.
 pub fn urgency(measures: &LeguinMeasures, behavior: &LeguinBehavior) -> Urgency {

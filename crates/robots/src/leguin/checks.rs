@@ -1,0 +1,82 @@
+//! What Leguin remembers to appraise her situation \[I\].
+
+use affect::{Episode, Prediction, RecentShare};
+use serde::{Deserialize, Serialize};
+
+use crate::checks::{PREDICTION_S, RECENT_S};
+
+/// Time in which she is to answer a call, s \[I\].
+const ANSWER_S: f64 = 20.0;
+
+/// What she remembers to appraise her situation.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Checks {
+    pub(super) episode: Episode,
+    /// The pressure of her errand.
+    pressure: Prediction,
+    /// Time since the first call that she has not answered by an exchange, s.
+    owed_s: Option<f64>,
+    /// The ticks in which no call was overdue.
+    duty: RecentShare,
+    is_on_errand: bool,
+    /// Errands that have ended, and those of them that she completed.
+    ended: u32,
+    completed: u32,
+}
+
+impl Checks {
+    /// The waiter calls her.
+    pub(super) fn owe(&mut self) {
+        self.owed_s.get_or_insert(0.0);
+    }
+
+    /// She begins an errand.
+    pub(super) fn begin_errand(&mut self) {
+        self.is_on_errand = true;
+    }
+
+    /// She has met the waiter, for an exchange.
+    pub(super) fn complete_errand(&mut self) {
+        self.owed_s = None;
+        self.completed += u32::from(self.is_on_errand);
+        self.end_errand();
+    }
+
+    /// She turns back, or her errand is completed.
+    pub(super) fn end_errand(&mut self) {
+        self.ended += u32::from(self.is_on_errand);
+        self.is_on_errand = false;
+    }
+
+    /// Adds a tick.
+    pub(super) fn advance(&mut self, tick_s: f64) {
+        self.owed_s = self.owed_s.map(|owed_s| owed_s + tick_s);
+        let is_overdue = self.owed_s.is_some_and(|owed_s| owed_s > ANSWER_S);
+        self.duty.add((!is_overdue).into(), 1, RECENT_S, tick_s);
+    }
+
+    /// Of the errands that have ended, the share that she completed.
+    pub(super) fn completed(&self) -> f64 {
+        if self.ended == 0 {
+            1.0
+        } else {
+            f64::from(self.completed) / f64::from(self.ended)
+        }
+    }
+
+    /// Adds the pressure of a tick, from which novelty follows.
+    pub(super) fn measure(&mut self, pressure: f64, tick_s: f64) {
+        self.pressure.observe(pressure, PREDICTION_S, tick_s);
+    }
+
+    /// How far the pressure is from what its trend predicted.
+    pub(super) fn novelty(&self) -> f64 {
+        self.pressure.novelty()
+    }
+
+    /// The share of recent time in which no call was overdue.
+    pub(super) fn answered_in_time(&self) -> f64 {
+        self.duty.share()
+    }
+}
