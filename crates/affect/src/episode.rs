@@ -10,7 +10,7 @@ use std::collections::VecDeque;
 /// episode begins, and kept until it ends \[I\].
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Cause {
+pub struct EpisodeCause {
     /// The agent responsible [D: S].
     pub agency: Agency,
     /// What the emotion is about, as it is published: the kind and the name, as in `event: the delay`.
@@ -19,7 +19,7 @@ pub struct Cause {
     pub causal_chain: String,
 }
 
-impl Cause {
+impl EpisodeCause {
     /// The causal chain as a sentence; empty without one.
     pub fn spoken(&self) -> String {
         CausalChain::read(&self.causal_chain).map_or_else(String::new, |chain| chain.spoken())
@@ -35,16 +35,16 @@ impl Schemata {
         agency: Agency,
         name: &str,
         circumstances: &Circumstances<'_>,
-    ) -> Cause {
+    ) -> EpisodeCause {
         let Some(schema) = self.get(emotion) else {
-            return Cause {
+            return EpisodeCause {
                 agency,
                 focality: name.to_owned(),
                 causal_chain: String::new(),
             };
         };
 
-        Cause {
+        EpisodeCause {
             agency,
             focality: format!("{}: {name}", schema.focality.name()),
             causal_chain: schema.causal_chain.filled(circumstances).to_string(),
@@ -71,13 +71,13 @@ impl Schemata {
 pub struct Episode {
     emotion: String,
     lasted_s: f64,
-    cause: Cause,
+    cause: EpisodeCause,
 }
 
 impl Episode {
     /// Advances by `dt_s` seconds. If the emotion is another one than before, an episode begins, with the cause that `begin`
     /// finds; its argument is the episode before.
-    pub fn update(&mut self, emotion: &str, dt_s: f64, begin: impl FnOnce(&Self) -> Cause) {
+    pub fn update(&mut self, emotion: &str, dt_s: f64, begin: impl FnOnce(&Self) -> EpisodeCause) {
         if self.emotion == emotion {
             self.lasted_s += dt_s;
             return;
@@ -99,7 +99,7 @@ impl Episode {
     }
 
     /// The cause of the episode.
-    pub fn cause(&self) -> &Cause {
+    pub fn cause(&self) -> &EpisodeCause {
         &self.cause
     }
 }
@@ -214,9 +214,9 @@ mod tests {
     #[test]
     fn a_cause_is_kept_until_another_emotion_begins() {
         let mut episode = Episode::default();
-        let by = |name: &str| Cause {
+        let by = |name: &str| EpisodeCause {
             agency: Agency::Other(name.to_owned()),
-            ..Cause::default()
+            ..EpisodeCause::default()
         };
 
         episode.update("CONCERNED", 0.5, |before| {

@@ -165,7 +165,7 @@ mod schema;
 
 pub use causal::{CausalChain, Circumstances, Clause, ClauseError, ClauseKind};
 pub use dynamics::{Belief, Dynamics, EmotionState, Progress, ProgressEvent, StepInput, Stimulus};
-pub use episode::{Cause, Episode, Prediction, RecentShare};
+pub use episode::{Episode, EpisodeCause, Prediction, RecentShare};
 pub use frame::AffectFrame;
 pub use generator::{DynamicGenerator, EmotionGenerator};
 pub use label::{EmotionLabel, Feeling, StandardEmotion};

@@ -5,7 +5,7 @@
 //! emotion of its own defines a table for it and loads it with [`Schemata::from_toml`].
 
 use crate::akr::{
-    ActionTendency, Duration, FacialExpression, Focality, Level, Preference, Valence,
+    ActionTendency, AffectiveLevel, Duration, FacialExpression, Focality, Preference, Valence,
 };
 use crate::causal::CausalChain;
 use serde::Deserialize;
@@ -59,11 +59,11 @@ pub enum SchemaError {
         /// Name of the node.
         name: String,
         /// Its level.
-        level: Level,
+        level: AffectiveLevel,
         /// Name of its parent.
         parent: String,
         /// The level of its parent.
-        above: Level,
+        above: AffectiveLevel,
     },
     /// A node has a value that its level does not allow.
     #[error("{name} is of the level {level}, which does not have `{key} = {value}`; {instead}", level = level.name())]
@@ -71,7 +71,7 @@ pub enum SchemaError {
         /// Name of the node.
         name: String,
         /// Its level.
-        level: Level,
+        level: AffectiveLevel,
         /// The component.
         key: &'static str,
         /// The value.
@@ -198,9 +198,9 @@ impl Components {
 /// A table of the file.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Table {
+struct NodeTable {
     parent: Option<String>,
-    level: Option<Level>,
+    level: Option<AffectiveLevel>,
     traits: Option<Vec<String>>,
     interactive_strategy: Option<String>,
     preferences: Option<BTreeSet<Preference>>,
@@ -221,14 +221,14 @@ pub struct Node {
     /// The node above; `None` for the root.
     pub parent: Option<String>,
     /// Its level.
-    pub level: Level,
+    pub level: AffectiveLevel,
     /// What it states.
     pub own: Components,
     /// What it states and inherits.
     pub all: Components,
     /// Where each value comes from, by component: documented or chosen, as in `[D: S]`. Empty for a file without marks.
     pub marks: BTreeMap<String, String>,
-    stated_level: Option<Level>,
+    stated_level: Option<AffectiveLevel>,
 }
 
 /// The components that all episodes of one emotion share.
@@ -282,16 +282,16 @@ impl Node {
         for (key, value) in self.own.entries() {
             match key {
                 "traits" | "interactive_strategy" | "preferences"
-                    if level != Level::Personality =>
+                    if level != AffectiveLevel::Personality =>
                 {
                     return refuse(key, &value, "only a personality has it");
                 }
                 "facial_expression" | "action_tendency" | "causal_chain"
-                    if level != Level::Emotion =>
+                    if level != AffectiveLevel::Emotion =>
                 {
                     return refuse(key, &value, "only an emotion has it");
                 }
-                "valence" if level == Level::Personality => {
+                "valence" if level == AffectiveLevel::Personality => {
                     return refuse(key, &value, "a personality can have any affect");
                 }
                 _ => {}
@@ -302,7 +302,7 @@ impl Node {
             && !level.allows(focality)
         {
             let instead = match level {
-                Level::Emotion => "an emotion is about an event, an agent or an object",
+                AffectiveLevel::Emotion => "an emotion is about an event, an agent or an object",
                 _ => "it is \"global\"",
             };
             return refuse("focality", focality.name(), instead);
@@ -319,12 +319,14 @@ impl Node {
 
         for measure in self.own.measured.iter().flatten() {
             let instead = match level {
-                Level::Emotion if MEASURES.contains(&measure.as_str()) => continue,
-                Level::Affect | Level::Mood if measure == "intensity" => continue,
-                Level::Emotion => format!("what is measured is one of {}", MEASURES.join(", ")),
-                Level::Mood => "a mood has no agency, and nothing elicits it".to_owned(),
-                Level::Affect => "affect has valence and intensity only".to_owned(),
-                Level::Personality => "nothing is measured of a personality".to_owned(),
+                AffectiveLevel::Emotion if MEASURES.contains(&measure.as_str()) => continue,
+                AffectiveLevel::Affect | AffectiveLevel::Mood if measure == "intensity" => continue,
+                AffectiveLevel::Emotion => {
+                    format!("what is measured is one of {}", MEASURES.join(", "))
+                }
+                AffectiveLevel::Mood => "a mood has no agency, and nothing elicits it".to_owned(),
+                AffectiveLevel::Affect => "affect has valence and intensity only".to_owned(),
+                AffectiveLevel::Personality => "nothing is measured of a personality".to_owned(),
             };
             return refuse("measured", measure, &instead);
         }
@@ -340,13 +342,13 @@ impl Node {
                 key,
             })
         };
-        if self.level > Level::Personality && self.all.valence.is_none() {
+        if self.level > AffectiveLevel::Personality && self.all.valence.is_none() {
             return missing("valence");
         }
-        if self.level > Level::Affect && self.all.duration != self.level.duration() {
+        if self.level > AffectiveLevel::Affect && self.all.duration != self.level.duration() {
             return missing("duration");
         }
-        if self.level > Level::Affect
+        if self.level > AffectiveLevel::Affect
             && !self.all.focality.is_some_and(|one| self.level.allows(one))
         {
             return missing("focality");
@@ -426,9 +428,9 @@ impl Schemata {
     ///
     /// Returns an error if the text cannot be parsed or if a node contradicts itself or its parent.
     pub fn extended(&self, text: &str) -> Result<Self, SchemaError> {
-        let tables: BTreeMap<String, Table> =
+        let tables: BTreeMap<String, NodeTable> =
             toml::from_str(text).map_err(|error| SchemaError::Syntax(error.to_string()))?;
-        let remarks = Remarks::of(text);
+        let remarks = FileComments::of(text);
 
         let mut added: Vec<Node> = tables
             .into_iter()
@@ -445,7 +447,7 @@ impl Schemata {
         let mut by_name = BTreeMap::new();
         for node in &nodes {
             node.check()?;
-            if node.level != Level::Emotion {
+            if node.level != AffectiveLevel::Emotion {
                 continue;
             }
             match node.schema() {
@@ -536,14 +538,14 @@ impl Schemata {
     }
 }
 
-impl Table {
+impl NodeTable {
     /// The node, whose level and inherited components are not known yet.
-    fn node(self, name: String, remarks: &Remarks) -> Node {
+    fn node(self, name: String, remarks: &FileComments) -> Node {
         Node {
             marks: remarks.marks.get(&name).cloned().unwrap_or_default(),
             name,
             parent: self.parent,
-            level: self.level.unwrap_or(Level::Emotion),
+            level: self.level.unwrap_or(AffectiveLevel::Emotion),
             stated_level: self.level,
             own: Components {
                 traits: self.traits,
@@ -572,7 +574,7 @@ fn resolve(nodes: &mut [Node]) -> Result<(), SchemaError> {
 
     for index in 0..nodes.len() {
         let ancestors = ancestors(nodes, &known, index)?;
-        let mut level = Level::Personality;
+        let mut level = AffectiveLevel::Personality;
         let mut all = Components::default();
 
         // From the root down to the node.
@@ -580,7 +582,7 @@ fn resolve(nodes: &mut [Node]) -> Result<(), SchemaError> {
             let node = &nodes[*at];
             let above = level;
             level = node.stated_level.unwrap_or(above);
-            if position == 0 && node.stated_level != Some(Level::Personality) {
+            if position == 0 && node.stated_level != Some(AffectiveLevel::Personality) {
                 return Err(SchemaError::NoParent(node.name.clone()));
             }
             if position > 0 && !level.refines(above) {
@@ -643,12 +645,12 @@ fn ancestors(
 
 /// What a file says of its values in comments, which the TOML parser drops: the order of the tables, and the marks.
 #[derive(Default)]
-struct Remarks {
+struct FileComments {
     order: Vec<String>,
     marks: BTreeMap<String, BTreeMap<String, String>>,
 }
 
-impl Remarks {
+impl FileComments {
     fn of(text: &str) -> Self {
         let mut remarks = Self::default();
         for line in text.lines().map(str::trim) {

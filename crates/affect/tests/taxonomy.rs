@@ -6,11 +6,12 @@
 )]
 
 use affect::akr::{
-    Agency, Appraisal, Duration, Focality, Level, Personality, Preference, TABLE_2, Valence,
+    AffectiveLevel, Agency, Appraisal, Duration, Focality, Personality, Preference, TABLE_2,
+    Valence,
 };
 use affect::frame::{ACTION_TENDENCY, DURATION, FACIAL_EXPRESSION};
 use affect::{
-    AffectFrame, Cause, Circumstances, EmotionLabel, Episode, SchemaError, Schemata,
+    AffectFrame, Circumstances, EmotionLabel, Episode, EpisodeCause, SchemaError, Schemata,
     StandardEmotion, Urgency,
 };
 
@@ -60,7 +61,7 @@ fn two_episodes_of_an_emotion_differ_in_their_components() {
         .with_standards(1.0, 0.9);
     let began = |agency, name| {
         let mut episode = Episode::default();
-        episode.update("FRUSTRATED", 0.5, |_| Cause {
+        episode.update("FRUSTRATED", 0.5, |_| EpisodeCause {
             agency,
             focality: format!("event: {name}"),
             causal_chain: format!("belief: {name}"),
@@ -69,7 +70,7 @@ fn two_episodes_of_an_emotion_differ_in_their_components() {
     };
     let mut one = began(Agency::Other("Leguin".to_owned()), "the delay");
     let other = began(Agency::Oneself, "the way");
-    one.update("FRUSTRATED", 0.5, |_| Cause::default());
+    one.update("FRUSTRATED", 0.5, |_| EpisodeCause::default());
 
     let first = frame("FRUSTRATED", 0.8, blocked).during(&one);
     let second = frame("FRUSTRATED", 0.9, cut_off).during(&other);
@@ -162,7 +163,7 @@ fn surprise_goes_with_either_valence() {
 fn a_node_has_what_it_does_not_state_from_its_parent() {
     let schemata = Schemata::standard();
     let concerned = schemata.node("CONCERNED").unwrap();
-    assert_eq!(concerned.level, Level::Emotion);
+    assert_eq!(concerned.level, AffectiveLevel::Emotion);
     assert_eq!(concerned.own.valence, None);
     assert_eq!(concerned.all.valence, Some(Valence::Negative));
     assert_eq!(concerned.all.duration, Some(Duration::Minutes));
@@ -181,7 +182,7 @@ fn a_node_has_what_it_does_not_state_from_its_parent() {
     let mood = schemata.node("negative mood").unwrap();
     assert_eq!(
         (mood.level, mood.all.duration),
-        (Level::Mood, Some(Duration::Days))
+        (AffectiveLevel::Mood, Some(Duration::Days))
     );
     assert_eq!(mood.all.focality, Some(Focality::Global));
     assert_eq!(mood.all.measured, Some(vec!["intensity".to_owned()]));

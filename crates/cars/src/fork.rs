@@ -51,9 +51,9 @@ pub(crate) struct ForkArgs {
 
 /// A tick of a run.
 #[derive(Debug, Clone)]
-struct TickOfRun {
-    run: PathBuf,
-    moment: Moment,
+pub(crate) struct TickOfRun {
+    pub(crate) run: PathBuf,
+    pub(crate) moment: Moment,
 }
 
 impl FromStr for TickOfRun {

@@ -4,6 +4,7 @@ mod check;
 mod conform;
 mod control;
 mod diagram;
+mod emotions;
 mod errors;
 mod exec;
 mod execution;
@@ -53,6 +54,7 @@ Look:
   report       Write a report about runs or an experiment as one HTML file
   diagram      Draw who commanded whom, what was lost, what the robots felt
   replay       Show a recorded run to consoles as if it were in progress
+  emotions     Show the tree of a robot's emotions, or what it feels in a tick of a run
   log          Show the log of a run, also of one in progress
   export       Write tables as CSV, a log for ShiViz, a trace, emotions as EmotionML
 
@@ -139,6 +141,8 @@ enum Subcommands {
     Export(export::ExportArgs),
     /// Draw the space-time diagram of a run: who commanded whom, what was lost, what the robots felt.
     Diagram(diagram::DiagramArgs),
+    /// Show the taxonomy of a robot's emotions with all components, or where in it a robot of a recorded run is.
+    Emotions(emotions::EmotionsArgs),
     /// Write a report about runs as one HTML file: emotions and behaviors over time, transitions, occupancy, the network.
     Report(report::ReportArgs),
     /// Check a robot, written in any language, against the rules of the protocol.
@@ -199,6 +203,7 @@ fn dispatch(subcommand: Subcommands) -> Result<ExitCode> {
         Subcommands::Log(args) => control::log(&args),
         Subcommands::Export(args) => export::export(&args),
         Subcommands::Diagram(args) => diagram::diagram(&args),
+        Subcommands::Emotions(args) => emotions::emotions(&args),
         Subcommands::Report(args) => report::report(&args),
         Subcommands::Conform(args) => conform::conform(&args),
         Subcommands::Net(command) => net::net(command),

@@ -1,7 +1,7 @@
 //! Widgets that the panels of the robots share.
 
 use affect::akr::{FacialExpression, Valence};
-use affect::{AffectFrame, Cause, Episode};
+use affect::{AffectFrame, Episode, EpisodeCause};
 use robot::{Face, Tone, Widget};
 
 use crate::emotion::NEUTRAL;
@@ -42,7 +42,7 @@ pub(crate) fn affect(frame: Option<&AffectFrame<'_>>, label_cuts: &[f64; 4]) -> 
         },
         Widget::Text {
             label: "why".to_owned(),
-            text: cause.map(Cause::spoken).unwrap_or_default(),
+            text: cause.map(EpisodeCause::spoken).unwrap_or_default(),
         },
     ]
 }

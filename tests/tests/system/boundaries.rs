@@ -139,6 +139,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     (
         "cars",
         &[
+            "affect",
             "launch",
             "reports",
             "experiments",

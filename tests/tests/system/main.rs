@@ -20,6 +20,7 @@ mod dependencies;
 mod determinism;
 mod diagram;
 mod emotionml;
+mod emotions;
 mod ended;
 mod exec;
 mod expect;

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// A level of the taxonomy (Figure 1 of the paper): each refines the one before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Level {
+pub enum AffectiveLevel {
     /// The lasting character of an agent [D: S].
     Personality,
     /// Negative or positive affect: valence and intensity [D: S].
@@ -16,7 +16,7 @@ pub enum Level {
     Emotion,
 }
 
-impl Level {
+impl AffectiveLevel {
     /// The name used in files.
     pub fn name(self) -> &'static str {
         match self {

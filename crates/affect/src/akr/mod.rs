@@ -13,6 +13,6 @@ mod tendency;
 pub use crate::affect::{Affect, Valence};
 pub use appraisal::{Agency, Appraisal};
 pub use face::FacialExpression;
-pub use level::{Duration, Focality, Level};
+pub use level::{AffectiveLevel, Duration, Focality};
 pub use personality::{Personality, Preference};
 pub use tendency::{ActionTendency, PrimaryTendency, TABLE_1, TABLE_2, TaskTendency};

@@ -2,7 +2,7 @@
 
 use affect::StandardEmotion::{self, Angry, Discouraged, Frustrated, Happy, Hopeful};
 use affect::akr::{Agency, Appraisal};
-use affect::{Cause, Circumstances, EmotionLabel, Episode, Schemata};
+use affect::{Circumstances, EmotionLabel, Episode, EpisodeCause, Schemata};
 use robot::Cars;
 
 use super::Butler;
@@ -81,7 +81,7 @@ impl Butler {
     ///
     /// He is responsible for his happiness, and she for his frustration and anger \[D\]. Of the others: he for what he believes
     /// of himself, and she for what is because she has been called and is not there.
-    fn cause(&self, emotion: StandardEmotion, before: &Episode) -> Cause {
+    fn cause(&self, emotion: StandardEmotion, before: &Episode) -> EpisodeCause {
         let state = &self.state;
         let refiller = state.refiller.name();
         let is_hers = match emotion {

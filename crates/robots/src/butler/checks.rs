@@ -8,7 +8,7 @@ use crate::checks::{PREDICTION_S, RECENT_S};
 /// What he remembers to appraise his situation.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Checks {
+pub(super) struct ButlerChecks {
     pub(super) episode: Episode,
     /// The pressure of his need.
     pressure: Prediction,
@@ -18,7 +18,7 @@ pub(super) struct Checks {
     supply: RecentShare,
 }
 
-impl Checks {
+impl ButlerChecks {
     /// Adds a tick in which guests took so many treats and so many times reached for an empty tray.
     pub(super) fn count(&mut self, served: u32, missed: u32, has_treats: bool, tick_s: f64) {
         let asked = served.saturating_add(missed);

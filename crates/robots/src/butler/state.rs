@@ -8,7 +8,7 @@ use affect::{Feeling, ParameterError, StandardEmotion};
 use robot::{Cars, Point, StateVariables};
 use serde::{Deserialize, Serialize};
 
-use super::checks::Checks;
+use super::checks::ButlerChecks;
 use super::deliberation::Mind;
 use super::parameters::ButlerParameters;
 use super::tables::{ButlerBehavior, ButlerMeasures};
@@ -86,7 +86,7 @@ pub(super) struct ButlerMemory {
     pub(super) turns: Chance,
     pub(super) jokes: Jokes,
     pub(super) appraisal: Appraisal,
-    pub(super) checks: Checks,
+    pub(super) checks: ButlerChecks,
     pub(super) mind: Mind,
     /// The curve of the panel.
     pub(super) valences: VecDeque<f64>,
@@ -136,7 +136,7 @@ impl ButlerMemory {
             turns: Chance::new(1),
             jokes: Jokes::new(Chance::new(2), parameters.joke_mean_s),
             appraisal: checks::initial(),
-            checks: Checks::default(),
+            checks: ButlerChecks::default(),
             mind: Mind::default(),
             valences: VecDeque::new(),
         })

@@ -2,7 +2,7 @@
 
 use affect::StandardEmotion::{self, Discouraged, Happy, Hopeful};
 use affect::akr::{Agency, Appraisal, Valence};
-use affect::{Cause, Circumstances, EmotionLabel, Episode, Schemata};
+use affect::{Circumstances, EmotionLabel, Episode, EpisodeCause, Schemata};
 use robot::Cars;
 
 use super::Leguin;
@@ -71,7 +71,7 @@ impl Leguin {
     /// She is responsible for her happiness, and for what she believes of herself. Of the others the crowd is responsible if it
     /// blocks her, and the waiter if he told her to hurry or keeps her waiting. An unpleasant emotion without either has the
     /// agent of the one before: the same trouble eases.
-    fn cause(&self, emotion: StandardEmotion, before: &Episode) -> Cause {
+    fn cause(&self, emotion: StandardEmotion, before: &Episode) -> EpisodeCause {
         let measures = &self.state.measures;
         let waiter = self.parameters.waiter.as_str();
         let is_blocked = measures.blocked >= measures.th_concerned;

@@ -11,7 +11,7 @@ const ANSWER_S: f64 = 20.0;
 /// What she remembers to appraise her situation.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Checks {
+pub(super) struct LeguinChecks {
     pub(super) episode: Episode,
     /// The pressure of her errand.
     pressure: Prediction,
@@ -25,7 +25,7 @@ pub(super) struct Checks {
     completed: u32,
 }
 
-impl Checks {
+impl LeguinChecks {
     /// The waiter calls her.
     pub(super) fn owe(&mut self) {
         self.owed_s.get_or_insert(0.0);

@@ -4,7 +4,7 @@ use affect::akr::Appraisal;
 use robot::{Cars, Point, StateVariables};
 use serde::{Deserialize, Serialize};
 
-use super::checks::Checks;
+use super::checks::LeguinChecks;
 use super::parameters::LeguinParameters;
 use super::tables::{Errand, LeguinBehavior, LeguinMeasures};
 use crate::chance::Chance;
@@ -51,7 +51,7 @@ pub(super) struct LeguinMemory {
     pub(super) shame: Shame,
     pub(super) measures: LeguinMeasures,
     pub(super) appraisal: Appraisal,
-    pub(super) checks: Checks,
+    pub(super) checks: LeguinChecks,
     pub(super) turns: Chance,
     pub(super) jokes: Jokes,
 }
@@ -78,7 +78,7 @@ impl LeguinMemory {
             shame: Shame::default(),
             measures: LeguinMeasures::default(),
             appraisal: checks::initial(),
-            checks: Checks::default(),
+            checks: LeguinChecks::default(),
             turns: Chance::new(0),
             jokes: Jokes::new(Chance::new(1), parameters.joke_mean_s),
         }
