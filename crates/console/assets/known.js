@@ -13,6 +13,29 @@ import { seconds, short } from "./units.js";
 /** State variables that say how a robot feels, if it publishes them; every robot in any language may. */
 const INTENSITY = "intensity";
 const FACE = "facial_expression";
+/** What each component of an emotion means, in the order in which people read them: its name, its meaning, and its scale. */
+const COMPONENTS = /** @type {[string, string, "" | "share" | "sign"][]} */ ([
+  ["valence", "pleasant above 0, unpleasant below", "sign"],
+  ["intensity", "how strongly it is felt", "share"],
+  ["urgency", "how pressing the need behind it is", "share"],
+  ["action_tendency", "what it inclines the robot to do", ""],
+  ["facial_expression", "what the face shows", ""],
+  ["duration", "how long such a state usually lasts", ""],
+  ["duration_s", "seconds since this episode began", ""],
+  ["focality", "what it is about", ""],
+  ["agency", "who is responsible", ""],
+  ["goal_congruence", "1: nothing is in the way of the goal, -1: it is prevented", "sign"],
+  ["novelty", "how far the situation is from what was predicted", "share"],
+  ["controllability", "share of what the robot could do that it still can", "share"],
+  ["modifiability", "1: another agent acts on it, 0: none does, 0.5: unknown", "share"],
+  ["certainty", "how recent what is known of it is", "share"],
+  ["external_norms", "how far the robot does what it owes others", "share"],
+  ["internal_standards", "how far it does what it expects of itself", "share"],
+  ["mood", "the slow mean of what is felt", "sign"],
+  ["caution", "the trait of its personality: how fast urgency rises", "share"],
+  ["causal_chain", "the beliefs and goals behind it", ""],
+]);
+const SHARES = ["very low", "low", "medium", "high", "very high"];
 const FACES = ["happy", "sad", "surprised", "disgusted", "angry", "fearful", "neutral"];
 const MOST_COMMANDS = 3;
 /** Lines of the log that are searched for a robot's commands. */
@@ -81,6 +104,54 @@ export function generic(robot, { className, commands, isBegun }) {
 
   const rows = Object.entries(state_variables).map(([name, value]) => [name, show(value)]);
   return { widgets, details: rows.length ? [{ widget: "table", rows }] : [] };
+}
+
+/**
+ * The components of a robot's emotion, with words and meanings; empty for a robot that publishes none.
+ * @param {RobotFrame} robot
+ * @returns {{name: string, value: string, meaning: string}[]}
+ */
+export function componentsOf({ state_variables }) {
+  if (typeof state_variables.valence !== "number") return [];
+
+  return COMPONENTS.flatMap(([name, meaning, scale]) => {
+    const value = state_variables[name];
+    if (value === undefined) return [];
+    const word = typeof value === "number" ? wordFor(value, scale) : "";
+    return [{ name: name.replaceAll("_", " "), value: `${show(value)}${word && ` ${word}`}`, meaning }];
+  });
+}
+
+/** @type {(value: number, scale: "" | "share" | "sign") => string} */
+function wordFor(value, scale) {
+  if (scale === "sign") return value > 0 ? "positive" : value < 0 ? "negative" : "";
+  return scale === "share" ? SHARES[Math.min(4, Math.max(0, Math.floor(value * 5 + 1e-9)))] : "";
+}
+
+/**
+ * The place of an emotion in the tree of affective states (the paper's Figure 1), from the root down; `others` are the emotions
+ * of the same kind that the robot has had.
+ * @param {RobotFrame} robot
+ * @param {Map<string, number>} had each emotion with its valence
+ * @returns {{depth: number, text: string, isHere: boolean}[]}
+ */
+export function placeOf({ emotion_state, state_variables }, had) {
+  const { valence, mood } = state_variables;
+  if (typeof valence !== "number") return [];
+
+  const kind = valence < 0 ? "negative" : "positive";
+  const isMood = typeof mood === "number" && mood !== 0 && mood < 0 === valence < 0;
+  const others = [...had].filter(([name, other]) => other < 0 === valence < 0 && name !== emotion_state);
+  const node = (/** @type {number} */ depth, /** @type {string} */ text, isHere = false) => ({ depth, text, isHere });
+
+  return [
+    node(0, "personality"),
+    node(1, `${kind} affect`),
+    node(2, `${kind} mood`, isMood),
+    node(2, `${kind} emotion`),
+    node(3, emotion_state, true),
+    ...others.map(([name]) => node(3, name)),
+  ];
 }
 
 /** @type {(name: string, source: string, text: string) => string} */

@@ -2,7 +2,7 @@
 // A panel for each robot; of many, a list, and the panel of the one that is chosen. The page has no knowledge of particular
 // robots: it renders the widgets that they publish.
 
-import { generic, heldUp, intensityOf, lastCommands } from "./known.js";
+import { componentsOf, generic, heldUp, intensityOf, lastCommands, placeOf } from "./known.js";
 import { presence } from "./presence.js";
 import { RobotList } from "./robot-list.js";
 import { initials } from "./roster.js";
@@ -16,6 +16,8 @@ import { drawWidget } from "./widgets.js";
 /** @typedef {import("./types/messages.js").Widget} Widget */
 
 const MOST_WIDGETS = 64;
+/** Emotions of a robot that are kept for its tree. */
+const MOST_FELT = 32;
 /** More robots than this are a list. */
 const MOST_PANELS = 4;
 /** Widgets that are folded, unless a panel has nothing else. */
@@ -37,18 +39,28 @@ export class Panels {
     this.chosen = null;
     /** Robots whose details are unfolded. @type {Set<string>} */
     this.unfolded = new Set();
+    /** Robots whose components of emotion are unfolded. @type {Set<string>} */
+    this.explained = new Set();
+    /** The emotions that each robot has had on this page, with their valences. @type {Map<string, Map<string, number>>} */
+    this.felt = new Map();
     /** Since when a robot's moves have been refused, simulated seconds. @type {Map<string, number>} */
     this.blockedSince_s = new Map();
     /** The class of each robot, if it is known. @type {Map<string, string>} */
     this.classes = new Map();
     this.list = new RobotList({ choose: (robot) => actions.choose(robot), changed: () => this.render() });
-    store.on("epoch", () => this.blockedSince_s.clear());
+    store.on("epoch", () => {
+      this.blockedSince_s.clear();
+      this.felt.clear();
+    });
     store.on("frame", () => this.note());
   }
 
   note() {
     const { frame } = this.store;
-    for (const { name, blocked } of frame?.robots ?? []) {
+    for (const { name, blocked, emotion_state, state_variables } of frame?.robots ?? []) {
+      const felt = this.felt.get(name) ?? new Map();
+      const { valence } = state_variables;
+      if (typeof valence === "number" && felt.size < MOST_FELT) this.felt.set(name, felt.set(emotion_state, valence));
       const since_s = this.blockedSince_s.get(name) ?? Infinity;
       if (!blocked) this.blockedSince_s.delete(name);
       else if (frame) this.blockedSince_s.set(name, Math.min(since_s, frame.time_s));
@@ -109,6 +121,35 @@ export class Panels {
   }
 
   /**
+   * The place of the emotion in the tree of affective states, and its components, of a robot that publishes them.
+   * @param {RobotFrame} robot
+   */
+  affect(robot) {
+    const { name } = robot;
+    const components = componentsOf(robot);
+    if (!components.length) return nothing;
+
+    const fold = (/** @type {Event} */ event) => {
+      if (/** @type {HTMLDetailsElement} */ (event.target).open) this.explained.add(name);
+      else this.explained.delete(name);
+      this.render();
+    };
+    const isOpen = this.explained.has(name);
+    const place = placeOf(robot, this.felt.get(name) ?? new Map());
+
+    return html`<details class="details affect" data-testid="affect" ?open=${isOpen} @toggle=${fold}><summary>Emotion</summary>
+      ${isOpen
+        ? html`<ul class="tree">${place.map(
+              ({ depth, text, isHere }) =>
+                html`<li class=${isHere ? "here" : ""} aria-current=${isHere ? "true" : nothing} .style=${`margin-inline-start:${depth}rem`}>${text}</li>`,
+            )}</ul>
+            <div class="widget table"><table class="pairs"><tbody>${components.map(
+              ({ name: component, value, meaning }) => html`<tr title=${meaning}><td>${component}</td><td>${value}</td></tr>`,
+            )}</tbody></table></div>`
+        : nothing}</details>`;
+  }
+
+  /**
    * @param {RobotFrame} robot
    * @param {import("./types/messages.js").Awaited[]} awaiting
    */
@@ -140,6 +181,7 @@ export class Panels {
           ? html`<p class="no-panel" data-testid="no-panel">Without its own panel, which there is not of this tick.</p>`
           : nothing}
         <div class="widgets">${widgets.map((widget) => drawWidget(widget, send))}</div>
+        ${this.affect(robot)}
         ${details.length
           ? html`<details class="details" data-testid="details" ?open=${this.unfolded.has(name)} @toggle=${fold}><summary>Details</summary>
               <div class="widgets">${this.unfolded.has(name) ? details.map((widget) => drawWidget(widget, send)) : nothing}</div></details>`
