@@ -34,6 +34,7 @@ const FILES: &[(&str, &str)] = &texts![
     "configs/experiments/deadlock.toml",
     "configs/experiments/partition.toml",
     "configs/experiments/recruitment.toml",
+    "configs/experiments/signals.toml",
     "configs/experiments/tune_thresholds.toml",
     "configs/experiments/tune_timer.toml",
     "configs/hors_doeuvres.toml",
@@ -44,6 +45,7 @@ const FILES: &[(&str, &str)] = &texts![
     "configs/recruitment.toml",
     "configs/robots/butler.toml",
     "configs/robots/leguin.toml",
+    "configs/signals.toml",
     "configs/three_robots.toml",
     "configs/walled_hall.toml",
     "launch/hors_doeuvres.toml",
@@ -189,6 +191,7 @@ mod tests {
             "deadlock",
             "partition",
             "recruitment",
+            "signals",
             "tune_thresholds",
             "tune_timer",
         ];

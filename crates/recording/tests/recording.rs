@@ -9,8 +9,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use protocol::messages::{
-    Awaited, Cut, DisplayUnit, End, LogKind, LogRecord, Panel, Performative, Point, Reason, Report,
-    Variable, Widget,
+    Awaited, Cut, DisplayUnit, End, GuestMood, LogKind, LogRecord, Panel, Performative, Point,
+    Reason, Report, Variable, Widget,
 };
 use protocol::{Event, RobotName, RunName, Tick};
 use recording::content::Missed;
@@ -104,6 +104,7 @@ fn tick(tick: Tick) -> RecordedTick {
             guests_mm: (0..40)
                 .map(|i| (i * 7919 + tick as i64 * 31) % 29_989)
                 .collect(),
+            guest_moods: [(GuestMood::Waiting, vec![3, 7])].into(),
             expectations: Vec::new(),
             cuts: vec![Cut {
                 from: name("Butler"),

@@ -8,7 +8,7 @@ use affect::{
 use robot::{Cars, StateVariables};
 
 use crate::published::{number, text};
-use crate::script::Script;
+use crate::script::{Script, ScriptRole};
 use crate::switch::Switch;
 
 /// The emotion that a robot without emotions publishes.
@@ -18,6 +18,7 @@ pub(crate) const NEUTRAL: &str = "NEUTRAL";
 pub(crate) struct SwitchableGenerator<M, B> {
     switch: Switch,
     script: Script,
+    role: ScriptRole,
     /// The feeling of the script at this time.
     scripted: Option<Feeling<StandardEmotion>>,
     generator: DynamicGenerator<M, B, StandardEmotion>,
@@ -26,12 +27,13 @@ pub(crate) struct SwitchableGenerator<M, B> {
 impl<M, B> SwitchableGenerator<M, B> {
     pub(crate) fn new(
         switch: Switch,
-        script: Script,
+        (script, role): (Script, ScriptRole),
         generator: DynamicGenerator<M, B, StandardEmotion>,
     ) -> Self {
         Self {
             switch,
             script,
+            role,
             scripted: None,
             generator,
         }
@@ -58,20 +60,20 @@ impl<M, B> SwitchableGenerator<M, B> {
     /// The feeling; switched off, the initial one.
     pub(crate) fn feeling(&self) -> Feeling<StandardEmotion> {
         match self.scripted {
-            Some(feeling) if self.switch.is_on() => feeling,
+            Some(feeling) if self.switch.is_on() && self.role == ScriptRole::Felt => feeling,
             _ => self.generator.feeling(),
         }
     }
 
-    /// The feeling; `None` if it is switched off.
+    /// The feeling that others see; `None` if it is switched off.
     pub(crate) fn shown(&self) -> Option<Feeling<StandardEmotion>> {
-        self.switch.is_on().then(|| self.feeling())
+        let shown = self.scripted.unwrap_or_else(|| self.generator.feeling());
+        self.switch.is_on().then_some(shown)
     }
 
     /// Whether it is HAPPY; switched off, it is not.
     pub(crate) fn is_happy(&self) -> bool {
-        self.shown()
-            .is_some_and(|feeling| feeling.emotion == StandardEmotion::Happy)
+        self.switch.is_on() && self.feeling().emotion == StandardEmotion::Happy
     }
 
     /// The name under which the emotion is published.

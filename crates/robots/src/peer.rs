@@ -1,6 +1,7 @@
 //! What a robot knows of another one: by querying it, which a cut network prevents, and by sensing it, which nothing
 //! prevents.
 
+use affect::StandardEmotion;
 use std::sync::Arc;
 
 use robot::{Cars, Point, PublicState};
@@ -21,6 +22,8 @@ pub struct Peer {
     is_missing: bool,
     /// Its behavior in its last answer.
     behavior: Option<String>,
+    /// The emotion that it showed in its last answer, if it is a standard one.
+    emotion: Option<StandardEmotion>,
     /// Time since its last answer, seconds.
     unanswered_s: f64,
     /// Time since its location was last known, seconds.
@@ -47,6 +50,7 @@ impl Peer {
             is_sensed: false,
             is_missing: false,
             behavior: None,
+            emotion: None,
             unanswered_s: 0.0,
             unlocated_s: 0.0,
         }
@@ -68,6 +72,7 @@ impl Peer {
         let state = cars.get_robot_state(&self.name).ok();
         if let Some(state) = &state {
             self.behavior = Some(state.behavior_state.clone());
+            self.emotion = StandardEmotion::named(&state.emotion_state);
             self.unanswered_s = 0.0;
         }
 
@@ -130,6 +135,12 @@ impl Peer {
         self.behavior
             .as_deref()
             .filter(|_| !self.is_unknown(stale_s))
+    }
+
+    /// The emotion that it showed in its last answer, if that is not older than `stale_s` and a standard one.
+    #[must_use]
+    pub fn emotion(&self, stale_s: f64) -> Option<StandardEmotion> {
+        self.emotion.filter(|_| !self.is_unknown(stale_s))
     }
 
     /// How recent its last answer is: from 1 (of this tick) to 0 (older than `stale_s`, or none).

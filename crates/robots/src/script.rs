@@ -17,6 +17,17 @@ pub struct Scripted {
     pub urgency: Urgency,
 }
 
+/// In the place of what the feelings of a script are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ScriptRole {
+    /// Of what the robot feels: it acts by them, and shows them.
+    #[default]
+    Felt,
+    /// Of what it shows to others: it acts by its own.
+    Shown,
+}
+
 /// Feelings in the order in which they begin. An empty script leaves a robot its own emotions.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(transparent)]

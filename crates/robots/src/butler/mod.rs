@@ -261,7 +261,7 @@ impl Butler {
 
         Ok(Self {
             motion: Action::default(),
-            emotion: SwitchableGenerator::new(parameters.affect, parameters.script.clone(), esg),
+            emotion: SwitchableGenerator::new(parameters.affect, parameters.script(), esg),
             bsg: BehaviorGenerator::new(TABLE, ButlerBehavior::Serve),
             deliberator,
             state,
@@ -599,6 +599,20 @@ impl Butler {
             || (is_kept_away && cars.sensed_robots().iter().any(is_in_the_way))
     }
 
+    /// How far the emotion that the refiller shows makes him go, if he sees such signals: one who is FRUSTRATED on an errand of
+    /// his needs to be met \[I\].
+    fn signaled_urge(&self) -> Urge {
+        let shown = self.state.refiller.emotion(self.parameters.query_stale_s);
+        let is_signaled = self.parameters.signals.is_on()
+            && self.state.need
+            && shown == Some(StandardEmotion::Frustrated);
+        if is_signaled {
+            Urge::Intercept
+        } else {
+            Urge::None
+        }
+    }
+
     /// How far he goes to be refilled, by his policy.
     fn urge(&self) -> Urge {
         let parameters = &self.parameters;
@@ -609,8 +623,10 @@ impl Butler {
         match parameters.policy() {
             Policy::Emotion => {
                 let emotion = self.feeling().emotion;
-                self.deliberator
-                    .urge(emotion, &self.state.mind, self.state.need)
+                let own = self
+                    .deliberator
+                    .urge(emotion, &self.state.mind, self.state.need);
+                own.max(self.signaled_urge())
             }
             Policy::Rules => Urge::at(
                 self.pressure(),

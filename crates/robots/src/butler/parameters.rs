@@ -10,7 +10,7 @@ use crate::bounds::{not_negative, positive};
 use crate::drive::LOOK_S;
 use crate::policy::Policy;
 use crate::recruitment::recruiter::RecruiterParameters;
-use crate::script::Script;
+use crate::script::{Script, ScriptRole};
 use crate::switch::Switch;
 use crate::units::FT_M;
 
@@ -34,6 +34,11 @@ pub struct ButlerParameters {
     /// Emotions that he shows and acts by in the place of his own, for experiments. Default none \[I\].
     #[serde(skip_serializing_if = "Script::is_empty")]
     pub script: Script,
+    /// Whether the script takes the place of what is felt, or only of what is shown. Default felt \[I\].
+    pub scripted: ScriptRole,
+    /// Whether the emotion that the other robot shows is an input of its own \[D: that emotions signaled to others have
+    /// consequences for them; I: which\]. Default off \[I\].
+    pub signals: Switch,
     /// Whether his emotion acts on his behavior: the schematic level \[D: Murphy et al. 2002, abstract\]. With `off` he
     /// has emotions and publishes them, and acts as without. Default on \[I\].
     pub schematic: Switch,
@@ -154,6 +159,8 @@ impl Default for ButlerParameters {
             affect: Switch::On,
             policy: Policy::Emotion,
             script: Script::default(),
+            scripted: ScriptRole::default(),
+            signals: Switch::Off,
             schematic: Switch::On,
             resend: Switch::Off,
             resend_s: 5.0,
@@ -192,6 +199,11 @@ impl Default for ButlerParameters {
 }
 
 impl ButlerParameters {
+    /// The emotions that are given, and in the place of what.
+    pub(super) fn script(&self) -> (Script, ScriptRole) {
+        (self.script.clone(), self.scripted)
+    }
+
     /// Checks the values, except those of estimators and dynamics, which are checked where they are used.
     ///
     /// # Errors

@@ -119,6 +119,7 @@ impl CarsRobotInterface for Leguin {
         self.state.advance(behavior, tick_s);
         self.state.checks.advance(tick_s);
         self.observe_waiter(cars);
+        self.heed_signals();
         self.observe_way(tick_s);
         self.measure(behavior);
     }
@@ -243,7 +244,7 @@ impl Leguin {
 
         Ok(Self {
             motion: Action::default(),
-            emotion: SwitchableGenerator::new(parameters.affect, parameters.script.clone(), esg),
+            emotion: SwitchableGenerator::new(parameters.affect, parameters.script(), esg),
             bsg: BehaviorGenerator::new(TABLE, LeguinBehavior::Wait),
             haste,
             state: LeguinMemory::new(&parameters),
@@ -358,15 +359,41 @@ impl Leguin {
         }
     }
 
+    /// What the emotion that the waiter shows makes her do, if she sees such signals: she sets out when he is CONCERNED and
+    /// hurries when he is FRUSTRATED, as if he had commanded it \[I\].
+    fn heed_signals(&mut self) {
+        let stale_s = self.parameters.query_stale_s;
+        if !self.parameters.signals.is_on() || self.calls_another() {
+            return;
+        }
+
+        let state = &mut self.state;
+        let signaled = match state.waiter.emotion(stale_s) {
+            Some(StandardEmotion::Concerned) => Errand::Refill,
+            Some(StandardEmotion::Frustrated | StandardEmotion::Angry) => Errand::Hurry,
+            _ => return,
+        };
+        let is_new = match self.bsg.current() {
+            LeguinBehavior::Wait => state.pending != Some(Errand::Hurry),
+            LeguinBehavior::Refill => signaled == Errand::Hurry && !state.hurried,
+            _ => false,
+        };
+        if is_new {
+            state.pending = Some(signaled);
+        }
+    }
+
+    /// Whether the waiter is known to call another robot.
+    fn calls_another(&self) -> bool {
+        let called = self.state.waiter_calls.as_deref();
+        called.is_some_and(|name| *name != self.state.name)
+    }
+
     /// Whether the waiter wants treats from her. If he cannot be queried she assumes that he does, unless he is known to
     /// call for another robot: Vonda does not step in for Leguin.
     fn is_needed(&self) -> bool {
         let state = &self.state;
-        let calls_another = state
-            .waiter_calls
-            .as_deref()
-            .is_some_and(|name| *name != state.name);
-        !calls_another
+        !self.calls_another()
             && (state.waiter_needs || state.waiter.is_unknown(self.parameters.query_stale_s))
     }
 

@@ -7,7 +7,7 @@ use crate::bounds::{not_negative, positive};
 use crate::drive::LOOK_S;
 use crate::policy::Policy;
 use crate::recruitment::shame::HelperParameters;
-use crate::script::Script;
+use crate::script::{Script, ScriptRole};
 use crate::switch::Switch;
 use crate::units::FT_M;
 
@@ -28,6 +28,11 @@ pub struct LeguinParameters {
     /// Emotions that she shows and acts by in the place of her own, for experiments. Default none \[I\].
     #[serde(skip_serializing_if = "Script::is_empty")]
     pub script: Script,
+    /// Whether the script takes the place of what is felt, or only of what is shown. Default felt \[I\].
+    pub scripted: ScriptRole,
+    /// Whether the emotion that the other robot shows is an input of its own \[D: that emotions signaled to others have
+    /// consequences for them; I: which\]. Default off \[I\].
+    pub signals: Switch,
     /// Whether her emotion acts on her speed: the sensory-motor level \[D: Murphy et al. 2002, abstract\]. With `off`,
     /// "hurry" changes her emotion and not her speed. Default on \[I\].
     pub sensory_motor: Switch,
@@ -94,6 +99,8 @@ impl Default for LeguinParameters {
             affect: Switch::On,
             policy: Policy::Emotion,
             script: Script::default(),
+            scripted: ScriptRole::default(),
+            signals: Switch::Off,
             sensory_motor: Switch::On,
             schematic: Switch::On,
             caution: Caution::default(),
@@ -133,6 +140,11 @@ impl LeguinParameters {
     /// How strongly she reacts: 1 with the defaults.
     pub(super) fn gain(&self) -> f64 {
         self.dynamics.gain(self.caution)
+    }
+
+    /// The emotions that are given, and in the place of what.
+    pub(super) fn script(&self) -> (Script, ScriptRole) {
+        (self.script.clone(), self.scripted)
     }
 
     /// Checks the values, except those of her haste and of the dynamics, which are checked where they are used.
