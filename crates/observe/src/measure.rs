@@ -217,13 +217,13 @@ impl<'de> Visitor<'de> for PartsVisitor {
     }
 
     fn visit_map<A: MapAccess<'de>>(self, table: A) -> Result<Parts, A::Error> {
-        let Part(source) = Part::deserialize(MapAccessDeserializer::new(table))?;
+        let RatioTerm(source) = RatioTerm::deserialize(MapAccessDeserializer::new(table))?;
         Ok(Parts(vec![source]))
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Parts, A::Error> {
         let mut sources = Vec::new();
-        while let Some(Part(source)) = list.next_element()? {
+        while let Some(RatioTerm(source)) = list.next_element()? {
             if sources.len() == MAX_PARTS {
                 let reason = format!("more than {MAX_PARTS} numbers are added");
                 return Err(serde::de::Error::custom(reason));
@@ -239,8 +239,8 @@ impl<'de> Visitor<'de> for PartsVisitor {
 
 /// A number of a ratio.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(try_from = "RawPart")]
-struct Part(MeasureSource);
+#[serde(try_from = "RawRatioTerm")]
+struct RatioTerm(MeasureSource);
 
 /// A state variable of a robot, in a file `ROBOT.VARIABLE`.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
@@ -408,7 +408,7 @@ struct RawMeasure {
 /// A part of a ratio as written in the file.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct RawPart {
+struct RawRatioTerm {
     when: Option<When>,
     summary: Option<Spanned<String>>,
     count: Option<Spanned<Pattern>>,
@@ -449,7 +449,7 @@ impl TryFrom<RawMeasure> for Measure {
 
     fn try_from(raw: RawMeasure) -> Result<Self, MeasureError> {
         check_name(&raw.name)?;
-        let part = RawPart {
+        let part = RawRatioTerm {
             when: raw.when,
             summary: raw.summary,
             count: raw.count,
@@ -478,16 +478,16 @@ impl TryFrom<RawMeasure> for Measure {
     }
 }
 
-impl TryFrom<RawPart> for Part {
+impl TryFrom<RawRatioTerm> for RatioTerm {
     type Error = MeasureError;
 
-    fn try_from(raw: RawPart) -> Result<Self, MeasureError> {
+    fn try_from(raw: RawRatioTerm) -> Result<Self, MeasureError> {
         let (kind, _) = raw.check()?.ok_or(MeasureError::NotOne)?;
         Ok(Self(kind))
     }
 }
 
-impl RawPart {
+impl RawRatioTerm {
     /// The kind and its place in the file; `None` if there is none.
     fn check(self) -> Result<Option<(MeasureSource, Range<usize>)>, MeasureError> {
         if self.when.is_some() && self.count.is_none() {

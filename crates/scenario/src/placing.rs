@@ -9,7 +9,7 @@ use super::checked::{Scenario, to_wire, to_world};
 /// A body of a scenario cannot be placed.
 #[derive(Debug, Clone)]
 pub(super) struct PlacingError {
-    reason: Reason,
+    reason: PlacingReason,
     /// The robot that cannot be placed.
     robot: Option<RobotName>,
     /// The robot that it overlaps.
@@ -18,7 +18,7 @@ pub(super) struct PlacingError {
 
 /// Why a body cannot be placed.
 #[derive(Debug, Clone, Copy)]
-enum Reason {
+enum PlacingReason {
     Hall(HallError),
     /// All random places of a robot overlap another body.
     NoFreePlace,
@@ -69,7 +69,7 @@ pub(super) fn place_at_random(scenario: &mut Scenario) -> Result<(), PlacingErro
         let mut stream = protocol::random::stream(scenario.seed, &format!("at/{name}"));
         let Some(at) = placer.place(&mut stream) else {
             return Err(PlacingError {
-                reason: Reason::NoFreePlace,
+                reason: PlacingReason::NoFreePlace,
                 robot: Some(name),
                 other: None,
             });
@@ -104,7 +104,7 @@ impl PlacingError {
         }
 
         Self {
-            reason: Reason::Hall(error),
+            reason: PlacingReason::Hall(error),
             robot,
             other,
         }
@@ -116,7 +116,7 @@ impl PlacingError {
             return PlacingCause::Robot(robot);
         }
 
-        let Reason::Hall(error) = self.reason else {
+        let PlacingReason::Hall(error) = self.reason else {
             return PlacingCause::Field;
         };
         match error {
@@ -141,27 +141,31 @@ impl PlacingError {
 impl std::fmt::Display for PlacingError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match (&self.reason, &self.robot, &self.other) {
-            (Reason::Hall(HallError::RobotOnRobot { at, .. }), Some(robot), Some(other)) => {
+            (PlacingReason::Hall(HallError::RobotOnRobot { at, .. }), Some(robot), Some(other)) => {
                 write!(f, "robot {robot} at {at} m overlaps robot {other}")
             }
-            (Reason::Hall(HallError::RobotOnObstacle { at, obstacle, .. }), Some(robot), _) => {
+            (
+                PlacingReason::Hall(HallError::RobotOnObstacle { at, obstacle, .. }),
+                Some(robot),
+                _,
+            ) => {
                 write!(f, "robot {robot} at {at} m overlaps obstacle {obstacle}")
             }
-            (Reason::Hall(HallError::RobotOffField { at, .. }), Some(robot), _) => {
+            (PlacingReason::Hall(HallError::RobotOffField { at, .. }), Some(robot), _) => {
                 write!(
                     f,
                     "robot {robot} at {at} m does not lie wholly inside the field"
                 )
             }
-            (Reason::NoFreePlace, Some(robot), _) => {
+            (PlacingReason::NoFreePlace, Some(robot), _) => {
                 write!(
                     f,
                     "there is no free place for robot {robot} in {} draws: the field is too full",
                     RobotPlacer::TRIES
                 )
             }
-            (Reason::Hall(error), ..) => error.fmt(f),
-            (Reason::NoFreePlace, None, _) => f.write_str("the field is too full"),
+            (PlacingReason::Hall(error), ..) => error.fmt(f),
+            (PlacingReason::NoFreePlace, None, _) => f.write_str("the field is too full"),
         }
     }
 }

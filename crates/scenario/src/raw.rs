@@ -5,8 +5,8 @@ mod expect;
 pub(super) mod fault;
 mod guests;
 mod network;
+mod numbers;
 mod place;
-mod range;
 mod times;
 mod unplaced;
 pub(super) mod words;
@@ -24,14 +24,13 @@ use protocol::messages::{DisplayUnit, OnLate, Parameters, Point};
 use protocol::{RobotName, Tick};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
-use world::Triangular;
 
 use change::{ChangeTable, ParentTable};
 use fault::FaultTable;
 use guests::GuestsTable;
 use network::NetworkTable;
-use place::Place;
-use range::Range;
+use numbers::positive;
+use place::StartPlace;
 use times::Times;
 use unplaced::unplaced;
 
@@ -114,7 +113,7 @@ struct RawRobot {
     /// So many robots, whose names are this one and a number.
     count: Option<usize>,
     class: Option<String>,
-    at: Place,
+    at: StartPlace,
     on_late: Option<OnLate>,
     params_from: Option<Spanned<PathBuf>>,
     #[serde(default)]
@@ -308,48 +307,6 @@ impl ScenarioFile {
     }
 }
 
-/// A distribution in SI units, or its default.
-fn triangular<Q: CheckedNumber>(
-    source: &Source,
-    raw: Option<&Spanned<Range<Q>>>,
-    default: Range<Q>,
-) -> Result<Triangular, FileError> {
-    let span = raw.map(Spanned::span);
-    let Range { min, mode, max } = raw.map_or(default, |range| *range.get_ref());
-    Triangular::new(min.number(), mode.number(), max.number())
-        .map_err(|error| FileError::at(source, span, &error.to_string()))
-}
-
-/// A value with a number that can be checked.
-trait CheckedNumber: Copy {
-    /// The number in SI units.
-    fn number(self) -> f64;
-}
-
-impl CheckedNumber for Time {
-    fn number(self) -> f64 {
-        self.0
-    }
-}
-
-impl CheckedNumber for Speed {
-    fn number(self) -> f64 {
-        self.0
-    }
-}
-
-impl CheckedNumber for Length {
-    fn number(self) -> f64 {
-        self.0
-    }
-}
-
-impl CheckedNumber for u32 {
-    fn number(self) -> f64 {
-        f64::from(self)
-    }
-}
-
 fn record(raw: Option<RecordTable>, source: &Source) -> Result<RecordContents, FileError> {
     let default = RecordContents::default();
     let Some(raw) = raw else {
@@ -447,7 +404,7 @@ fn spec(robot: RawRobot, source: &Source, folder: Option<&Path>) -> Result<Robot
     Ok(RobotSpec {
         class: class.unwrap_or_else(|| robot.name.as_str().to_owned()),
         at: robot.at.point(),
-        is_at_random: robot.at == Place::Random,
+        is_at_random: robot.at == StartPlace::Random,
         parameters: to_parameters(&parameters),
     })
 }
@@ -511,26 +468,6 @@ impl FilePlaces {
 
 fn point(FixedList([x, y]): FixedList<Length, 2>) -> Point {
     Point::new(x.0, y.0)
-}
-
-/// A value that must be positive and finite, or its default.
-fn positive<T: CheckedNumber>(
-    source: &Source,
-    value: Option<&Spanned<T>>,
-    default: T,
-    what: &str,
-) -> Result<T, FileError> {
-    let Some(spanned) = value else {
-        return Ok(default);
-    };
-
-    let value = *spanned.get_ref();
-    let number = value.number();
-    if number > 0.0 && number.is_finite() {
-        return Ok(value);
-    }
-    let text = format!("{what} must be more than zero");
-    Err(FileError::at(source, Some(spanned.span()), &text))
 }
 
 /// Parameters as JSON for the welcome of a robot. Texts that are quantities become SI numbers.
@@ -625,7 +562,7 @@ impl RawRobot {
             name: name.clone(),
             count: None,
             class: Some(spec.class.clone()),
-            at: Place::of(spec),
+            at: StartPlace::of(spec),
             on_late: lateness.own.get(name).copied(),
             params_from: None,
             params: params.collect(),

@@ -349,15 +349,13 @@ mod tests {
     #[test]
     fn guests_out_of_range_and_guests_without_rules_ask_for_nothing() {
         for rules in ["[guests.requests]\nrange = \"1 cm\"\n", ""] {
-            let mut hall = hall(rules);
-            after(&mut hall, 0, &report("neutral", 0.0, 0.0, &[]));
-            let events = {
-                let name = RobotName::new("A").unwrap();
-                let (world, guests) = &mut hall;
-                let report = report("neutral", 3.0, 3.0, &["hello"]);
-                guests.take(1, [(0, &name, &report)].into_iter(), world)
-            };
-            assert_eq!(events, []);
+            let (world, mut guests) = hall(rules);
+            let name = RobotName::new("A").unwrap();
+            for (tick, count) in [(0, 0.0), (1, 3.0)] {
+                let report = report("happy", count, count, &["hello"]);
+                let events = guests.take(tick, [(0, &name, &report)].into_iter(), &world);
+                assert_eq!(events, []);
+            }
         }
     }
 

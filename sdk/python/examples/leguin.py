@@ -53,6 +53,18 @@ Policy = Literal["emotion", "rules", "timer", "neither"]
 
 
 @dataclass(frozen=True)
+class RecruitmentParameters:
+    """How she answers a waiter who calls any refiller: not at all in Python. The other values are read and not used."""
+
+    by: Literal["off"] = "off"
+    threshold: float = 0.6
+    gain: float = 1.0
+    weight: Literal["inverse", "inverse_square"] = "inverse"
+    near_m: float = FT_M
+    shame_start_max: float = 0.3
+
+
+@dataclass(frozen=True)
 class Parameters:
     """What she can be told about herself, in SI units; what each means is in ``configs/robots/leguin.toml``."""
 
@@ -60,6 +72,8 @@ class Parameters:
     goods: str = "treats"
     affect: Switch = "on"
     policy: Policy = "emotion"
+    signals: Literal["off"] = "off"
+    scripted: Literal["felt"] = "felt"
     sensory_motor: Switch = "on"
     schematic: Switch = "on"
     caution: float = 0.5
@@ -83,6 +97,7 @@ class Parameters:
     turn_mean_s: float = 5.0
     look_s: float = 2.0
     joke_mean_s: float = 60.0
+    recruitment: RecruitmentParameters = field(default_factory=RecruitmentParameters)
     dynamics: DynamicsParameters = field(default_factory=DynamicsParameters)
 
     POSITIVE = (

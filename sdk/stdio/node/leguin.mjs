@@ -17,6 +17,8 @@ const PARAMETERS = {
   goods: "treats",
   affect: "on",
   policy: "emotion",
+  signals: "off", // The only one that she has here, as the next one.
+  scripted: "felt",
   sensory_motor: "on",
   schematic: "on",
   caution: 0.5,
@@ -637,10 +639,13 @@ function known(defaults, given) {
 
 /** Back to the initial state; a former incarnation that was lost has published what it knew. */
 async function begin(init) {
-  const { dynamics: given, ...others } = init.parameters ?? {};
+  const { dynamics: given, recruitment, ...others } = init.parameters ?? {};
   told = init;
   parameters = known(PARAMETERS, others);
   dynamics = known(DYNAMICS, given ?? {});
+  if (parameters.signals !== "off") throw new Error("she sees no signals here: signals is off");
+  if (parameters.scripted !== "felt") throw new Error("she has no script here: scripted is felt");
+  if ((recruitment?.by ?? "off") !== "off") throw new Error("she is not recruited here: recruitment.by is off");
   const own = Stream.named(init.seed, init.stream);
   her = {
     at: init.location,

@@ -93,12 +93,12 @@ fn a_window_has_what_began_before_it() {
         "--duration",
         "120 s",
     ]);
-    let by_tick = Picture::of(&lab, "hall", &["--from", "100", "--to", "160"]);
-    let by_time = Picture::of(&lab, "hall", &["--from", "50 s", "--to", "80 s"]);
+    let by_tick = Picture::of(&lab, "hall", &["--from", "102", "--to", "162"]);
+    let by_time = Picture::of(&lab, "hall", &["--from", "51 s", "--to", "81 s"]);
     assert_eq!(by_tick.svg, by_time.svg);
 
     let events = lab.events("hall");
-    let in_window = |event: &&Value| (100..=160).contains(&event["tick"].as_u64().unwrap());
+    let in_window = |event: &&Value| (102..=162).contains(&event["tick"].as_u64().unwrap());
     let changes = events
         .iter()
         .filter(in_window)
@@ -114,9 +114,9 @@ fn a_window_has_what_began_before_it() {
         "diagram",
         "hall",
         "--from",
-        "100",
+        "102",
         "--to",
-        "160",
+        "162",
         "-o",
         file.to_str().unwrap(),
     ]);

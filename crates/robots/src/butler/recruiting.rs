@@ -5,7 +5,7 @@ use robot::{Cars, RobotName, StateVariables};
 use super::Butler;
 use crate::commands::{HELP, REFILL};
 use crate::published::{count, number, text};
-use crate::recruitment::recruiter::{Counts, Step};
+use crate::recruitment::recruiter::{RecruitingCounts, RecruitingStep};
 
 impl Butler {
     /// Whether he recruits refillers.
@@ -41,18 +41,18 @@ impl Butler {
 
         match step {
             None => {}
-            Some(Step::Call) => {
+            Some(RecruitingStep::Call) => {
                 for refiller in self.refillers(cars) {
                     self.send(refiller.as_str(), HELP, cars);
                 }
             }
-            Some(Step::Assign { to, is_first }) => {
+            Some(RecruitingStep::Assign { to, is_first }) => {
                 if is_first {
                     self.state.engage(&to);
                 }
                 self.send(&to, REFILL, cars);
             }
-            Some(Step::GiveUp) => self.state.forget_calls(),
+            Some(RecruitingStep::GiveUp) => self.state.forget_calls(),
         }
     }
 
@@ -85,7 +85,7 @@ impl Butler {
         }
 
         let recruiter = &self.state.recruiter;
-        let Counts {
+        let RecruitingCounts {
             requests,
             calls,
             arrivals,
@@ -105,7 +105,7 @@ impl Butler {
             return;
         }
 
-        let counts = Counts {
+        let counts = RecruitingCounts {
             requests: count(last, "requests"),
             calls: count(last, "help_calls"),
             arrivals: count(last, "arrivals"),

@@ -53,7 +53,7 @@ impl RecruiterParameters {
 
 /// What the waiter has to do.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Step {
+pub enum RecruitingStep {
     /// Send "help" to every refiller.
     Call,
     /// Send "refill" to this one. The first time she is chosen.
@@ -69,7 +69,7 @@ pub enum Step {
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-enum Phase {
+enum RecruitingPhase {
     Idle,
     /// He calls; the time since the last call is `None` before the first one.
     Calling {
@@ -92,19 +92,19 @@ enum Phase {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Recruiter {
-    phase: Phase,
+    phase: RecruitingPhase,
     /// The time since the request that has not been served, s.
     open_s: Option<f64>,
     /// Who has offered in this tick.
     offers: Vec<String>,
     chance: Chance,
-    counts: Counts,
+    counts: RecruitingCounts,
 }
 
 /// What has happened so far.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Counts {
+pub struct RecruitingCounts {
     /// Requests: needs for which he has called.
     pub requests: u32,
     /// Calls: a "help" to every refiller is one.
@@ -120,25 +120,25 @@ impl Recruiter {
     #[must_use]
     pub fn new(chance: Chance) -> Self {
         Self {
-            phase: Phase::Idle,
+            phase: RecruitingPhase::Idle,
             open_s: None,
             offers: Vec::new(),
             chance,
-            counts: Counts::default(),
+            counts: RecruitingCounts::default(),
         }
     }
 
     /// What has happened so far.
     #[must_use]
-    pub fn counts(&self) -> Counts {
+    pub fn counts(&self) -> RecruitingCounts {
         self.counts
     }
 
     /// Goes on from what an earlier incarnation has counted, and from the refiller whom it had chosen.
-    pub fn take_over(&mut self, counts: Counts, chosen: Option<&str>) {
+    pub fn take_over(&mut self, counts: RecruitingCounts, chosen: Option<&str>) {
         self.counts = counts;
         if let Some(to) = chosen {
-            self.phase = Phase::Assigned {
+            self.phase = RecruitingPhase::Assigned {
                 to: to.to_owned(),
                 since_s: 0.0,
             };
@@ -149,23 +149,25 @@ impl Recruiter {
     #[must_use]
     pub fn chosen(&self) -> Option<&str> {
         match &self.phase {
-            Phase::Assigning { to, .. } | Phase::Assigned { to, .. } => Some(to),
-            Phase::Idle | Phase::Calling { .. } => None,
+            RecruitingPhase::Assigning { to, .. } | RecruitingPhase::Assigned { to, .. } => {
+                Some(to)
+            }
+            RecruitingPhase::Idle | RecruitingPhase::Calling { .. } => None,
         }
     }
 
     /// Whether the refiller whom he has chosen has accepted.
     #[must_use]
     pub fn is_assigned(&self) -> bool {
-        matches!(self.phase, Phase::Assigned { .. })
+        matches!(self.phase, RecruitingPhase::Assigned { .. })
     }
 
     /// He needs help: calls, unless he does already or has somebody who comes.
     pub fn request(&mut self) {
-        if self.phase != Phase::Idle {
+        if self.phase != RecruitingPhase::Idle {
             return;
         }
-        self.phase = Phase::Calling { since_s: None };
+        self.phase = RecruitingPhase::Calling { since_s: None };
         if self.open_s.is_none() {
             self.open_s = Some(0.0);
             self.counts.requests += 1;
@@ -175,9 +177,9 @@ impl Recruiter {
     /// Takes a command of another robot. Returns whether it is an answer to a call.
     pub fn hear(&mut self, from: &str, command: &str) -> bool {
         match (command, &self.phase) {
-            (OFFER, Phase::Calling { .. }) => self.offers.push(from.to_owned()),
-            (ACCEPT, Phase::Assigning { to, .. }) if to == from => {
-                self.phase = Phase::Assigned {
+            (OFFER, RecruitingPhase::Calling { .. }) => self.offers.push(from.to_owned()),
+            (ACCEPT, RecruitingPhase::Assigning { to, .. }) if to == from => {
+                self.phase = RecruitingPhase::Assigned {
                     to: from.to_owned(),
                     since_s: 0.0,
                 };
@@ -195,22 +197,22 @@ impl Recruiter {
         tick_s: f64,
         parameters: &RecruiterParameters,
         distance_m: impl FnMut(&str) -> Option<f64>,
-    ) -> Option<Step> {
+    ) -> Option<RecruitingStep> {
         if let Some(open_s) = &mut self.open_s {
             *open_s += tick_s;
         }
 
         let offers = std::mem::take(&mut self.offers);
         match &mut self.phase {
-            Phase::Idle => None,
-            Phase::Calling { since_s } => {
+            RecruitingPhase::Idle => None,
+            RecruitingPhase::Calling { since_s } => {
                 if let Some(to) = choose(offers, parameters.by, &mut self.chance, distance_m) {
-                    self.phase = Phase::Assigning {
+                    self.phase = RecruitingPhase::Assigning {
                         to: to.clone(),
                         tries: 1,
                         since_s: 0.0,
                     };
-                    return Some(Step::Assign { to, is_first: true });
+                    return Some(RecruitingStep::Assign { to, is_first: true });
                 }
                 let waited_s = since_s.map(|since_s| since_s + tick_s);
                 if waited_s.is_some_and(|waited_s| waited_s < parameters.help_s) {
@@ -219,31 +221,31 @@ impl Recruiter {
                 }
                 *since_s = Some(0.0);
                 self.counts.calls += 1;
-                Some(Step::Call)
+                Some(RecruitingStep::Call)
             }
-            Phase::Assigning { to, tries, since_s } => {
+            RecruitingPhase::Assigning { to, tries, since_s } => {
                 *since_s += tick_s;
                 if *since_s < parameters.help_s {
                     return None;
                 }
                 if *tries == parameters.assign_tries {
-                    self.phase = Phase::Calling { since_s: None };
-                    return Some(Step::GiveUp);
+                    self.phase = RecruitingPhase::Calling { since_s: None };
+                    return Some(RecruitingStep::GiveUp);
                 }
                 *tries += 1;
                 *since_s = 0.0;
-                Some(Step::Assign {
+                Some(RecruitingStep::Assign {
                     to: to.clone(),
                     is_first: false,
                 })
             }
-            Phase::Assigned { since_s, .. } => {
+            RecruitingPhase::Assigned { since_s, .. } => {
                 *since_s += tick_s;
                 if self.open_s.is_none() || *since_s < parameters.patience_s {
                     return None;
                 }
-                self.phase = Phase::Calling { since_s: None };
-                Some(Step::GiveUp)
+                self.phase = RecruitingPhase::Calling { since_s: None };
+                Some(RecruitingStep::GiveUp)
             }
         }
     }
@@ -258,7 +260,7 @@ impl Recruiter {
 
     /// The refiller has served him, or has turned back: he has nobody.
     pub fn release(&mut self) {
-        self.phase = Phase::Idle;
+        self.phase = RecruitingPhase::Idle;
     }
 }
 
@@ -305,7 +307,7 @@ mod tests {
     }
 
     /// What he does in so many ticks in which he hears nothing.
-    fn steps(recruiter: &mut Recruiter, ticks: usize) -> Vec<Step> {
+    fn steps(recruiter: &mut Recruiter, ticks: usize) -> Vec<RecruitingStep> {
         let parameters = parameters(Recruitment::Greedy);
         let mut steps = Vec::new();
         for _ in 0..ticks {
@@ -314,8 +316,8 @@ mod tests {
         steps
     }
 
-    fn assign(to: &str, is_first: bool) -> Step {
-        Step::Assign {
+    fn assign(to: &str, is_first: bool) -> RecruitingStep {
+        RecruitingStep::Assign {
             to: to.to_owned(),
             is_first,
         }
@@ -327,7 +329,7 @@ mod tests {
         assert!(steps(&mut recruiter, 10).is_empty(), "he needs nobody");
         recruiter.request();
         // At once, and then every 2 s: 4 ticks.
-        assert_eq!(steps(&mut recruiter, 9), vec![Step::Call; 3]);
+        assert_eq!(steps(&mut recruiter, 9), vec![RecruitingStep::Call; 3]);
         recruiter.request();
         assert_eq!(recruiter.counts().requests, 1);
         assert!(recruiter.hear("S1", OFFER));
@@ -407,14 +409,17 @@ mod tests {
         let assigned = steps(&mut recruiter, 17);
         assert_eq!(assigned.len(), 5);
         let after = steps(&mut recruiter, 5);
-        assert_eq!(after, [Step::GiveUp, Step::Call]);
+        assert_eq!(after, [RecruitingStep::GiveUp, RecruitingStep::Call]);
         assert_eq!(recruiter.chosen(), None);
 
         recruiter.hear("S2", OFFER);
         steps(&mut recruiter, 1);
         recruiter.hear("S2", ACCEPT);
         assert!(steps(&mut recruiter, 239).is_empty());
-        assert_eq!(steps(&mut recruiter, 2), [Step::GiveUp, Step::Call]);
+        assert_eq!(
+            steps(&mut recruiter, 2),
+            [RecruitingStep::GiveUp, RecruitingStep::Call]
+        );
         assert_eq!(recruiter.counts().requests, 1, "it is the same request");
     }
 }

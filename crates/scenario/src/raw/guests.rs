@@ -7,9 +7,9 @@ use config::{FileError, Source};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
-use super::range::Range;
+use super::numbers::{Range, positive, triangular};
 use super::unplaced::unplaced;
-use super::{checked, positive, triangular};
+use crate::checked::check_guests;
 use crate::guests::{Faces, GuestRules, Requests};
 use crate::network::ticks;
 
@@ -67,7 +67,7 @@ pub(super) fn walks(
     let mut count = 0;
     if let Some(table) = table {
         count = *table.count.get_ref();
-        checked::check_guests(count)
+        check_guests(count)
             .map_err(|reason| FileError::at(source, Some(table.count.span()), &reason))?;
     }
 

@@ -13,7 +13,7 @@ use super::super::checked::RobotSpec;
 use super::super::network::{
     Burst, Channel, Counted, LinkRule, LostCommand, Network, Partition, ticks,
 };
-use super::range::Range;
+use super::numbers::Range;
 use super::times;
 use super::times::Times;
 use super::unplaced::unplaced;

@@ -14,7 +14,7 @@ const RANDOM: &str = "random";
 
 /// A place of a robot.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Place {
+pub(super) enum StartPlace {
     /// A given one.
     Given {
         at: FixedList<Length, 2>,
@@ -25,7 +25,7 @@ pub(super) enum Place {
     Random,
 }
 
-impl Place {
+impl StartPlace {
     /// The place of a robot, written out.
     pub(super) fn of(spec: &RobotSpec) -> Self {
         Self::Given {
@@ -53,13 +53,13 @@ impl Place {
     }
 }
 
-impl<'de> Deserialize<'de> for Place {
+impl<'de> Deserialize<'de> for StartPlace {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(PlaceVisitor)
+        deserializer.deserialize_any(StartPlaceVisitor)
     }
 }
 
-impl Serialize for Place {
+impl Serialize for StartPlace {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
             Self::Given { at, .. } => at.serialize(serializer),
@@ -68,10 +68,10 @@ impl Serialize for Place {
     }
 }
 
-struct PlaceVisitor;
+struct StartPlaceVisitor;
 
-impl<'de> Visitor<'de> for PlaceVisitor {
-    type Value = Place;
+impl<'de> Visitor<'de> for StartPlaceVisitor {
+    type Value = StartPlace;
 
     fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(
@@ -80,16 +80,16 @@ impl<'de> Visitor<'de> for PlaceVisitor {
         )
     }
 
-    fn visit_str<E: Error>(self, text: &str) -> Result<Place, E> {
+    fn visit_str<E: Error>(self, text: &str) -> Result<StartPlace, E> {
         if text == RANDOM {
-            return Ok(Place::Random);
+            return Ok(StartPlace::Random);
         }
         Err(E::invalid_value(serde::de::Unexpected::Str(text), &self))
     }
 
-    fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<Place, A::Error> {
+    fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<StartPlace, A::Error> {
         let at = FixedList::deserialize(SeqAccessDeserializer::new(list))?;
-        Ok(Place::Given {
+        Ok(StartPlace::Given {
             at,
             is_drawn: false,
         })
