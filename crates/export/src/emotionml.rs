@@ -242,10 +242,10 @@ impl<W: Write> Document<'_, W> {
             .text(FACIAL_EXPRESSION)
             .filter(|face| *face != NEUTRAL_FACE);
         let face = face.map_or("", |_| " expressed-through=\"face\"");
-        write!(
+        writeln!(
             self.out,
             "  <emotion id=\"emotion.{robot}.{}\" time-ref-uri=\"{clock}\" offset-to-start=\"{begin_ms}\" \
-             duration=\"{duration_ms}\"{sets}{face}>\n",
+             duration=\"{duration_ms}\"{sets}{face}>",
             stay.period.begin
         )?;
         let about = [FOCALITY, CAUSAL_CHAIN].map(|name| published.text(name));

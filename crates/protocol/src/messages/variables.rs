@@ -191,10 +191,7 @@ impl StateVariables {
     pub fn with(self, added: impl IntoIterator<Item = (&'static str, Variable)>) -> Self {
         let added = added.into_iter();
         let mut entries = Vec::with_capacity(self.len() + added.size_hint().1.unwrap_or(USUAL));
-        let mut own = match Arc::try_unwrap(self.0) {
-            Ok(own) => own.into_iter().peekable(),
-            Err(shared) => shared.to_vec().into_iter().peekable(),
-        };
+        let mut own = Arc::unwrap_or_clone(self.0).into_iter().peekable();
 
         for (name, value) in added {
             while let Some(entry) = own.next_if(|(entry, _)| entry.as_str() < name) {
