@@ -63,7 +63,7 @@ def test_an_empty_panel_is_replaced_by_what_is_known(launch, open_page):
     expect(panel.locator(".pair", has_text="behavior")).to_contain_text("REFILL")
     expect(panel.get_by_test_id("face")).to_be_visible()
     expect(panel.locator(".gauge", has_text="intensity")).to_be_visible()
-    panel.locator("summary").click()
+    panel.locator("summary", has_text="Details").click()
     expect(panel.locator("tr", has_text="trips")).to_be_visible()
 
     # A panel with nothing but buttons has them below what is known.
@@ -80,12 +80,12 @@ def test_details_are_folded_until_they_are_asked_for(launch, open_page):
     expect(panel).to_contain_text("why")
     expect(panel).not_to_contain_text("controllability")
 
-    panel.locator("summary").click()
+    panel.locator("summary", has_text="Details").click()
     expect(panel.locator("tr", has_text="controllability")).to_be_visible()
     step(page, 2)
     expect(panel.locator("tr", has_text="controllability")).to_be_visible()
     expect(page.get_by_test_id("panel-Leguin")).not_to_contain_text("controllability")
-    panel.locator("summary").click()
+    panel.locator("summary", has_text="Details").click()
     expect(panel).not_to_contain_text("controllability")
 
 

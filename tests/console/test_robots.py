@@ -23,7 +23,7 @@ def test_three_robots_show_three_panels(launch, open_page):
         panel = page.get_by_test_id(f"panel-{name}")
         expect(panel.get_by_test_id("face")).to_be_visible()
         expect(panel.get_by_test_id("presence")).to_have_text("here")
-        panel.locator("summary").click()
+        panel.locator("summary", has_text="Details").click()
         expect(panel.locator(".details table").first).to_be_visible()
         seen.append(panel.inner_text().replace(name, ""))
 
@@ -132,7 +132,7 @@ def test_content_of_a_panel_or_line_is_not_executed(launch, open_page):
     panel = page.get_by_test_id("panel-Leguin")
     expect(panel.get_by_test_id("face")).to_be_visible()
 
-    panel.locator("summary").click()
+    panel.locator("summary", has_text="Details").click()
     run.put_panel("Leguin", HOSTILE["widgets"])
     expect(panel).to_contain_text("<script>window.hacked=1</script>")
     expect(panel.locator(".details table")).to_be_visible()
@@ -207,7 +207,7 @@ def test_the_page_works_with_any_content_of_a_panel(launch, open_page):
     page.get_by_test_id("btn-step").click()
     panel = page.get_by_test_id("panel-Leguin")
     expect(panel.get_by_test_id("face")).to_be_visible()
-    panel.locator("summary").click()
+    panel.locator("summary", has_text="Details").click()
 
     chance = random.Random(2002)
     for number in range(60):

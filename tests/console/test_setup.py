@@ -57,7 +57,7 @@ def test_obstacles_that_are_clicked_block_a_robot(launch, open_page):
     assert blocked, run.events()
     assert blocked[0]["by"] == "obstacle", run.events()
     panel = page.get_by_test_id("panel-Leguin")
-    panel.locator("summary").click()
+    panel.locator("summary", has_text="Details").click()
     expect(panel.locator("tr", has_text="blocked for").locator("td").last).not_to_have_text("0.0 s")
 
 

@@ -143,7 +143,7 @@ export class Panels {
               ({ depth, text, isHere }) =>
                 html`<li class=${isHere ? "here" : ""} aria-current=${isHere ? "true" : nothing} .style=${`margin-inline-start:${depth}rem`}>${text}</li>`,
             )}</ul>
-            <div class="widget table"><table class="pairs"><tbody>${components.map(
+            <div class="widget table" tabindex="0"><table class="pairs"><tbody>${components.map(
               ({ name: component, value, meaning }) => html`<tr title=${meaning}><td>${component}</td><td>${value}</td></tr>`,
             )}</tbody></table></div>`
         : nothing}</details>`;

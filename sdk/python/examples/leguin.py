@@ -570,7 +570,7 @@ class Leguin(CarsRobotInterface):
 
     def state_variables(self) -> StateVariables:
         goal = self.goal()
-        variables: StateVariables = {
+        variables: dict[str, bool | float | str] = {
             "hurried": self.hurried,
             "blocked_s": self.way.stalled_s,
             "waiting_s": self.waiting_s,

@@ -644,7 +644,7 @@ fn ten_thousand_runs_over_two_factors_are_a_page_of_a_bounded_size() {
             .count()
     });
     let mut expected = vec![25; 4 * 4];
-    expected.extend([24 * 4; 4]);
+    expected.extend([24 * 4; 6]);
     assert_eq!(
         cells.collect::<Vec<usize>>(),
         expected,
