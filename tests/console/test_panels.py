@@ -80,12 +80,12 @@ def test_details_are_folded_until_they_are_asked_for(launch, open_page):
     expect(panel).to_contain_text("why")
     expect(panel).not_to_contain_text("controllability")
 
-    panel.locator("summary", has_text="Details").click()
+    panel.locator("summary", has_text="Emotion").click()
     expect(panel.locator("tr", has_text="controllability")).to_be_visible()
     step(page, 2)
     expect(panel.locator("tr", has_text="controllability")).to_be_visible()
     expect(page.get_by_test_id("panel-Leguin")).not_to_contain_text("controllability")
-    panel.locator("summary", has_text="Details").click()
+    panel.locator("summary", has_text="Emotion").click()
     expect(panel).not_to_contain_text("controllability")
 
 
