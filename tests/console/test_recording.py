@@ -67,9 +67,9 @@ def test_a_recording_is_scrubbed_and_played(recorded, open_page, screenshots):
     expect(page.get_by_test_id("log")).to_contain_text("initialized, seed 2002")
     verdicts = page.get_by_test_id("verdict")
     chip = page.get_by_test_id("verdicts-chip")
-    expect(chip).to_have_accessible_name("4 of 4 open")
+    expect(chip).to_have_accessible_name("6 of 6 open")
     chip.click()
-    expect(verdicts).to_have_count(4)
+    expect(verdicts).to_have_count(6)
     expect(verdicts.first).to_have_text("… open no robot overlaps another")
 
     page.get_by_test_id("speed").select_option("max")
@@ -77,8 +77,8 @@ def test_a_recording_is_scrubbed_and_played(recorded, open_page, screenshots):
     expect(page.get_by_test_id("tick")).to_have_text("200")
     expect(page.get_by_test_id("log")).to_contain_text("finished")
     # What is decided by the end of the run shows at its last tick. A call is on its way then.
-    expect(chip).to_have_accessible_name("1 of 4 undecided, 1 not asked, 2 hold")
-    expect(verdicts.nth(2)).to_have_text("✓ pass no robot overlaps another")
+    expect(chip).to_have_accessible_name("1 of 6 undecided, 2 not asked, 3 hold")
+    expect(verdicts.nth(3)).to_have_text("✓ pass no robot overlaps another")
     expect(page.locator("li.verdict.undecided")).to_have_text("? undecided a call is answered or escalated")
     expect(page.get_by_test_id("log")).to_contain_text("pass: no robot overlaps another (it did not happen until tick 200")
     page.screenshot(path=screenshots / "verdicts-1440x900-light.png")
