@@ -27,7 +27,7 @@ pub struct Faces {
 
 /// Guests ask a robot for something, as often as its state variables `served` and `missed` rise, and their mood is by what
 /// they get.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Requests {
     /// How near the guests are who ask, from center to center, meters.
     pub range_m: f64,

@@ -77,7 +77,7 @@ fn rules_for_guests_have_defaults_and_are_kept() {
         faces.make_way,
         ["angry", "fearful"].map(str::to_owned).into()
     );
-    let requests = scenario.guest_rules.requests.clone().unwrap();
+    let requests = scenario.guest_rules.requests.unwrap();
     assert_eq!((requests.range_m, requests.patience), (1.8288, 11));
     let written = parse(&scenario.to_toml().unwrap()).unwrap();
     assert_eq!(written.guest_rules, scenario.guest_rules);

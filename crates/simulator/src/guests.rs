@@ -48,6 +48,11 @@ impl GuestState {
         }
     }
 
+    /// Whether guests see faces at all.
+    pub(crate) fn sees_faces(&self) -> bool {
+        self.rules.faces.is_some()
+    }
+
     /// What guests do in the next tick at a robot that has reported this; nothing if it shows no face that moves them.
     pub(crate) fn reaction(&self, robot: usize, report: &Report) -> Option<Reaction> {
         let faces = self.rules.faces.as_ref()?;
@@ -79,7 +84,7 @@ impl GuestState {
         reports: impl Iterator<Item = (usize, &'a RobotName, &'a Report)>,
         world: &World<R>,
     ) -> Vec<Event> {
-        let Some(requests) = self.rules.requests.clone() else {
+        let Some(requests) = self.rules.requests else {
             return Vec::new();
         };
 
@@ -101,7 +106,7 @@ impl GuestState {
 
         for guest in &mut self.guests {
             if guest.mood == GuestMood::Waiting && tick - guest.since >= requests.patience {
-                guest.turn(GuestMood::Annoyed, tick);
+                guest.set_mood(GuestMood::Annoyed, tick);
             }
         }
 
@@ -132,13 +137,13 @@ impl GuestState {
         let missed = usize::try_from(missed).unwrap_or(usize::MAX);
         let (lucky, others) = asking.split_at(served.min(asking.len()));
         for guest in lucky {
-            self.guests[*guest].turn(GuestMood::Content, tick);
+            self.guests[*guest].set_mood(GuestMood::Content, tick);
         }
         let content = others
             .iter()
             .filter(|guest| self.guests[**guest].mood == GuestMood::Content);
         for guest in content.copied().take(missed).collect::<Vec<_>>() {
-            self.guests[guest].turn(GuestMood::Waiting, tick);
+            self.guests[guest].set_mood(GuestMood::Waiting, tick);
         }
     }
 
@@ -146,14 +151,14 @@ impl GuestState {
     fn cheer(&mut self, near: &[usize], tick: Tick) {
         for guest in near {
             if self.guests[*guest].mood == GuestMood::Annoyed {
-                self.guests[*guest].turn(GuestMood::Waiting, tick);
+                self.guests[*guest].set_mood(GuestMood::Waiting, tick);
             }
         }
     }
 }
 
 impl Guest {
-    fn turn(&mut self, mood: GuestMood, tick: Tick) {
+    fn set_mood(&mut self, mood: GuestMood, tick: Tick) {
         if self.mood != mood {
             *self = Self { mood, since: tick };
         }

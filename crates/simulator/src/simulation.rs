@@ -547,6 +547,10 @@ impl Simulation {
     /// What guests do in the tick at the robots' faces.
     fn reactions(&self) -> Vec<Reaction> {
         let mut reactions = Vec::new();
+        if !self.guests.sees_faces() {
+            return reactions;
+        }
+
         for (index, name) in self.names.iter().enumerate() {
             // Who has not reported shows nothing.
             if let Some(report) = self
