@@ -14,6 +14,7 @@
 use crate::affect::Valence;
 use crate::label::{EmotionLabel, Feeling, StandardEmotion};
 use crate::ladder::{Ladder, Place};
+use crate::mood::MoodParameters;
 use crate::parameters::{DynamicsParameters, ParameterError};
 use crate::scalar::{Caution, Urgency, has_elapsed};
 use serde::{Deserialize, Serialize};
@@ -157,6 +158,8 @@ pub struct EmotionState<E> {
     /// Time for which the condition of the next rung has held without interruption, in seconds.
     pressing_s: f64,
     belief: Belief,
+    /// The slow mean of what is felt, -1 to 1.
+    mood: f64,
 }
 
 impl<E: EmotionLabel> EmotionState<E> {
@@ -176,6 +179,21 @@ impl<E: EmotionLabel> EmotionState<E> {
     /// The robot's current belief about its ability.
     pub fn belief(&self) -> Belief {
         self.belief
+    }
+
+    /// The mood: intensity with the sign of its valence, -1 to 1.
+    pub fn mood(&self) -> f64 {
+        self.mood
+    }
+
+    /// The same state in another mood, which is limited to -1 to 1; NaN is no mood.
+    #[must_use]
+    pub fn with_mood(self, mood: f64) -> Self {
+        let mood = if mood.is_nan() { 0.0 } else { mood };
+        Self {
+            mood: mood.clamp(-1.0, 1.0),
+            ..self
+        }
     }
 
     /// What counted as progress in the last step; `None` if nothing did.
@@ -201,6 +219,7 @@ impl<E: EmotionLabel> EmotionState<E> {
 pub struct Dynamics<E> {
     ladder: Ladder<E>,
     parameters: DynamicsParameters,
+    mood: MoodParameters,
     gain: f64,
 }
 
@@ -229,7 +248,18 @@ impl<E: EmotionLabel> Dynamics<E> {
             ladder,
             gain: parameters.gain(caution),
             parameters: parameters.clone(),
+            mood: MoodParameters::default(),
         })
+    }
+
+    /// The same dynamics with moods of these constants; without, a mood follows what is felt and acts on nothing.
+    ///
+    /// # Errors
+    ///
+    /// Returns the first [`ParameterError`] found.
+    pub fn with_mood(self, mood: MoodParameters) -> Result<Self, ParameterError> {
+        mood.check()?;
+        Ok(Self { mood, ..self })
     }
 
     /// The emotions and their thresholds.
@@ -247,7 +277,7 @@ impl<E: EmotionLabel> Dynamics<E> {
         self.gain
     }
 
-    /// The initial state: the lowest emotion, urgency 0, no belief.
+    /// The initial state: the lowest emotion, urgency 0, no belief, the mood of the parameters.
     pub fn start(&self) -> EmotionState<E> {
         EmotionState {
             emotion: self.ladder.start(),
@@ -257,6 +287,7 @@ impl<E: EmotionLabel> Dynamics<E> {
             unchanged_s: 0.0,
             pressing_s: 0.0,
             belief: Belief::Unstated,
+            mood: self.mood.start,
         }
     }
 
@@ -282,35 +313,46 @@ impl<E: EmotionLabel> Dynamics<E> {
         }
     }
 
-    /// Whether `state` is valid for these dynamics: its emotion is on the ladder, and its times are finite and not
-    /// negative.
+    /// Whether `state` is valid for these dynamics: its emotion is on the ladder, its times are finite and not negative, and
+    /// its mood is within -1 and 1.
     ///
     /// Use it to validate a state that was read from a file. [`Dynamics::step`] accepts any state, and moves an
     /// emotion that is not on the ladder to the rung for its urgency.
     pub fn accepts(&self, state: &EmotionState<E>) -> bool {
         let is_on_ladder = self.ladder.place(state.emotion) != Place::Elsewhere;
 
-        is_on_ladder && is_duration(state.unchanged_s) && is_duration(state.pressing_s)
+        let has_mood = (-1.0..=1.0).contains(&state.mood);
+        is_on_ladder && has_mood && is_duration(state.unchanged_s) && is_duration(state.pressing_s)
     }
 
-    /// The urgency that `drive` moves toward: `min(1, g * need / rho_max)`.
+    /// The urgency that `drive` moves toward in a mood: `min(1, g * need / rho_max)`, shifted by the mood.
     ///
     /// `None` if the drive leaves the urgency unchanged.
-    pub fn target(&self, drive: StepInput) -> Option<Urgency> {
-        match drive {
-            StepInput::Need(ratio) if ratio.is_nan() => None,
+    pub fn target(&self, drive: StepInput, mood: f64) -> Option<Urgency> {
+        let pressure = match drive {
+            StepInput::Need(ratio) if ratio.is_nan() => return None,
             StepInput::Need(ratio) => {
-                let target = self.gain * ratio / self.parameters.rho_max;
-                Some(Urgency::saturating(target))
+                Urgency::saturating(self.gain * ratio / self.parameters.rho_max)
             }
-            StepInput::Pressure(pressure) => Some(pressure),
-            StepInput::Rest => Some(Urgency::MIN),
-            StepInput::Hold => None,
-        }
+            StepInput::Pressure(pressure) => pressure,
+            StepInput::Rest => Urgency::MIN,
+            StepInput::Hold => return None,
+        };
+
+        Some(Urgency::saturating(
+            pressure.value() + self.mood.shift(mood),
+        ))
     }
 
-    /// Advances the state by `dt_s` seconds: updates the belief, then the urgency, then the emotion at most once.
+    /// Advances the state by `dt_s` seconds: updates the belief, then the urgency, then the emotion at most once, then the mood.
     pub fn step(&self, state: &mut EmotionState<E>, stimulus: &Stimulus, dt_s: f64) {
+        self.step_emotion(state, stimulus, dt_s);
+
+        let felt = state.feeling().affect().signed();
+        state.mood = self.mood.next(state.mood, felt, dt_s);
+    }
+
+    fn step_emotion(&self, state: &mut EmotionState<E>, stimulus: &Stimulus, dt_s: f64) {
         state.belief = stimulus.belief.unwrap_or(state.belief);
         state.unchanged_s += dt_s;
 
@@ -320,6 +362,7 @@ impl<E: EmotionLabel> Dynamics<E> {
                 unchanged_s: state.unchanged_s,
                 belief: state.belief,
                 emotion: state.emotion,
+                mood: state.mood,
                 progress: Some(Progress::event(1.0)),
                 ..self.start()
             };
@@ -342,7 +385,8 @@ impl<E: EmotionLabel> Dynamics<E> {
     /// Filters the drive into the urgency, then adds the effect of the event. The urgency does not fall below the floor.
     fn update_urgency(&self, state: &mut EmotionState<E>, stimulus: &Stimulus, dt_s: f64) {
         let before = state.urgency.value();
-        let target = self.target(stimulus.drive).map(Urgency::value);
+        let target = self.target(stimulus.drive, state.mood);
+        let target = target.map(Urgency::value);
         let mut urgency = match target {
             Some(target) => self.filter(before, target, dt_s),
             None => before,

@@ -124,6 +124,18 @@ pub enum ParameterError {
         /// Its value.
         value: f64,
     },
+    /// A parameter outside of its range.
+    #[error("{name} must be from {least} to {greatest}, not {value}")]
+    OutsideRange {
+        /// The parameter.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// The least allowed value.
+        least: f64,
+        /// The greatest allowed value.
+        greatest: f64,
+    },
     /// Thresholds that do not ascend. The robot could skip an emotion.
     #[error(
         "thresholds must be in ascending order within [0, 1], but {lower} is followed by {upper}"
@@ -250,6 +262,24 @@ pub(crate) fn not_negative(name: &'static str, value: f64) -> Result<(), Paramet
         Ok(())
     } else {
         Err(ParameterError::Negative { name, value })
+    }
+}
+
+pub(crate) fn within(
+    name: &'static str,
+    value: f64,
+    least: f64,
+    greatest: f64,
+) -> Result<(), ParameterError> {
+    if (least..=greatest).contains(&value) {
+        Ok(())
+    } else {
+        Err(ParameterError::OutsideRange {
+            name,
+            value,
+            least,
+            greatest,
+        })
     }
 }
 

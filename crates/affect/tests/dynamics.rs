@@ -9,8 +9,8 @@ use affect::StandardEmotion::{
     Angry, Concerned, Confident, Discouraged, Frustrated, Happy, Hopeful,
 };
 use affect::{
-    Belief, Caution, Dynamics, DynamicsParameters, EmotionState, Feeling, Ladder, ProgressEvent,
-    Rung, StandardEmotion, StateSet, StepInput, Stimulus, Urgency,
+    Belief, Caution, Dynamics, DynamicsParameters, EmotionState, Feeling, Ladder, MoodParameters,
+    ProgressEvent, Rung, StandardEmotion, StateSet, StepInput, Stimulus, Urgency,
 };
 use proptest::prelude::*;
 
@@ -390,13 +390,73 @@ fn a_state_of_another_ladder_moves_to_a_rung() {
     robot.state = other.state;
     robot.entered(Stimulus::need(9.0), 2.0);
 
-    let json = r#"{"emotion":"CONFIDENT","urgency":0.5,"floor":0.0,"progress":null,"unchanged_s":0.0,"pressing_s":0.0,"belief":"unstated"}"#;
+    let json = r#"{"emotion":"CONFIDENT","urgency":0.5,"floor":0.0,"progress":null,"unchanged_s":0.0,"pressing_s":0.0,"belief":"unstated","mood":0.0}"#;
     robot.state = serde_json::from_str(json).unwrap();
     assert!(!robot.dynamics.accepts(&robot.state));
     assert_eq!(robot.step(Stimulus::new(StepInput::Hold)), Concerned);
 
     let wrong = json.replace("0.5,", "1.5,");
     assert!(serde_json::from_str::<EmotionState<StandardEmotion>>(&wrong).is_err());
+}
+
+/// Dynamics with a mood of these constants that begins so.
+fn moody(start: f64, tau_s: f64, weight: f64) -> Dynamics<StandardEmotion> {
+    let mood = MoodParameters {
+        start,
+        tau_s,
+        weight,
+    };
+    dynamics(StateSet::Murphy4).with_mood(mood).unwrap()
+}
+
+/// The feeling and the mood after some seconds of a need.
+fn after(dynamics: &Dynamics<StandardEmotion>, need: f64, time_s: f64) -> (StandardEmotion, f64) {
+    let mut state = dynamics.start();
+    for _ in 0..(time_s / DT_S) as usize {
+        dynamics.step(&mut state, &Stimulus::need(need), DT_S);
+    }
+    (state.feeling().emotion, state.mood())
+}
+
+#[test]
+fn a_bad_mood_makes_the_same_need_worse_and_a_good_one_lighter() {
+    let need = 0.8; // A pressure of 0.4: CONFIDENT.
+    let never = 1e12;
+    assert_eq!(after(&moody(0.0, never, 0.4), need, 60.0).0, Confident);
+    assert_eq!(after(&moody(-1.0, never, 0.4), need, 60.0).0, Frustrated);
+    assert_eq!(after(&moody(1.0, never, 0.4), need, 60.0).0, Happy);
+    assert_eq!(
+        after(&moody(-1.0, never, 0.0), need, 60.0).0,
+        Confident,
+        "no weight"
+    );
+}
+
+#[test]
+fn a_mood_follows_what_is_felt_and_an_achieved_goal_does_not_end_it() {
+    let dynamics = moody(0.0, 300.0, 0.0);
+    let (emotion, mood) = after(&dynamics, 9.0, 120.0);
+    assert_eq!(emotion, Frustrated);
+    assert!((-0.35..-0.25).contains(&mood), "{mood} after 120 s of 300");
+
+    let mut state = dynamics.start().with_mood(mood);
+    let goal = Stimulus::rest().with_event(Some(ProgressEvent::GoalAchieved));
+    dynamics.step(&mut state, &goal, DT_S);
+    assert_eq!(state.feeling().emotion, Happy);
+    assert!(mood < state.mood() && state.mood() < mood + 0.01);
+}
+
+#[test]
+fn moods_out_of_range_are_no_moods() {
+    let state = dynamics(StateSet::Murphy4).start();
+    for (given, mood) in [(2.0, 1.0), (-2.0, -1.0), (f64::NAN, 0.0), (0.3, 0.3)] {
+        assert_eq!(state.clone().with_mood(given).mood(), mood);
+    }
+
+    let json = serde_json::to_string(&state).unwrap();
+    let wrong = json.replace("\"mood\":0.0", "\"mood\":1.5");
+    let wrong: EmotionState<StandardEmotion> = serde_json::from_str(&wrong).unwrap();
+    assert!(!dynamics(StateSet::Murphy4).accepts(&wrong));
 }
 
 fn rung(ladder: &Ladder<StandardEmotion>, emotion: StandardEmotion) -> usize {

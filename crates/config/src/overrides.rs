@@ -158,6 +158,20 @@ impl Override {
         is_among_parameters && self.value.is_table()
     }
 
+    /// Whether it sets the value at a path that ends with these keys, by itself or with the table around it.
+    #[must_use]
+    pub fn sets(&self, keys: &[&str]) -> bool {
+        (0..=keys.len()).any(|known| {
+            let (above, within) = keys.split_at(known);
+            let is_there =
+                self.path.len() >= known && self.path[self.path.len() - known..] == *above;
+            let value = within
+                .iter()
+                .try_fold(&self.value, |value, key| value.get(key));
+            is_there && value.is_some()
+        })
+    }
+
     /// Whether it sets how many robots there are of a kind.
     fn is_count(&self) -> bool {
         matches!(&self.path[..], [robots, _, count] if robots == ROBOTS && count == COUNT)

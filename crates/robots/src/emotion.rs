@@ -71,6 +71,11 @@ impl<M, B> SwitchableGenerator<M, B> {
         self.switch.is_on().then_some(shown)
     }
 
+    /// The mood, -1 to 1.
+    pub(crate) fn mood(&self) -> f64 {
+        self.generator.state().mood()
+    }
+
     /// Whether it is HAPPY; switched off, it is not.
     pub(crate) fn is_happy(&self) -> bool {
         self.switch.is_on() && self.feeling().emotion == StandardEmotion::Happy
@@ -104,7 +109,7 @@ impl<M, B> SwitchableGenerator<M, B> {
         Ok(())
     }
 
-    /// Continues from the feeling that a lost incarnation published: its urgency, and the emotion of its action tendency.
+    /// Continues from what a lost incarnation published: its urgency, the emotion of its action tendency, and its mood.
     pub(crate) fn take_over(&mut self, last: &StateVariables) {
         let tendency = text(last, affect::frame::ACTION_TENDENCY);
         let emotion = StandardEmotion::ALL.into_iter().find(|emotion| {
@@ -121,7 +126,8 @@ impl<M, B> SwitchableGenerator<M, B> {
                 .generator
                 .dynamics()
                 .taken_over(Feeling { emotion, urgency });
-            self.generator.restore(state);
+            let mood = number(last, affect::frame::MOOD).unwrap_or(state.mood());
+            self.generator.restore(state.with_mood(mood));
         }
     }
 }

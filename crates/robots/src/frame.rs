@@ -2,21 +2,28 @@
 
 use affect::akr::Appraisal;
 use affect::frame::Value;
-use affect::{AffectFrame, Caution, EmotionLabel, Episode, Feeling, Schemata, StandardEmotion};
+use affect::{AffectFrame, Caution, EmotionLabel, Episode, Schemata};
 use robot::{Action, StateVariables, Variable};
 
-/// The frame of a feeling; `None` for a robot without emotions.
-pub(crate) fn of<'a>(
-    feeling: Option<Feeling<StandardEmotion>>,
+use crate::emotion::SwitchableGenerator;
+
+/// The frame of what a robot shows; `None` for one without emotions.
+pub(crate) fn of<'a, M, B>(
+    emotion: &SwitchableGenerator<M, B>,
     appraisal: Appraisal,
     episode: &'a Episode,
     caution: Caution,
 ) -> Option<AffectFrame<'a>> {
-    let feeling = feeling?;
+    let feeling = emotion.shown()?;
     let name = feeling.emotion.name();
     let frame = Schemata::standard().frame(name, feeling.urgency, appraisal)?;
 
-    Some(frame.during(episode).with_caution(caution))
+    Some(
+        frame
+            .during(episode)
+            .with_caution(caution)
+            .with_mood(emotion.mood()),
+    )
 }
 
 /// The action of a robot with this frame: its emotion, and the state variables of [`publish_variables`].

@@ -16,6 +16,8 @@ pub enum Input {
     ExchangeOver,
     /// The robot gives up what it tried.
     GivesUp,
+    /// The robot believes again that it can achieve its goal.
+    Encouraged,
     /// The refiller sets out on an errand.
     NewErrand,
     /// The refiller is told to hurry.
@@ -37,6 +39,7 @@ impl Input {
             Self::ComesNearer => "comes nearer",
             Self::ExchangeOver => "exchange over",
             Self::GivesUp => "gives up",
+            Self::Encouraged => "encouraged",
             Self::NewErrand => "new errand",
             Self::Hurry => "hurry",
             Self::SentHome => "sent home",
@@ -57,7 +60,9 @@ impl Input {
             Self::ExchangeOver => Some(ProgressEvent::GoalAchieved),
             Self::GivesUp | Self::Hurry => Some(ProgressEvent::Negative(setback)),
             Self::NearerHome => Some(ProgressEvent::Positive(low)),
-            Self::NewErrand | Self::SentHome | Self::Home => Some(ProgressEvent::Positive(high)),
+            Self::Encouraged | Self::NewErrand | Self::SentHome | Self::Home => {
+                Some(ProgressEvent::Positive(high))
+            }
         }
     }
 }

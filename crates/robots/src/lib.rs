@@ -3,7 +3,7 @@
 //!
 //! Each robot is a set of parameters, an appraisal of its measures, a table for its behavior, and a panel. They share how they
 //! move ([`drive`]), what they know of one another ([`peer`]), the random streams ([`chance`]), what counts as progress
-//! ([`input`]), and the emotion that an experiment can switch off.
+//! ([`input`]), what they believe of themselves ([`belief`]), and the emotion that an experiment can switch off.
 //!
 //! An emotion acts at the three levels of `affect::levels`: sensory-motor (Leguin's speed), schematic (the behavior of
 //! both) and conceptual (Butler's plans, off by default). Each level has a switch, and so has the emotion as a whole, for
@@ -13,6 +13,7 @@
 //! **\[D\]** documented in a readable source (the paper, unless another is named), or **\[I\]** inferred or chosen here;
 //! every chosen number is a parameter.
 
+pub mod belief;
 mod bounds;
 pub mod butler;
 pub mod chance;

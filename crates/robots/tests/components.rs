@@ -237,3 +237,53 @@ fn the_causal_chain_has_the_goal_and_whether_it_is_achieved() {
         )
     );
 }
+
+#[test]
+fn a_mood_is_what_was_felt_and_a_bad_one_makes_a_robot_call_sooner() {
+    let first_call_s = |start: f64| {
+        let butler = format!("mood = {{ start = {start:?}, tau_s = 1e9, weight = 0.3 }}");
+        let mut stage = Stage::pair(1, &butler, "");
+        assert!((stage.number("Butler", "mood") - start).abs() < 1e-6);
+        assert!(stage.step_until(120.0, |stage| !stage.commands_of("Butler").is_empty()));
+        stage.tick as f64 * stage::TICK_S
+    };
+    let [bad, none, good] = [-0.8, 0.0, 0.8].map(first_call_s);
+    assert!(bad < none && none < good, "{bad} s, {none} s, {good} s");
+
+    // A mood is the slow mean of what is felt.
+    for seed in 0..4 {
+        let mut stage = deaf(seed);
+        let quick = "mood = { tau_s = 30.0 }";
+        let mut quick = Stage::new(
+            seed,
+            vec![Role::new("Butler", "Butler", feet(25.0, 25.0), quick)],
+        );
+        quick.begin();
+        stage.step_until(120.0, |_| false);
+        quick.step_until(120.0, |_| false);
+        assert!(stage.number("Butler", "mood").abs() < 0.01, "a day is long");
+        assert!(quick.number("Butler", "mood") < -0.5, "nobody comes");
+    }
+}
+
+#[test]
+fn a_mood_outlasts_the_process_of_its_robot() {
+    let mut stage = Stage::new(
+        3,
+        vec![
+            Role::played_by(
+                Box::new(stage::reborn::Butler::lost(40)),
+                "Butler",
+                feet(25.0, 25.0),
+                "mood = { start = -0.5 }",
+            ),
+            Role::new("Leguin", "Leguin", feet(4.0, 4.0), ""),
+        ],
+    );
+    stage.begin();
+    for _ in 0..60 {
+        let before = stage.number("Butler", "mood");
+        stage.step();
+        assert!((stage.number("Butler", "mood") - before).abs() < 1e-4);
+    }
+}

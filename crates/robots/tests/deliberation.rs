@@ -1,5 +1,5 @@
-//! A Butler who deliberates: beliefs, personality and the conceptual level each change what he does, with a refiller who is
-//! walled in.
+//! Robots who deliberate: beliefs, personality and the conceptual level each change what Butler does, with a refiller who is
+//! walled in; and beliefs what Leguin does.
 
 mod stage;
 
@@ -240,4 +240,98 @@ fn deliberation_without_sense_is_refused() {
         let error = robots::Butler::new(parameters).err().unwrap_or_default();
         assert!(error.contains(reason), "{error}");
     }
+}
+
+/// The texts of a robot's belief and of what led to it; empty without one.
+fn belief(stage: &Stage, robot: &str) -> [String; 2] {
+    let variables = &stage.report(robot).state_variables;
+    ["belief", "belief_because"].map(|name| {
+        let text = variables.get(name).and_then(|value| value.as_str());
+        text.unwrap_or_default().to_owned()
+    })
+}
+
+/// Leguin behind a wall, called to a Butler with treats for ever, whose gate is the last of the obstacles.
+fn walled_leguin(leguin: &str) -> Stage {
+    let mut stage = Stage::pair(1, "treat_mean_s = 1e9", leguin);
+    stage.obstacles = (0..12)
+        .flat_map(|i| {
+            let along = 2.0 * f64::from(i) + 1.0;
+            [feet(along, 9.0), feet(9.0, along)]
+        })
+        .collect();
+    stage.command("Leguin", "refill");
+    stage
+}
+
+const DESPAIRING: &str =
+    "block_patience_s = 10.0\ndeliberation = { beliefs = 'on', discouraged_after = 1 }";
+
+#[test]
+fn a_leguin_who_believes_that_she_cannot_is_discouraged_and_does_not_set_out() {
+    let mut stage = walled_leguin(DESPAIRING);
+    assert!(stage.step_until(120.0, |stage| stage.emotion("Leguin") == "DISCOURAGED"));
+    assert_eq!(belief(&stage, "Leguin"), ["cannot", "1 errand given up"]);
+    assert_eq!(
+        stage.report("Leguin").state_variables["agency"].to_string(),
+        "self"
+    );
+    assert!(stage.step_until(60.0, |stage| stage.behavior("Leguin") == "WAIT"));
+
+    // She remembers the call, and waits.
+    stage.command("Leguin", "refill");
+    assert!(!stage.step_until(60.0, |stage| stage.behavior("Leguin") != "WAIT"));
+    assert_eq!(stage.emotion("Leguin"), "DISCOURAGED");
+    assert_eq!(
+        stage.report("Leguin").state_variables["pending"].to_string(),
+        "refill"
+    );
+}
+
+#[test]
+fn a_discouraged_leguin_is_hopeful_and_sets_out_when_the_waiter_is_near() {
+    let mut stage = walled_leguin(DESPAIRING);
+    assert!(stage.step_until(120.0, |stage| stage.emotion("Leguin") == "DISCOURAGED"));
+    assert!(stage.step_until(60.0, |stage| stage.behavior("Leguin") == "WAIT"));
+    stage.command("Leguin", "refill");
+    stage.step();
+
+    // Butler stands next to her now: where he wanted to go is taken.
+    stage.obstacles = vec![stage.report("Butler").proposal];
+    stage.places.insert(stage::name("Butler"), feet(9.0, 4.0));
+    assert!(stage.step_until(3.0, |stage| stage.emotion("Leguin") == "HOPEFUL"));
+    assert_eq!(belief(&stage, "Leguin"), ["can", "Butler is near"]);
+    let progress_by = stage.report("Leguin").state_variables["progress_by"].to_string();
+    assert_eq!(
+        progress_by, "encouraged",
+        "that she can is a positive input"
+    );
+    assert!(stage.step_until(2.0, |stage| stage.behavior("Leguin") == "REFILL"));
+}
+
+#[test]
+fn without_beliefs_leguin_sets_out_again_and_again() {
+    let mut stage = walled_leguin("block_patience_s = 10.0");
+    for _ in 0..3 {
+        assert!(stage.step_until(60.0, |stage| stage.behavior("Leguin") == "GO_HOME"));
+        assert!(stage.step_until(60.0, |stage| stage.behavior("Leguin") == "WAIT"));
+        stage.command("Leguin", "refill");
+        assert!(stage.step_until(2.0, |stage| stage.behavior("Leguin") == "REFILL"));
+    }
+    assert_eq!(belief(&stage, "Leguin"), ["", ""]);
+}
+
+#[test]
+fn a_discouraged_robot_says_why_and_a_later_incarnation_still_knows() {
+    let parameters = "[deliberation]\nbeliefs = \"on\"";
+    let mut stage = walled(0, butler(), parameters);
+    assert!(stage.step_until(600.0, |stage| stage.emotion("Butler") == "DISCOURAGED"));
+    assert_eq!(belief(&stage, "Butler"), ["cannot", "2 chases given up"]);
+
+    let at_tick = stage.tick + 1;
+    let mut stage = walled(0, Box::new(reborn::Butler::lost(at_tick)), parameters);
+    while stage.tick < at_tick {
+        stage.step();
+    }
+    assert_eq!(belief(&stage, "Butler"), ["cannot", "2 chases given up"]);
 }

@@ -4,6 +4,7 @@ pub(super) mod change;
 mod expect;
 pub(super) mod fault;
 mod guests;
+mod mood;
 mod network;
 mod numbers;
 mod place;
@@ -375,30 +376,37 @@ fn robots(
 ) -> Result<BTreeMap<RobotName, RobotSpec>, FileError> {
     let mut robots = BTreeMap::new();
     for entry in raw {
-        let span = Some(entry.span());
+        let span = entry.span();
         let robot = entry.into_inner();
         if robot.name.is_operator() {
             let reason = "the name `operator` is kept for commands from outside the roster";
-            return Err(FileError::at(source, span, reason));
+            return Err(FileError::at(source, Some(span), reason));
         }
 
         let name = robot.name.clone();
-        let spec = spec(robot, source, folder)?;
+        let spec = spec(robot, span.clone(), source, folder)?;
         if robots.insert(name.clone(), spec).is_some() {
             let reason = format!("a second robot called {name}");
-            return Err(FileError::at(source, span, &reason));
+            return Err(FileError::at(source, Some(span), &reason));
         }
     }
     Ok(robots)
 }
 
 /// The specification of a robot. Its own parameters replace those of the file that it names, key by key, also within tables.
-fn spec(robot: RawRobot, source: &Source, folder: Option<&Path>) -> Result<RobotSpec, FileError> {
+fn spec(
+    robot: RawRobot,
+    span: Span<usize>,
+    source: &Source,
+    folder: Option<&Path>,
+) -> Result<RobotSpec, FileError> {
     let mut parameters = toml::Table::new();
     if let Some(file) = &robot.params_from {
         parameters = named_parameters(file, source, folder)?;
     }
     merge(&mut parameters, &robot.params);
+    mood::carry_over(&mut parameters, &robot.name, folder.is_some())
+        .map_err(|reason| FileError::at(source, Some(span), &reason))?;
 
     let class = robot.class;
     Ok(RobotSpec {

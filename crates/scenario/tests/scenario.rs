@@ -843,3 +843,72 @@ fn what_lies_between_two_ticks_is_refused_with_the_reason() {
         "{fault}"
     );
 }
+
+/// A scenario whose robot A begins with the mood of a run.
+fn in_the_mood_of(run: &str) -> Result<Scenario, FileError> {
+    parse(&format!(
+        "[[robot]]\nname = \"A\"\nat = [\"5 m\", \"5 m\"]\nparams = {{ mood = {{ start = 0.1, weight = 0.2, from = {run} }} }}\n"
+    ))
+}
+
+#[test]
+fn a_robot_begins_with_the_mood_in_which_it_ended_another_run() {
+    let run = tempfile::tempdir().unwrap();
+    let path = format!("{:?}", run.path().to_str().unwrap());
+    let summary = run.path().join("summary.json");
+
+    let missing = shown(&in_the_mood_of("\"no such run\"").unwrap_err());
+    assert!(missing.contains("there is no run no such run"), "{missing}");
+    let unfinished = shown(&in_the_mood_of(&path).unwrap_err());
+    assert!(unfinished.contains("it is not over"), "{unfinished}");
+    let number = shown(&in_the_mood_of("3").unwrap_err());
+    assert!(number.contains("in quotation marks"), "{number}");
+
+    for (content, reason) in [
+        ("{", "summary.json"),
+        (
+            r#"{"robots": {"B": {}}}"#,
+            "no robot called A; its robots are B",
+        ),
+        (
+            r#"{"robots": {"A": {"state_variables": {}}}}"#,
+            "A has published no mood",
+        ),
+    ] {
+        std::fs::write(&summary, content).unwrap();
+        let error = shown(&in_the_mood_of(&path).unwrap_err());
+        assert!(error.contains(reason), "{error}");
+    }
+
+    std::fs::write(
+        &summary,
+        r#"{"robots": {"A": {"state_variables": {"mood": -0.25}}}}"#,
+    )
+    .unwrap();
+    let scenario = in_the_mood_of(&path).unwrap();
+    let mood = &scenario.robots.values().next().unwrap().parameters["mood"];
+    assert_eq!(*mood, serde_json::json!({"start": -0.25, "weight": 0.2}));
+    std::fs::remove_file(&summary).unwrap();
+    let text = scenario.to_toml().unwrap();
+    assert!(parse(&text).is_ok(), "the record depends on no other run");
+}
+
+#[test]
+fn neither_a_change_nor_a_scenario_from_outside_names_a_run() {
+    for set in [
+        "robot.A.params.mood.from=\"r\"",
+        "robot.A.params.mood={ from = \"r\" }",
+        "robot.*.params={ mood = { from = \"r\" } }",
+    ] {
+        let text = format!("[[change]]\nat = \"1 s\"\nset = ['{set}']\n{TWO_ROBOTS}");
+        let error = shown(&parse(&text).unwrap_err());
+        assert!(error.contains("from the start on"), "{set}: {error}");
+    }
+
+    let source = Source {
+        name: "loaded".into(),
+        text: "[[robot]]\nname = \"A\"\nat = [\"5 m\", \"5 m\"]\nparams = { mood = { from = \"r\" } }\n".into(),
+    };
+    let error = shown(&Scenario::parse_alone(&source).unwrap_err());
+    assert!(error.contains("of a scenario from outside"), "{error}");
+}

@@ -190,18 +190,38 @@ class DynamicsParameters:
         return self.caution_gain_base + self.caution_gain_slope * caution
 
 
+@dataclass(frozen=True)
+class MoodParameters:
+    """The constants of a mood, the slow mean of what is felt; what each means is in ``configs/robots/leguin.toml``."""
+
+    start: float = 0.0
+    tau_s: float = 86_400.0
+    weight: float = 0.0
+
+    def check(self) -> None:
+        """:raises ValueError: what is wrong with the values, if anything is."""
+        for name, least in (("start", -1.0), ("weight", 0.0)):
+            if not least <= getattr(self, name) <= 1.0:
+                raise ValueError(f"mood.{name} must be from {least:g} to 1, not {getattr(self, name):g}")
+        if not self.tau_s > 0.0:
+            raise ValueError(f"mood.tau_s must be above 0, not {self.tau_s:g}")
+
+
 class DynamicGenerator:
     """An ESG: the urgency follows a pressure, and leads up and down a ladder of emotions. FRUSTRATED is left by positive
-    inputs only, as far as they are important."""
+    inputs only, as far as they are important. A bad mood makes everything more pressing."""
 
     RUNGS = tuple(Emotion)
 
-    def __init__(self, parameters: DynamicsParameters, caution: float) -> None:
+    def __init__(self, parameters: DynamicsParameters, mood: MoodParameters, caution: float) -> None:
         self._parameters = parameters
+        self._mood = mood
         self._gain = parameters.gain(caution)
         self._enter = (0.0, parameters.th_confident, parameters.th_concerned, parameters.th_frustrated)
         self._rung = 0
         self._urgency = self._floor = self._unchanged_s = 0.0
+        self.mood = mood.start
+        """The slow mean of what is felt, -1 to 1."""
         self.progress: tuple[float, bool] | None = None
         """What counted as progress in the last step: its importance with its sign, and whether it was the event."""
 
@@ -210,14 +230,21 @@ class DynamicGenerator:
         """What is felt now."""
         return Feeling(self.RUNGS[self._rung], self._urgency)
 
-    def take_over(self, emotion: Emotion, urgency: float) -> None:
+    def take_over(self, emotion: Emotion, urgency: float, mood: float) -> None:
         """Continues with a feeling of which nothing else is known: a negative one ends by a positive input only."""
+        self.mood = min(max(mood, -1.0), 1.0)
         self._rung = self.RUNGS.index(emotion)
         self._urgency = min(max(urgency, 0.0), 1.0)
         self._floor = max(self._leave_below(self._rung), 0.0) if emotion.is_negative else 0.0
 
     def update(self, pressure: float | None, event: Event | None, dt_s: float) -> None:
-        """One step: progress in, emotion out. Without a pressure the urgency holds."""
+        """One step: progress in, emotion out, and then the mood. Without a pressure the urgency holds."""
+        if pressure is not None:
+            pressure = min(max(pressure - self._mood.weight * self.mood, 0.0), 1.0)
+        self._update_emotion(pressure, event, dt_s)
+        self.mood += (self.feeling.valence - self.mood) * min(dt_s / self._mood.tau_s, 1.0)
+
+    def _update_emotion(self, pressure: float | None, event: Event | None, dt_s: float) -> None:
         self._unchanged_s += dt_s
         if event == "achieved":
             self._urgency = self._floor = 0.0

@@ -25,6 +25,7 @@ from affect import (
     Episode,
     Event,
     Feeling,
+    MoodParameters,
     Prediction,
     RecentShare,
     Row,
@@ -50,6 +51,14 @@ JOKES = (
 
 Switch = Literal["on", "off"]
 Policy = Literal["emotion", "rules", "timer", "neither"]
+
+
+@dataclass(frozen=True)
+class BeliefParameters:
+    """Her beliefs about herself: none in Python. The other value is read and not used."""
+
+    beliefs: Literal["off"] = "off"
+    discouraged_after: int = 2
 
 
 @dataclass(frozen=True)
@@ -98,6 +107,8 @@ class Parameters:
     look_s: float = 2.0
     joke_mean_s: float = 60.0
     recruitment: RecruitmentParameters = field(default_factory=RecruitmentParameters)
+    deliberation: BeliefParameters = field(default_factory=BeliefParameters)
+    mood: MoodParameters = field(default_factory=MoodParameters)
     dynamics: DynamicsParameters = field(default_factory=DynamicsParameters)
 
     POSITIVE = (
@@ -120,6 +131,7 @@ class Parameters:
             onset, full = self.haste_onset, self.haste_full
             raise ValueError(f"haste_onset, {onset:g}, and haste_full, {full:g}, must ascend up to 1")
         self.dynamics.check()
+        self.mood.check()
         if not 0.0 <= self.caution <= 1.0:
             raise ValueError(f"caution must lie in [0, 1], not {self.caution:g}")
 
@@ -260,7 +272,7 @@ class Leguin(CarsRobotInterface):
             self.parameters.check()
         except ValueError as error:
             raise BadParameters(cars.name, str(error)) from None
-        self.esg = DynamicGenerator(self.parameters.dynamics, self.parameters.caution)
+        self.esg = DynamicGenerator(self.parameters.dynamics, self.parameters.mood, self.parameters.caution)
         self.noted = self.shown = ""  # What happened, for the next emotion, and what the present one was shown.
         self.progress: tuple[str, float] | None = None  # The last input that counted.
         self.bsg = BehaviorGenerator(TABLE, WAIT)
@@ -607,6 +619,7 @@ class Leguin(CarsRobotInterface):
             "duration": "minutes",
             "duration_s": episode.lasted_s,
             "caution": self.parameters.caution,
+            "mood": self.esg.mood,
             "action_tendency": TENDENCIES[emotion],
             "facial_expression": EXPRESSIONS[emotion][0],
         }
@@ -625,7 +638,8 @@ class Leguin(CarsRobotInterface):
         urgency = number("urgency")
         for emotion, tendency in TENDENCIES.items():
             if self.parameters.affect == "on" and urgency is not None and tendency == last.get("action_tendency"):
-                self.esg.take_over(emotion, urgency)
+                mood = number("mood")
+                self.esg.take_over(emotion, urgency, self.esg.mood if mood is None else mood)
         known = {behavior.value: behavior for behavior in Behavior}
         self.bsg = BehaviorGenerator(TABLE, known.get(str(last.get("behavior")), HOME))
         cars.log("is back, and takes over where the last one was lost")

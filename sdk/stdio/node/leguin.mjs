@@ -63,6 +63,7 @@ const DYNAMICS = {
   hope_s: 15,
   label_cuts: [0.2, 0.4, 0.6, 0.8],
 };
+const MOOD = { start: 0, tau_s: 86400, weight: 0 };
 const JOKES = [
   "Waiting is easy. I have it in my state table.",
   "I asked the table for a joke. It said the spread was good enough.",
@@ -124,7 +125,7 @@ const BEHAVIORS = [
   [["WAIT", "GO_HOME"], (c) => c.isHappy && c.hasJoke, joke, null],
 ];
 
-let told, parameters, dynamics, her;
+let told, parameters, dynamics, moodiness, her;
 
 function set(changes) {
   Object.assign(her, changes);
@@ -436,6 +437,7 @@ function followEpisode(tickS) {
 const hasAffect = () => parameters.affect === "on";
 const isNegative = () => FEELINGS[her.emotion][0];
 const intensity = () => (isNegative() ? her.urgency : 1 - her.urgency);
+const valence = () => (isNegative() ? -intensity() : intensity());
 
 /** What happened since the last emotion, or else what this tick's measures say. */
 function input() {
@@ -469,11 +471,20 @@ function respond(shown, target, before, gain) {
   return { urgency, counted: behind };
 }
 
-/** Emotion state generator: the urgency follows the pressure and leads up and down the ladder. FRUSTRATED is left by positive inputs
-    only, as far as they are important. */
-function updateEmotion() {
+/** Her emotion, and then her mood, which is the slow mean of what she feels. */
+function feel() {
   const shown = input();
   if (!hasAffect()) return;
+  updateEmotion(shown);
+  her.mood += (valence() - her.mood) * Math.min(told.tick_s / moodiness.tau_s, 1);
+}
+
+/** What the urgency moves toward: a bad mood makes everything more pressing. */
+const target = () => (her.behavior === "EXCHANGE" ? null : Math.min(Math.max(pressure() - moodiness.weight * her.mood, 0), 1));
+
+/** Emotion state generator: the urgency follows the pressure and leads up and down the ladder. FRUSTRATED is left by positive inputs
+    only, as far as they are important. */
+function updateEmotion(shown) {
   her.unchangedS += told.tick_s;
   const rung = rungOf(her.emotion);
   if (shown === "exchange over") {
@@ -482,7 +493,7 @@ function updateEmotion() {
   }
   const before = her.urgency;
   const gain = dynamics.caution_gain_base + dynamics.caution_gain_slope * parameters.caution;
-  const { urgency, counted } = respond(shown, her.behavior === "EXCHANGE" ? null : pressure(), before, gain);
+  const { urgency, counted } = respond(shown, target(), before, gain);
   her.urgency = Math.min(Math.max(urgency, Math.min(before, her.floor), 0), 1);
   her.progress = counted ?? her.progress;
   if (her.unchangedS + 1e-9 < dynamics.dwell_s) return;
@@ -594,7 +605,7 @@ async function finishTick() {
   const [, face, action_tendency] = FEELINGS[her.emotion];
   const { of: _, ...episode } = her.episode;
   const frame = {
-    valence: isNegative() ? -intensity() : intensity(),
+    valence: valence(),
     intensity: intensity(),
     urgency: her.urgency,
     ...her.appraisal,
@@ -603,6 +614,7 @@ async function finishTick() {
     caution: parameters.caution,
     duration: "minutes",
     facial_expression: face,
+    mood: her.mood,
   };
   send({
     type: "done",
@@ -639,13 +651,15 @@ function known(defaults, given) {
 
 /** Back to the initial state; a former incarnation that was lost has published what it knew. */
 async function begin(init) {
-  const { dynamics: given, recruitment, ...others } = init.parameters ?? {};
+  const { dynamics: given, mood, deliberation, recruitment, ...others } = init.parameters ?? {};
   told = init;
   parameters = known(PARAMETERS, others);
   dynamics = known(DYNAMICS, given ?? {});
+  moodiness = known(MOOD, mood ?? {});
   if (parameters.signals !== "off") throw new Error("she sees no signals here: signals is off");
   if (parameters.scripted !== "felt") throw new Error("she has no script here: scripted is felt");
   if ((recruitment?.by ?? "off") !== "off") throw new Error("she is not recruited here: recruitment.by is off");
+  if ((deliberation?.beliefs ?? "off") !== "off") throw new Error("she has no beliefs here: deliberation.beliefs is off");
   const own = Stream.named(init.seed, init.stream);
   her = {
     at: init.location,
@@ -671,6 +685,7 @@ async function begin(init) {
     urgency: 0,
     floor: 0, // What the urgency does not fall below until there is a positive input.
     unchangedS: 0,
+    mood: moodiness.start,
     noted: "", // What happened, for the next emotion.
     progress: null, // The last input that counted: its name, and its importance with its sign.
     measures: { hurried: false, errand: 0, blocked: 0, waiting: 0 },
@@ -710,7 +725,7 @@ async function begin(init) {
   set({ trips: last.trips ?? 0, givenUp: last.given_up ?? 0, behavior: last.behavior ?? "GO_HOME" });
   const felt = Object.entries(FEELINGS).find(([, feeling]) => feeling[2] === last.action_tendency);
   if (hasAffect() && felt && typeof last.urgency === "number") {
-    set({ emotion: felt[0], urgency: last.urgency });
+    set({ emotion: felt[0], urgency: last.urgency, mood: last.mood ?? her.mood });
     her.floor = isNegative() ? Math.max(leaveBelow(rungOf(felt[0])), 0) : 0;
   }
   her.home = { x: last.home_x_m ?? her.home.x, y: last.home_y_m ?? her.home.y };
@@ -728,7 +743,7 @@ async function tick({ location, blocked = false, sensed = [], commands = [] }) {
   await observeWaiter(sensed);
   observeWay();
   measure();
-  updateEmotion();
+  feel();
   appraise();
   followEpisode(told.tick_s);
   updateBehavior();

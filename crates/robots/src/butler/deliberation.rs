@@ -10,16 +10,13 @@ use std::collections::BTreeSet;
 use affect::akr::{ActionTendency, Affect, Personality, Preference, Valence};
 use affect::levels::{ActionOutcome, Candidate, Conceptual, ConceptualParameters, Memory};
 use affect::progress::{need_ratio, time_to_empty_s};
-use affect::{Belief, Caution, Feeling, StandardEmotion, Urgency};
+use affect::{Caution, Feeling, StandardEmotion, Urgency};
 use serde::{Deserialize, Serialize};
 
+use crate::belief::{BeliefParameters, Beliefs};
 use crate::bounds::positive;
 use crate::policy::Urge;
 use crate::switch::Switch;
-
-/// Beliefs, as they are published.
-const CAN: &str = "can";
-const CANNOT: &str = "cannot";
 
 /// What he deliberates about.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -43,12 +40,22 @@ pub struct Deliberation {
 impl Default for Deliberation {
     fn default() -> Self {
         Self {
-            beliefs: Switch::Off,
-            discouraged_after: 2,
+            beliefs: BeliefParameters::default().beliefs,
+            discouraged_after: BeliefParameters::default().discouraged_after,
             conceptual: Switch::Off,
             plan_s: 5.0,
             preferences: Personality::default().preferences,
             level: ConceptualParameters::default(),
+        }
+    }
+}
+
+impl Deliberation {
+    /// Whether he has beliefs about himself, and how soon he despairs.
+    pub(super) fn beliefs(&self) -> BeliefParameters {
+        BeliefParameters {
+            beliefs: self.beliefs,
+            discouraged_after: self.discouraged_after,
         }
     }
 }
@@ -93,11 +100,8 @@ pub(super) struct Prospects {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Mind {
-    belief: Belief,
-    /// INTERCEPTs in a row that came to nothing.
-    abandoned: u32,
-    /// Whether the refiller was near or came nearer in the last tick.
-    was_encouraged: bool,
+    /// What he believes; he gives up INTERCEPTs.
+    pub(super) beliefs: Beliefs,
     plan: Option<ActivePlan>,
     memory: Memory<StandardEmotion, FrustratedPlan>,
 }
@@ -114,38 +118,6 @@ struct ActivePlan {
 }
 
 impl Mind {
-    /// An INTERCEPT came to nothing.
-    pub(super) fn abandon(&mut self) {
-        self.abandoned = self.abandoned.saturating_add(1);
-    }
-
-    /// An exchange took place.
-    pub(super) fn succeed(&mut self) {
-        self.abandoned = 0;
-        if self.belief == Belief::Cannot {
-            self.belief = Belief::Can;
-        }
-    }
-
-    /// What he believes of himself, as it is published; `None` if he has formed no belief.
-    pub(super) fn belief(&self) -> Option<&'static str> {
-        match self.belief {
-            Belief::Unstated => None,
-            Belief::Can => Some(CAN),
-            Belief::Cannot => Some(CANNOT),
-        }
-    }
-
-    /// Continues with the belief that a lost incarnation published. What encourages him must be news to this one, too.
-    pub(super) fn take_over(&mut self, belief: Option<&str>) {
-        self.was_encouraged = true;
-        self.belief = match belief {
-            Some(CAN) => Belief::Can,
-            Some(CANNOT) => Belief::Cannot,
-            _ => Belief::Unstated,
-        };
-    }
-
     /// The plan that he follows, if any.
     pub(super) fn plan(&self) -> Option<FrustratedPlan> {
         self.plan.map(|planned| planned.plan)
@@ -173,9 +145,7 @@ impl Deliberator {
         rho_max: f64,
     ) -> Result<Self, String> {
         positive("deliberation.plan_s", parameters.plan_s)?;
-        if parameters.discouraged_after == 0 {
-            return Err("deliberation.discouraged_after must be at least 1".to_owned());
-        }
+        parameters.beliefs().check()?;
 
         let personality = Personality {
             caution,
@@ -190,29 +160,6 @@ impl Deliberator {
             gain,
             rho_max,
         })
-    }
-
-    /// Updates what he believes. `is_encouraging`: whether the refiller is near or comes nearer.
-    ///
-    /// Only a change encourages him: one whom he could not reach although she was near does not.
-    pub(super) fn believe(&self, mind: &mut Mind, is_encouraging: bool) -> Option<Belief> {
-        if !self.parameters.beliefs.is_on() {
-            return None;
-        }
-
-        let is_news = is_encouraging && !mind.was_encouraged;
-        mind.was_encouraged = is_encouraging;
-
-        if mind.belief == Belief::Cannot {
-            if is_news {
-                mind.belief = Belief::Can;
-                mind.abandoned = 0;
-            }
-        } else if mind.abandoned >= self.parameters.discouraged_after {
-            mind.belief = Belief::Cannot;
-        }
-
-        Some(mind.belief)
     }
 
     /// Whether he plans at all.
@@ -243,14 +190,14 @@ impl Deliberator {
                 .remember(planned.emotion, &planned.plan, feeling.affect());
         }
         if is_frustrated {
-            mind.plan = self.choose(&mind.memory, mind.abandoned, feeling, prospects);
+            mind.plan = self.choose(&mind.memory, mind.beliefs.given_up(), feeling, prospects);
         }
     }
 
     fn choose(
         &self,
         memory: &Memory<StandardEmotion, FrustratedPlan>,
-        abandoned: u32,
+        given_up: u32,
         feeling: Feeling<StandardEmotion>,
         prospects: &Prospects,
     ) -> Option<ActivePlan> {
@@ -259,7 +206,7 @@ impl Deliberator {
             // Guests take no treats meanwhile. The more often he tried in vain, the less he expects of it.
             let met = self.anticipated(prospects.treats, intercept_s, prospects);
             let in_vain = feeling.affect();
-            let probability = 1.0 / (1.0 + f64::from(abandoned));
+            let probability = 1.0 / (1.0 + f64::from(given_up));
             let outcomes = vec![
                 self.outcome(probability, met),
                 self.outcome(1.0 - probability, in_vain),

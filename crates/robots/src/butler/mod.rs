@@ -24,6 +24,7 @@ pub use deliberation::Deliberation;
 pub use parameters::{Approach, ButlerParameters, Rate};
 pub use tables::{ButlerAct, ButlerBehavior, ButlerContext, ButlerMeasures, TABLE, appraise};
 
+use crate::belief::Encouragement;
 use crate::closing::Closing;
 use crate::commands::{GO_HOME, HURRY, REFILL, shortened};
 use crate::drive::StraightDrive;
@@ -120,8 +121,8 @@ impl CarsRobotInterface for Butler {
         let has_treats = state.treats > 0;
         state.checks.count(served, missed, has_treats, tick_s);
         self.observe_refiller(cars);
-        self.measure(cars);
         self.believe(cars);
+        self.measure(cars);
     }
 
     fn update_emotion_state(&mut self, cars: &mut Cars<'_>) {
@@ -250,6 +251,7 @@ impl Butler {
 
         let state = ButlerMemory::new(&parameters).map_err(|error| error.to_string())?;
         let dynamics = Dynamics::standard(&parameters.dynamics, parameters.caution)
+            .and_then(|dynamics| dynamics.with_mood(parameters.mood))
             .map_err(|error| error.to_string())?;
         let deliberator = Deliberator::new(
             parameters.deliberation.clone(),
@@ -279,9 +281,8 @@ impl Butler {
     #[must_use]
     pub fn frame(&self) -> Option<AffectFrame<'_>> {
         let state = &self.state;
-        let feeling = self.emotion.shown();
         frame::of(
-            feeling,
+            &self.emotion,
             state.appraisal,
             &state.checks.episode,
             self.parameters.caution,
@@ -447,7 +448,11 @@ impl Butler {
             need_ratio: need_ratio(time_to_refill_s, time_to_empty_s, rate_per_s),
             exchange_is_over,
             event,
-            belief: None,
+            belief: self
+                .state
+                .mind
+                .beliefs
+                .stated(self.parameters.deliberation.beliefs()),
         };
     }
 
@@ -455,14 +460,21 @@ impl Butler {
     /// more than his own pace.
     fn believe(&mut self, cars: &Cars<'_>) {
         let state = &mut self.state;
-        let is_near = state
-            .refiller
-            .is_within(cars.welcome().sensing_range_m, cars);
+        let sensing_range_m = cars.welcome().sensing_range_m;
         let comes_nearer =
             state.refiller_left && state.approach.speed_mps() > self.parameters.v_serve_mps;
+        let encouragement = if state.refiller.is_within(sensing_range_m, cars) {
+            Some(Encouragement::IsNear)
+        } else {
+            comes_nearer.then_some(Encouragement::Comes)
+        };
 
-        let is_encouraging = is_near || comes_nearer;
-        state.measures.belief = self.deliberator.believe(&mut state.mind, is_encouraging);
+        let parameters = self.parameters.deliberation.beliefs();
+        let refiller = state.refiller.name();
+        let beliefs = &mut state.mind.beliefs;
+        if beliefs.update(parameters, "chase", refiller, encouragement) {
+            state.inputs.note(Input::Encouraged);
+        }
     }
 
     /// What he plans while he is FRUSTRATED.
@@ -690,7 +702,7 @@ impl Butler {
             ButlerAct::GiveUp => {
                 state.gave_up = state.gave_up.saturating_add(1);
                 state.rest_s = self.parameters.intercept_again_s;
-                state.mind.abandon();
+                state.mind.beliefs.give_up();
                 state.inputs.note(Input::GivesUp);
             }
             ButlerAct::Joke => {

@@ -1,7 +1,7 @@
 //! Butler's parameters, in SI units. A parameter file may have text with a unit: `"4 ft"`.
 
 use affect::progress::{ApproachParameters, RateParameters};
-use affect::{Caution, DynamicsParameters};
+use affect::{Caution, DynamicsParameters, MoodParameters};
 use serde::{Deserialize, Serialize};
 
 use super::deliberation::Deliberation;
@@ -107,6 +107,8 @@ pub struct ButlerParameters {
     pub approach: Approach,
     /// What he deliberates about: beliefs and plans. Default nothing.
     pub deliberation: Deliberation,
+    /// His mood.
+    pub mood: MoodParameters,
     /// Constants of his emotions.
     pub dynamics: DynamicsParameters,
 }
@@ -193,6 +195,7 @@ impl Default for ButlerParameters {
             rate: Rate::default(),
             approach: Approach::default(),
             deliberation: Deliberation::default(),
+            mood: MoodParameters::default(),
             dynamics: DynamicsParameters::default(),
         }
     }

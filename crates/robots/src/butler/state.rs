@@ -16,11 +16,11 @@ use crate::chance::Chance;
 use crate::checks;
 use crate::closing::Closing;
 use crate::drive::Drive;
-use crate::input::Inputs;
+use crate::input::{Input, Inputs};
 use crate::jokes::Jokes;
 use crate::panel::SPARKLINE_LEN;
 use crate::peer::Peer;
-use crate::published::{count, flag, location, number, saturated, text};
+use crate::published::{count, flag, location, number, saturated};
 use crate::recruitment::Recruitment;
 use crate::recruitment::recruiter::Recruiter;
 
@@ -202,7 +202,9 @@ impl ButlerMemory {
         self.treats = capacity;
         self.exchanges += 1;
         self.need = false;
-        self.mind.succeed();
+        if self.mind.beliefs.succeed() {
+            self.inputs.note(Input::Encouraged);
+        }
         self.rest_s = 0.0;
         self.forget_calls();
         self.approach.expect_again();
@@ -247,9 +249,7 @@ impl ButlerMemory {
             variables.insert("table_y_m", table.y.into());
         }
         self.inputs.publish(&mut variables);
-        if let Some(belief) = self.mind.belief() {
-            variables.insert("belief", belief.into());
-        }
+        self.mind.beliefs.publish(&mut variables);
         if let Some(plan) = self.mind.plan() {
             variables.insert("plan", plan.name().into());
         }
@@ -275,6 +275,6 @@ impl ButlerMemory {
 
         self.start = location(last, "start_x_m", "start_y_m").unwrap_or(self.start);
         self.table = location(last, "table_x_m", "table_y_m");
-        self.mind.take_over(text(last, "belief"));
+        self.mind.beliefs.take_over(last);
     }
 }

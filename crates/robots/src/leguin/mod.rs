@@ -22,6 +22,7 @@ pub use tables::{
     Errand, LeguinAct, LeguinBehavior, LeguinContext, LeguinMeasures, TABLE, appraise, urgency,
 };
 
+use crate::belief::Encouragement;
 use crate::closing::Closing;
 use crate::commands::{GO_HOME, HURRY, REFILL, shortened};
 use crate::drive::StraightDrive;
@@ -121,6 +122,7 @@ impl CarsRobotInterface for Leguin {
         self.observe_waiter(cars);
         self.heed_signals();
         self.observe_way(tick_s);
+        self.believe(cars);
         self.measure(behavior);
     }
 
@@ -230,6 +232,7 @@ impl Leguin {
     pub fn new(parameters: LeguinParameters) -> Result<Self, String> {
         parameters.check()?;
         let dynamics = Dynamics::standard(&parameters.dynamics, parameters.caution)
+            .and_then(|dynamics| dynamics.with_mood(parameters.mood))
             .map_err(|error| error.to_string())?;
         let esg = DynamicGenerator::new(dynamics, appraise);
 
@@ -262,9 +265,8 @@ impl Leguin {
     #[must_use]
     pub fn frame(&self) -> Option<AffectFrame<'_>> {
         let state = &self.state;
-        let feeling = self.emotion.shown();
         frame::of(
-            feeling,
+            &self.emotion,
             state.appraisal,
             &state.checks.episode,
             self.parameters.caution,
@@ -298,6 +300,25 @@ impl Leguin {
         Ok(())
     }
 
+    /// What she believes of herself: the waiter within sensing range encourages her, and so does one who comes to meet her.
+    fn believe(&mut self, cars: &Cars<'_>) {
+        let state = &mut self.state;
+        let sensing_range_m = cars.welcome().sensing_range_m;
+        let comes = state.waiter.behavior(self.parameters.query_stale_s) == Some("INTERCEPT");
+        let encouragement = if state.waiter.is_within(sensing_range_m, cars) {
+            Some(Encouragement::IsNear)
+        } else {
+            comes.then_some(Encouragement::Comes)
+        };
+
+        let parameters = self.parameters.deliberation;
+        let waiter = state.waiter.name();
+        let beliefs = &mut state.beliefs;
+        if beliefs.update(parameters, "errand", waiter, encouragement) {
+            state.inputs.note(Input::Encouraged);
+        }
+    }
+
     fn measure(&mut self, behavior: LeguinBehavior) {
         let parameters = &self.parameters;
         let gain = parameters.gain();
@@ -328,6 +349,7 @@ impl Leguin {
             blocked,
             waiting: self.state.waiting_s * gain / parameters.await_patience_s,
             event,
+            belief: self.state.beliefs.stated(parameters.deliberation),
             th_concerned: parameters.dynamics.th_concerned,
         };
     }
@@ -415,12 +437,19 @@ impl Leguin {
             gives_up: self.gives_up(),
             is_happy: parameters.schematic.is_on() && self.emotion.is_happy(),
             pending: state.pending,
+            despairs: self.despairs(),
             waiter_is_needy_here: self.is_needed() && waiter_is_here,
             exchange_is_over: self.bsg.has_lasted(parameters.exchange_s),
             sent_home: state.sent_home,
             is_home: self.is_home(),
             has_joke: state.jokes.are_due(),
         }
+    }
+
+    /// Whether she does not set out any more: DISCOURAGED, she is not inclined to do anything \[I\].
+    fn despairs(&self) -> bool {
+        self.parameters.policy() == Policy::Emotion
+            && self.feeling().emotion == StandardEmotion::Discouraged
     }
 
     /// Whether she turns back, by her policy. Not before she has set out: what frustrated her before is over.
@@ -456,6 +485,9 @@ impl Leguin {
                 state.inputs.note(Input::Hurry);
             }
             LeguinAct::FinishErrand => {
+                if state.beliefs.succeed() {
+                    state.inputs.note(Input::Encouraged);
+                }
                 state.checks.complete_errand();
                 state.hurried = false;
                 state.pending = None;
@@ -469,6 +501,7 @@ impl Leguin {
             LeguinAct::ComeHome => state.inputs.note(Input::Home),
             LeguinAct::GiveUp => {
                 state.checks.end_errand();
+                state.beliefs.give_up();
                 state.given_up += 1;
                 state.hurried = false;
                 state.way = Closing::default();

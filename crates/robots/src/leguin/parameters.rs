@@ -1,8 +1,9 @@
 //! Leguin's parameters, in SI units. A parameter file may have text with a unit: `"4 ft"`.
 
-use affect::{Caution, DynamicsParameters};
+use affect::{Caution, DynamicsParameters, MoodParameters};
 use serde::{Deserialize, Serialize};
 
+use crate::belief::BeliefParameters;
 use crate::bounds::{not_negative, positive};
 use crate::drive::LOOK_S;
 use crate::policy::Policy;
@@ -87,6 +88,10 @@ pub struct LeguinParameters {
     pub joke_mean_s: f64,
     /// How she answers a waiter who calls for help.
     pub recruitment: HelperParameters,
+    /// Her beliefs about herself.
+    pub deliberation: BeliefParameters,
+    /// Her mood.
+    pub mood: MoodParameters,
     /// Constants of her emotions.
     pub dynamics: DynamicsParameters,
 }
@@ -125,6 +130,8 @@ impl Default for LeguinParameters {
             look_s: LOOK_S,
             joke_mean_s: 60.0,
             recruitment: HelperParameters::default(),
+            deliberation: BeliefParameters::default(),
+            mood: MoodParameters::default(),
             dynamics: DynamicsParameters::default(),
         }
     }
@@ -165,6 +172,7 @@ impl LeguinParameters {
         not_negative("hurry_pressure", self.hurry_pressure)?;
         self.script.check()?;
         self.recruitment.check()?;
+        self.deliberation.check()?;
         not_negative("arrive_m", self.arrive_m)?;
         not_negative("settle_s", self.settle_s)?;
         not_negative("settle_m", self.settle_m)?;

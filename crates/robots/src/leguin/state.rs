@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::checks::LeguinChecks;
 use super::parameters::LeguinParameters;
 use super::tables::{Errand, LeguinBehavior, LeguinMeasures};
+use crate::belief::Beliefs;
 use crate::chance::Chance;
 use crate::checks;
 use crate::closing::Closing;
@@ -37,6 +38,8 @@ pub(super) struct LeguinMemory {
     /// Whether she made progress on it in this tick.
     pub(super) comes_nearer: bool,
     pub(super) inputs: Inputs,
+    /// What she believes; she gives up errands.
+    pub(super) beliefs: Beliefs,
     /// Time for which she has waited to be sent home.
     pub(super) waiting_s: f64,
     pub(super) trips: u32,
@@ -69,6 +72,7 @@ impl LeguinMemory {
             way: Closing::default(),
             comes_nearer: false,
             inputs: Inputs::default(),
+            beliefs: Beliefs::default(),
             waiting_s: 0.0,
             trips: 0,
             given_up: 0,
@@ -133,6 +137,7 @@ impl LeguinMemory {
         ]
         .into();
         self.inputs.publish(&mut variables);
+        self.beliefs.publish(&mut variables);
 
         variables
     }
@@ -147,6 +152,7 @@ impl LeguinMemory {
         };
         self.trips = count(last, "trips");
         self.given_up = count(last, "given_up");
+        self.beliefs.take_over(last);
         self.home = location(last, "home_x_m", "home_y_m").unwrap_or(self.home);
     }
 }

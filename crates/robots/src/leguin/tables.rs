@@ -7,7 +7,7 @@ use affect::behavior::{
     Row,
     Then::{Go, Stay},
 };
-use affect::{ProgressEvent, StepInput, Stimulus, Urgency};
+use affect::{Belief, ProgressEvent, StepInput, Stimulus, Urgency};
 use serde::{Deserialize, Serialize};
 
 /// Leguin's behaviors.
@@ -69,6 +69,8 @@ pub struct LeguinMeasures {
     pub waiting: f64,
     /// What else happened: the input of her emotion besides the pressure.
     pub event: Option<ProgressEvent>,
+    /// What she believes of herself, if she has beliefs.
+    pub belief: Option<Belief>,
     /// The share at which she is CONCERNED about the way.
     pub th_concerned: f64,
 }
@@ -91,7 +93,11 @@ pub fn appraise(measures: &LeguinMeasures, behavior: &LeguinBehavior) -> Stimulu
         _ => StepInput::Pressure(urgency(measures, behavior)),
     };
 
-    Stimulus::new(drive).with_event(measures.event)
+    Stimulus {
+        event: measures.event,
+        belief: measures.belief,
+        ..Stimulus::new(drive)
+    }
 }
 
 /// What a row of the behavior table makes Leguin do.
@@ -122,6 +128,8 @@ pub struct LeguinContext {
     pub is_happy: bool,
     /// What she was commanded to do and has not begun.
     pub pending: Option<Errand>,
+    /// Whether she believes that she cannot do it.
+    pub despairs: bool,
     /// Whether the waiter needs her, as far as is known, and is within the exchange radius.
     pub waiter_is_needy_here: bool,
     /// Whether an exchange has lasted as long as it takes.
@@ -138,7 +146,7 @@ pub struct LeguinContext {
 #[rustfmt::skip]
 pub const TABLE: &[Row<LeguinBehavior, LeguinContext, LeguinAct>] = &[
     Row { from: &[Wait, Refill], when: |c| c.waiter_is_needy_here, act: &[LeguinAct::FinishErrand], then: Go(Exchange) },
-    Row { from: &[Wait], when: |c| c.pending.is_some(), act: &[LeguinAct::TakeErrand], then: Go(Refill) },
+    Row { from: &[Wait], when: |c| c.pending.is_some() && !c.despairs, act: &[LeguinAct::TakeErrand], then: Go(Refill) },
     Row { from: &[Refill], when: |c| c.pending == Some(Errand::Hurry), act: &[LeguinAct::Hurry], then: Stay },
     Row { from: &[Exchange], when: |c| c.exchange_is_over, act: &[], then: Go(AwaitGoHome) },
     Row { from: &[AwaitGoHome], when: |c| c.sent_home, act: &[LeguinAct::TurnHome], then: Go(GoHome) },

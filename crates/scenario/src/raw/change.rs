@@ -13,6 +13,7 @@ use super::super::change::{Change, Parent};
 use super::super::checked;
 use super::super::fault::Fault;
 use super::super::network::ticks;
+use super::mood;
 use super::times::Times;
 use super::unplaced::unplaced;
 
@@ -99,6 +100,12 @@ fn parse(text: &Spanned<String>, source: &Source) -> Result<Override, FileError>
         .map_err(|reason: String| FileError::at(source, Some(text.span()), &reason))?;
     if NOT_CHANGED.contains(&change.top()) {
         let reason = "a change of a change is a further [[change]]";
+        return Err(FileError::at(source, Some(text.span()), reason));
+    }
+    if change.sets(&mood::FROM) {
+        // The record keeps changes as they are, and depends on no other run.
+        let reason =
+            "a robot has the mood of another run from the start on: set mood.from in the scenario";
         return Err(FileError::at(source, Some(text.span()), reason));
     }
     Ok(change)

@@ -1,0 +1,82 @@
+//! `mood.from` of a robot's parameters: the run with whose last mood the robot begins. A mood outlasts a run.
+
+use std::path::{Path, PathBuf};
+
+use config::Source;
+use protocol::RobotName;
+use toml::{Table, Value};
+
+use crate::files::SUMMARY;
+
+/// Where a robot names a run.
+pub(super) const FROM: [&str; 3] = ["params", "mood", "from"];
+/// The state variable and the parameter with a robot's mood, and the key that takes the mood of the run.
+const MOOD: &str = "mood";
+const START: &str = "start";
+/// Where run folders are made.
+const RUNS: &str = "runs";
+
+/// Puts the mood that the robot had at the end of the run that its parameters name in the place of the name. So a record has a
+/// number, and depends on no other one. `reads_files` is false for a scenario from outside.
+///
+/// # Errors
+/// There is no such run, it is not over, or the robot has no mood in it.
+pub(super) fn carry_over(
+    parameters: &mut Table,
+    robot: &RobotName,
+    reads_files: bool,
+) -> Result<(), String> {
+    let Some(mood) = parameters.get_mut(MOOD).and_then(Value::as_table_mut) else {
+        return Ok(());
+    };
+    let run = match mood.remove(FROM[2]) {
+        None => return Ok(()),
+        Some(_) if !reads_files => {
+            return Err(
+                "mood.from of a scenario from outside names no run; write its number as mood.start"
+                    .to_owned(),
+            );
+        }
+        Some(Value::String(run)) => run,
+        Some(_) => return Err("mood.from is the name of a run, in quotation marks".to_owned()),
+    };
+
+    let last = last_mood(&run, robot)?;
+    mood.insert(START.to_owned(), Value::Float(last));
+    Ok(())
+}
+
+/// The mood that the robot published last in a run.
+fn last_mood(run: &str, robot: &RobotName) -> Result<f64, String> {
+    let candidates: [PathBuf; 2] = [Path::new(RUNS).join(run), PathBuf::from(run)];
+    let Some(folder) = candidates.into_iter().find(|path| path.is_dir()) else {
+        return Err(format!(
+            "mood.from: there is no run {run}, neither in {RUNS} nor as a folder"
+        ));
+    };
+
+    let file = folder.join(SUMMARY);
+    if !file.is_file() {
+        return Err(format!(
+            "mood.from: the run {run} has no {SUMMARY}: it is not over"
+        ));
+    }
+    let source = Source::read(&file).map_err(|error| format!("mood.from: {error}"))?;
+    let summary: serde_json::Value = serde_json::from_str(&source.text)
+        .map_err(|error| format!("mood.from: {}: {error}", file.display()))?;
+
+    let robots = summary["robots"].as_object();
+    let Some(state) = robots.and_then(|robots| robots.get(robot.as_str())) else {
+        let names: Vec<&str> = robots
+            .into_iter()
+            .flat_map(|robots| robots.keys().map(String::as_str))
+            .collect();
+        return Err(format!(
+            "mood.from: the run {run} has no robot called {robot}; its robots are {}",
+            names.join(", ")
+        ));
+    };
+    state["state_variables"][MOOD]
+        .as_f64()
+        .ok_or_else(|| format!("mood.from: {robot} has published no mood in the run {run}"))
+}
