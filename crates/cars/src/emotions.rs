@@ -4,7 +4,7 @@ use std::error::Error;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use affect::frame::{CAUSAL_CHAIN, MEANINGS, VALENCE, word};
+use affect::frame::{CAUSAL_CHAIN, MEANINGS, MOOD, VALENCE, word};
 use affect::{CausalChain, IntensityLabel, Node, Schemata};
 use clap::Args;
 use config::Changes;
@@ -243,6 +243,9 @@ fn felt(run: &RunName, tick: Tick, tick_s: f64, robot: &RobotName, report: &Repo
     };
 
     text += &place(emotion, valence);
+    if let Some(mood) = variables.get(MOOD).and_then(Variable::as_f64) {
+        text += &place_of_mood(mood);
+    }
     text.push('\n');
     text += &components(variables);
     text.push('\n');
@@ -273,6 +276,23 @@ fn place(emotion: &str, valence: f64) -> String {
     for name in names {
         let mark = if name == emotion { "> " } else { "  " };
         text += &format!("{mark}{}{name}\n", "  ".repeat(depth));
+    }
+    text
+}
+
+/// The node of a mood in the tree, with a mark, below the one of its valence; empty for a mood of 0, which is neither.
+fn place_of_mood(mood: f64) -> String {
+    let name = match mood {
+        _ if mood < 0.0 => "negative mood",
+        _ if mood > 0.0 => "positive mood",
+        _ => return String::new(),
+    };
+    let path = Schemata::standard().path(name);
+
+    let mut text = String::new();
+    for (depth, node) in path.iter().enumerate().skip(1) {
+        let mark = if node.name == name { "> " } else { "  " };
+        text += &format!("{mark}{}{}\n", "  ".repeat(depth), node.name);
     }
     text
 }

@@ -129,8 +129,8 @@ function wordFor(value, scale) {
 }
 
 /**
- * The place of an emotion in the tree of affective states (the paper's Figure 1), from the root down; `others` are the emotions
- * of the same kind that the robot has had.
+ * The place of an emotion and of the mood in the tree of affective states (the paper's Figure 1), from the root down; `others` are
+ * the emotions of the same kind that the robot has had.
  * @param {RobotFrame} robot
  * @param {Map<string, number>} had each emotion with its valence
  * @returns {{depth: number, text: string, isHere: boolean}[]}
@@ -140,17 +140,18 @@ export function placeOf({ emotion_state, state_variables }, had) {
   if (typeof valence !== "number") return [];
 
   const kind = valence < 0 ? "negative" : "positive";
-  const isMood = typeof mood === "number" && mood !== 0 && mood < 0 === valence < 0;
+  const moodKind = typeof mood !== "number" || mood === 0 ? "" : mood < 0 ? "negative" : "positive";
   const others = [...had].filter(([name, other]) => other < 0 === valence < 0 && name !== emotion_state);
   const node = (/** @type {number} */ depth, /** @type {string} */ text, isHere = false) => ({ depth, text, isHere });
 
   return [
     node(0, "personality"),
     node(1, `${kind} affect`),
-    node(2, `${kind} mood`, isMood),
+    node(2, `${kind} mood`, kind === moodKind),
     node(2, `${kind} emotion`),
     node(3, emotion_state, true),
     ...others.map(([name]) => node(3, name)),
+    ...(moodKind && kind !== moodKind ? [node(1, `${moodKind} affect`), node(2, `${moodKind} mood`, true)] : []),
   ];
 }
 

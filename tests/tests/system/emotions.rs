@@ -48,7 +48,13 @@ fn a_moment_of_a_run_has_its_place_in_the_tree_and_all_components() {
         1,
         "{felt}"
     );
+    // He has been HAPPY for most of the time.
+    assert!(
+        felt.lines().any(|line| line == ">   positive mood"),
+        "{felt}"
+    );
     for name in [
+        "mood",
         "valence",
         "intensity",
         "duration",
@@ -110,4 +116,57 @@ fn what_is_unknown_is_refused_with_what_there_is() {
         let text = words.join(" ").replace("│ ", "");
         assert!(text.contains(expected), "{text}");
     }
+}
+
+/// A robot's mood at the end of a run, and the one with which its record says that it began.
+fn moods(lab: &Lab, run: &str, robot: &str) -> [f64; 2] {
+    let folder = lab.out().join(run);
+    let summary = std::fs::read_to_string(folder.join("summary.json")).unwrap();
+    let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
+    let scenario = std::fs::read_to_string(folder.join("scenario.toml")).unwrap();
+    let scenario: toml::Value = toml::from_str(&scenario).unwrap();
+    let robots = scenario["robot"].as_array().unwrap();
+    let spec = robots
+        .iter()
+        .find(|spec| spec["name"].as_str() == Some(robot));
+    let start = spec.and_then(|spec| spec["params"]["mood"].get("start"));
+
+    [
+        summary["robots"][robot]["state_variables"]["mood"]
+            .as_f64()
+            .unwrap(),
+        start.and_then(toml::Value::as_float).unwrap_or(0.0),
+    ]
+}
+
+#[test]
+fn a_mood_is_carried_over_to_the_next_run_which_depends_on_no_other_record() {
+    let lab = Lab::new();
+    let museum = [
+        "run",
+        "configs/museum.toml",
+        "-q",
+        "--set",
+        "expect=[]",
+        "--run",
+    ];
+    lab.ok(&[&museum[..], &["morning"]].concat());
+    let from = format!("robot.*.params.mood.from={:?}", lab.out().join("morning"));
+    lab.ok(&[&museum[..], &["noon", "--set", &from]].concat());
+
+    for robot in ["Butler", "Leguin"] {
+        let [morning, start] = moods(&lab, "morning", robot);
+        assert_eq!(start, 0.0);
+        let [noon, start] = moods(&lab, "noon", robot);
+        assert_eq!(start, morning, "{robot}");
+        assert!(
+            noon > morning && morning > 0.0,
+            "{robot}: {morning}, {noon}"
+        );
+    }
+
+    std::fs::remove_dir_all(lab.out().join("morning")).unwrap();
+    lab.ok(&["verify", "noon"]);
+    let (_, text) = lab.fails(&[&museum[..], &["night", "--set", &from]].concat());
+    assert!(text.contains("there is no run"), "{text}");
 }
