@@ -60,12 +60,11 @@ pub(super) fn play<N: Default>(
 }
 
 /// Does something for every seed, on all processors, and returns what came of it in the order of the seeds.
-pub(super) fn for_each_seed<T: Send>(one: impl Fn(u64) -> T + Sync) -> Vec<T> {
+fn for_each_seed<T: Send>(seeds: u64, one: impl Fn(u64) -> T + Sync) -> Vec<T> {
     let next = AtomicU64::new(1);
     let work = || {
-        let seeds = std::iter::from_fn(|| Some(next.fetch_add(1, Ordering::Relaxed)));
-        seeds
-            .take_while(|seed| *seed <= SEEDS)
+        std::iter::from_fn(|| Some(next.fetch_add(1, Ordering::Relaxed)))
+            .take_while(|seed| *seed <= seeds)
             .map(|seed| (seed, one(seed)))
             .collect::<Vec<_>>()
     };
@@ -91,7 +90,17 @@ pub(super) fn watch<N: Default + Send>(
     set: &[&str],
     look: impl Fn(&mut N, &Change<'_>) + Sync,
 ) -> Vec<N> {
-    for_each_seed(|seed| play(file, seed, set, &look).0)
+    watch_seeds(SEEDS, file, set, look)
+}
+
+/// Plays a scenario with seeds 1 to `seeds`; returns the notes that `look` made of each.
+pub(super) fn watch_seeds<N: Default + Send>(
+    seeds: u64,
+    file: &str,
+    set: &[&str],
+    look: impl Fn(&mut N, &Change<'_>) + Sync,
+) -> Vec<N> {
+    for_each_seed(seeds, |seed| play(file, seed, set, &look).0)
 }
 
 fn sent(events: &[Event], what: &str) -> usize {
@@ -436,40 +445,58 @@ fn t14_vonda_comes_in_leguins_place_when_butlers_parameter_names_her() {
     assert!(vonda_worked && hall.number("Butler", "exchanges") > 3.0);
 }
 
-/// Item 26.
+/// How far Leguin is from her place to Butler, 0 to 1.
+fn part_of_the_way(hall: &Hall) -> f64 {
+    let robots = &hall.simulation.scenario().robots;
+    let leguin = robots.iter().find(|(name, _)| name.as_str() == "Leguin");
+    let from_m = hall.at("Leguin").distance_m(leguin.unwrap().1.at);
+    let to_m = hall.at("Leguin").distance_m(hall.at("Butler"));
+
+    from_m / (from_m + to_m)
+}
+
+/// Item 26. The figure shows a state of both robots at one of its moments: with seven treats left.
 #[test]
 fn t15_the_state_of_figure_6_is_reached() {
-    type Found = Vec<(u64, u64, f64)>;
+    /// Tick, treats left and part of the way, of each tick in the state.
+    type Found = Vec<(u64, f64, f64)>;
+
     let notes = watch(HALL, &[], |found: &mut Found, change| {
         let hall = change.hall;
-        let is_concerned = ["Butler", "Leguin"]
+        let are_concerned = ["Butler", "Leguin"]
             .iter()
             .all(|robot| hall.emotion(robot) == "CONCERNED");
-        let works = (change.butler.1, change.leguin.1) == ("SERVE", "REFILL");
-        if !(is_concerned && works && hall.number("Butler", "treats") == 7.0) {
-            return;
-        }
-        let table = hall
-            .simulation
-            .scenario()
-            .robots
-            .iter()
-            .find(|(name, _)| name.as_str() == "Leguin");
-        let from_m = hall.at("Leguin").distance_m(table.unwrap().1.at);
-        let to_m = hall.at("Leguin").distance_m(hall.at("Butler"));
-        let part = from_m / (from_m + to_m);
-        if (0.35..=0.65).contains(&part) {
-            found.push((change.seed, hall.simulation.tick(), part));
+        let work = (change.butler.1, change.leguin.1) == ("SERVE", "REFILL");
+        let part = part_of_the_way(hall);
+        let is_halfway = (0.35..=0.65).contains(&part);
+        if are_concerned && work && hall.flag("Leguin", "hurried") && is_halfway {
+            let treats = hall.number("Butler", "treats");
+            found.push((hall.simulation.tick(), treats, part));
         }
     });
-    let seeds = notes.iter().filter(|found| !found.is_empty()).count();
-    println!("Figure 6 in {seeds} of {SEEDS} seeds, first at (seed, tick, part of the way):");
+    let reached = |least: f64, most: f64| {
+        let is_reached = |found: &&Found| {
+            found
+                .iter()
+                .any(|(_, treats, _)| (least..=most).contains(treats))
+        };
+        notes.iter().filter(is_reached).count()
+    };
 
-    for (seed, tick, part) in notes.iter().filter_map(|found| found.first()) {
-        println!("  {seed}, {tick}, {part:.2}");
+    for (least, most) in [(0.0, 30.0), (0.0, 10.0), (6.0, 8.0)] {
+        let seeds = reached(least, most);
+        println!("Figure 6 with {least} to {most} treats: in {seeds} of {SEEDS} seeds");
+    }
+    let snapshots = reached(7.0, 7.0);
+    println!("Figure 6 with seven treats: in {snapshots} of {SEEDS} seeds, first at:");
+    for (seed, found) in (1..).zip(&notes) {
+        if let Some((tick, _, part)) = found.iter().find(|(_, treats, _)| *treats == 7.0) {
+            println!("  seed {seed}, tick {tick}, {part:.2} of the way");
+        }
     }
 
-    assert!(seeds > 0);
+    assert_eq!(reached(6.0, 8.0), notes.len());
+    assert!(snapshots >= 20, "{snapshots}");
 }
 
 /// What is left of a team when commands are lost.
@@ -482,7 +509,7 @@ struct Losses {
 fn lossy(loss: f64, arm: &[&str]) -> Losses {
     let loss = format!("network.commands={{ loss = {loss:?} }}");
     let set: Vec<&str> = arm.iter().copied().chain([loss.as_str()]).collect();
-    let runs = for_each_seed(|seed| {
+    let runs = for_each_seed(SEEDS, |seed| {
         let (_, hall) = play(HALL, seed, &set, &|(): &mut (), _| {});
         (
             hall.number("Butler", "exchanges"),
