@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use lab::run::Local;
-use protocol::messages::Point;
+use protocol::messages::{Point, StateVariables};
 use protocol::{RobotName, RunName};
 use robot::LocalHost;
 use scenario::Changes;
@@ -93,17 +93,22 @@ impl Hall {
     /// A state variable of a robot that is a number.
     #[must_use]
     pub fn number(&self, robot: &str, variable: &str) -> f64 {
-        let variables = self.simulation.state_variables(&name(robot));
-        let value = variables.expect("it has reported").get(variable);
+        let value = self.variables(robot).get(variable);
         let number = value.and_then(protocol::messages::Variable::as_f64);
         number.unwrap_or_else(|| panic!("{robot} does not publish a number {variable}"))
+    }
+
+    /// State variables of a robot.
+    #[must_use]
+    pub fn variables(&self, robot: &str) -> &StateVariables {
+        let variables = self.simulation.state_variables(&name(robot));
+        variables.expect("it has reported")
     }
 
     /// Flag among the state variables of a robot.
     #[must_use]
     pub fn flag(&self, robot: &str, variable: &str) -> bool {
-        let variables = self.simulation.state_variables(&name(robot));
-        let value = variables.expect("it has reported").get(variable);
+        let value = self.variables(robot).get(variable);
         let flag = value.and_then(protocol::messages::Variable::as_bool);
         flag.unwrap_or_else(|| panic!("{robot} does not publish a flag {variable}"))
     }

@@ -13,6 +13,7 @@ mod book;
 mod boundaries;
 mod built_in;
 mod by_hand;
+mod components;
 mod conform;
 mod console;
 mod control;
