@@ -8,6 +8,7 @@
 )]
 
 mod affect;
+mod affect_table;
 mod again;
 mod book;
 mod boundaries;

@@ -455,6 +455,18 @@ fn part_of_the_way(hall: &Hall) -> f64 {
     from_m / (from_m + to_m)
 }
 
+/// Whether both are CONCERNED, he serves, and she is on her way with "hurry", about halfway.
+pub(super) fn is_state_of_figure_6(change: &Change<'_>) -> bool {
+    let hall = change.hall;
+    let are_concerned = ["Butler", "Leguin"]
+        .iter()
+        .all(|robot| hall.emotion(robot) == "CONCERNED");
+    let work = (change.butler.1, change.leguin.1) == ("SERVE", "REFILL");
+    let is_halfway = (0.35..=0.65).contains(&part_of_the_way(hall));
+
+    are_concerned && work && hall.flag("Leguin", "hurried") && is_halfway
+}
+
 /// Item 26. The figure shows a state of both robots at one of its moments: with seven treats left.
 #[test]
 fn t15_the_state_of_figure_6_is_reached() {
@@ -462,16 +474,10 @@ fn t15_the_state_of_figure_6_is_reached() {
     type Found = Vec<(u64, f64, f64)>;
 
     let notes = watch(HALL, &[], |found: &mut Found, change| {
-        let hall = change.hall;
-        let are_concerned = ["Butler", "Leguin"]
-            .iter()
-            .all(|robot| hall.emotion(robot) == "CONCERNED");
-        let work = (change.butler.1, change.leguin.1) == ("SERVE", "REFILL");
-        let part = part_of_the_way(hall);
-        let is_halfway = (0.35..=0.65).contains(&part);
-        if are_concerned && work && hall.flag("Leguin", "hurried") && is_halfway {
+        if is_state_of_figure_6(change) {
+            let hall = change.hall;
             let treats = hall.number("Butler", "treats");
-            found.push((hall.simulation.tick(), treats, part));
+            found.push((hall.simulation.tick(), treats, part_of_the_way(hall)));
         }
     });
     let reached = |least: f64, most: f64| {
