@@ -89,6 +89,11 @@ impl Beliefs {
         self.belief == Belief::Cannot && self.turn(Belief::Can, "an exchange".to_owned())
     }
 
+    /// Whether it believes that it cannot achieve its goal.
+    pub(crate) fn are_of_failure(&self) -> bool {
+        self.belief == Belief::Cannot
+    }
+
     /// How often in a row it gave up.
     pub(crate) fn given_up(&self) -> u32 {
         self.given_up

@@ -17,7 +17,7 @@ pub mod belief;
 mod bounds;
 pub mod butler;
 pub mod chance;
-mod checks;
+pub mod checks;
 mod classes;
 pub mod closing;
 mod commands;

@@ -62,6 +62,14 @@ class BeliefParameters:
 
 
 @dataclass(frozen=True)
+class AppraisalParameters:
+    """How far she looks to appraise her situation."""
+
+    prediction_s: float = 5.0
+    recent_s: float = 60.0
+
+
+@dataclass(frozen=True)
 class RecruitmentParameters:
     """How she answers a waiter who calls any refiller: not at all in Python. The other values are read and not used."""
 
@@ -103,11 +111,13 @@ class Parameters:
     settle_m: float = 6.0 * FT_M
     stand_off_m: float = 3.0 * FT_M
     query_stale_s: float = 5.0
+    answer_s: float = 20.0
     turn_mean_s: float = 5.0
     look_s: float = 2.0
     joke_mean_s: float = 60.0
     recruitment: RecruitmentParameters = field(default_factory=RecruitmentParameters)
     deliberation: BeliefParameters = field(default_factory=BeliefParameters)
+    appraisal: AppraisalParameters = field(default_factory=AppraisalParameters)
     mood: MoodParameters = field(default_factory=MoodParameters)
     dynamics: DynamicsParameters = field(default_factory=DynamicsParameters)
 
@@ -247,7 +257,6 @@ TENDENCIES = {
 CROWD = "the crowd"
 """The name of what blocks her way."""
 
-ANSWER_S, PREDICTION_S, RECENT_S = 20.0, 5.0, 60.0
 """Time in which she is to answer a call; how far ahead she predicts, and how far back she judges what she does."""
 
 EVENTS = {WAIT: "the rest", DRIVE: "the call", EXCHANGE: "the exchange", AWAIT: "the wait", HOME: "the way home"}
@@ -279,9 +288,9 @@ class Leguin(CarsRobotInterface):
         self.measures = Measures()
         self.appraisal = Appraisal()
         self.episode = Episode()
-        self.pressure = Prediction(PREDICTION_S)
+        self.pressure = Prediction(self.parameters.appraisal.prediction_s)
         self.owed_s: float | None = None  # How long ago she was first called, until she comes.
-        self.duty = RecentShare(RECENT_S)
+        self.duty = RecentShare(self.parameters.appraisal.recent_s)
         self.is_on_errand = False
         self.ended = self.completed = 0  # Errands, and those of them that she completed.
         self.at = self.home = cars.welcome.location
@@ -292,6 +301,7 @@ class Leguin(CarsRobotInterface):
         self.comes_nearer = False
         self.waiting_s = 0.0  # How long she has waited to be sent home.
         self.trips = self.given_up = 0
+        self.is_lost = False  # Whether she gave up, and nothing good has happened since.
         self.waiter = Peer(self.parameters.waiter)
         self.waiter_needs = False  # Whether he needed a refill when he last answered, and of whom.
         self.waiter_calls: str | None = None
@@ -334,7 +344,7 @@ class Leguin(CarsRobotInterface):
         self.waiting_s = self.waiting_s + cars.tick_s if behavior is AWAIT else 0.0
         if self.owed_s is not None:
             self.owed_s += cars.tick_s
-        self.duty.add(self.owed_s is None or self.owed_s <= ANSWER_S, cars.tick_s)
+        self.duty.add(self.owed_s is None or self.owed_s <= self.parameters.answer_s, cars.tick_s)
         self.observe_waiter(cars)
         self.observe_way(behavior, cars.tick_s)
         self.measures = Measures(
@@ -349,8 +359,8 @@ class Leguin(CarsRobotInterface):
         """Her judgment of this moment."""
         measures = self.measures
         return Appraisal(
-            goal_congruence=1.0 - 2.0 * urgency(measures, self.bsg.current),
-            controllability=1.0 - min(measures.blocked, 1.0),
+            goal_congruence=-1.0 if self.is_lost else 1.0 - 2.0 * urgency(measures, self.bsg.current),
+            controllability=0.0 if self.is_lost else 1.0 - min(measures.blocked, 1.0),
             certainty=self.waiter.location_certainty(self.parameters.query_stale_s),
             novelty=self.pressure.novelty,
             modifiability=self.modifiability(),
@@ -385,8 +395,7 @@ class Leguin(CarsRobotInterface):
                 agency = before.agency
         event = "the blocked way" if is_blocked and behavior is DRIVE else EVENTS[behavior]
         goal = f"to bring {self.parameters.goods} to {self.parameters.waiter}"
-        other = self.waiter.name if agency == "self" else agency
-        chain = "; ".join(EXPRESSIONS[emotion][2]).format(g=goal, a=other)
+        chain = "; ".join(EXPRESSIONS[emotion][2]).format(g=goal, a=self.waiter.name)
         return Cause(agency, f"event: {event}", chain)
 
     def observe_waiter(self, cars: Cars) -> None:
@@ -417,6 +426,7 @@ class Leguin(CarsRobotInterface):
             if self.esg.progress is not None:
                 signed, is_event = self.esg.progress
                 self.progress = (self.shown if is_event else "falls behind", signed)
+                self.is_lost = self.is_lost and signed <= 0.0
         self.pressure.observe(urgency(self.measures, behavior), cars.tick_s)
         self.appraisal = self.appraise()
         self.episode.update(self.feeling.emotion, cars.tick_s, self.cause)
@@ -513,7 +523,7 @@ class Leguin(CarsRobotInterface):
             case Act.COME_HOME:
                 self.noted = "home"
             case Act.GIVE_UP:
-                self.given_up, self.hurried = self.given_up + 1, False
+                self.given_up, self.hurried, self.is_lost = self.given_up + 1, False, True
                 self.end_errand()
                 self.way = Closing()
                 self.noted = "gives up"

@@ -39,6 +39,7 @@ const PARAMETERS = {
   settle_m: 6 * FT_M,
   stand_off_m: 3 * FT_M,
   query_stale_s: 5,
+  answer_s: 20,
   turn_mean_s: 5,
   look_s: 2,
   joke_mean_s: 60,
@@ -63,6 +64,7 @@ const DYNAMICS = {
   hope_s: 15,
   label_cuts: [0.2, 0.4, 0.6, 0.8],
 };
+const APPRAISAL = { prediction_s: 5, recent_s: 60 };
 const MOOD = { start: 0, tau_s: 86400, weight: 0 };
 const JOKES = [
   "Waiting is easy. I have it in my state table.",
@@ -94,8 +96,6 @@ const LADDER = [
   ["CONCERNED", "th_concerned"],
   ["FRUSTRATED", "th_frustrated"],
 ];
-/** How far ahead she predicts, how far back she judges, and how long a call may wait, seconds. */
-const [PREDICTION_S, RECENT_S, ANSWER_S] = [5, 60, 20];
 /** What she has done before on a way counts no more. */
 const NO_WAY = { stalledS: 0, nearestM: null, comesNearer: false };
 const endErrand = () => set({ ended: her.ended + her.isOnErrand, isOnErrand: 0 });
@@ -107,7 +107,7 @@ const finishErrand = () => {
 const turnHome = () => set({ trips: her.trips + 1, sentHome: false, noted: "sent home" });
 const giveUp = () => {
   endErrand();
-  set({ givenUp: her.givenUp + 1, hurried: false, noted: "gives up", ...NO_WAY });
+  set({ givenUp: her.givenUp + 1, isLost: true, hurried: false, noted: "gives up", ...NO_WAY });
 };
 const takeErrand = ({ pending }) => {
   const hurried = pending === "hurry";
@@ -125,7 +125,7 @@ const BEHAVIORS = [
   [["WAIT", "GO_HOME"], (c) => c.isHappy && c.hasJoke, joke, null],
 ];
 
-let told, parameters, dynamics, moodiness, her;
+let told, parameters, dynamics, looks, moodiness, her;
 
 function set(changes) {
   Object.assign(her, changes);
@@ -363,7 +363,7 @@ const ticksIn = (seconds) => Math.min(Math.max(Math.round(seconds / told.tick_s)
 
 /** How far the pressure is from what its trend predicted. */
 function novelty(value) {
-  const ticks = ticksIn(PREDICTION_S);
+  const ticks = ticksIn(looks.prediction_s);
   her.pressures.push(value);
   her.pressures = her.pressures.slice(-(2 * ticks + 1));
   const base = her.pressures.length - 1 - ticks;
@@ -376,8 +376,8 @@ function novelty(value) {
 /** Whether calls wait for too long. */
 function checkDuty() {
   if (her.owedS !== null) her.owedS += told.tick_s;
-  her.duty.push(her.owedS !== null && her.owedS > ANSWER_S ? 0 : 1);
-  her.duty = her.duty.slice(-ticksIn(RECENT_S));
+  her.duty.push(her.owedS !== null && her.owedS > parameters.answer_s ? 0 : 1);
+  her.duty = her.duty.slice(-ticksIn(looks.recent_s));
 }
 
 /** Whether the situation can change without her. */
@@ -395,8 +395,8 @@ function appraise() {
   const urgency = pressure();
   const age = her.unseenS === 0 ? 0 : Math.min(her.unseenS / parameters.query_stale_s, 1);
   her.appraisal = {
-    goal_congruence: 1 - 2 * urgency,
-    controllability: 1 - Math.min(blocked, 1),
+    goal_congruence: her.isLost ? -1 : 1 - 2 * urgency,
+    controllability: her.isLost ? 0 : 1 - Math.min(blocked, 1),
     certainty: her.waiter === null ? 0 : 1 - age,
     novelty: novelty(urgency),
     modifiability: modifiability(),
@@ -421,7 +421,7 @@ function followEpisode(tickS) {
   }
   const events = { WAIT: "the rest", EXCHANGE: "the exchange", AWAIT_GO_HOME: "the wait", GO_HOME: "the way home" };
   const event = events[her.behavior] ?? (isOfCrowd ? "the blocked way" : "the call");
-  const words = { g: `to bring ${parameters.goods} to ${parameters.waiter}`, a: agency === "self" ? parameters.waiter : agency };
+  const words = { g: `to bring ${parameters.goods} to ${parameters.waiter}`, a: parameters.waiter };
   const chain = FEELINGS[her.emotion][3].map((clause) => clause.replace(/{([ga])}/, (_, slot) => words[slot]));
   her.episode = {
     of: her.emotion,
@@ -489,13 +489,14 @@ function updateEmotion(shown) {
   const rung = rungOf(her.emotion);
   if (shown === "exchange over") {
     if (rung !== 0) her.unchangedS = 0;
-    return set({ emotion: "HAPPY", urgency: 0, floor: 0, progress: [shown, 1] });
+    return set({ emotion: "HAPPY", urgency: 0, floor: 0, isLost: false, progress: [shown, 1] });
   }
   const before = her.urgency;
   const gain = dynamics.caution_gain_base + dynamics.caution_gain_slope * parameters.caution;
   const { urgency, counted } = respond(shown, target(), before, gain);
   her.urgency = Math.min(Math.max(urgency, Math.min(before, her.floor), 0), 1);
   her.progress = counted ?? her.progress;
+  if (counted?.[1] > 0) her.isLost = false;
   if (her.unchangedS + 1e-9 < dynamics.dwell_s) return;
   let next = rung;
   if (next + 1 < LADDER.length && her.urgency >= dynamics[LADDER[next + 1][1]]) next++;
@@ -651,10 +652,11 @@ function known(defaults, given) {
 
 /** Back to the initial state; a former incarnation that was lost has published what it knew. */
 async function begin(init) {
-  const { dynamics: given, mood, deliberation, recruitment, ...others } = init.parameters ?? {};
+  const { dynamics: given, appraisal, mood, deliberation, recruitment, ...others } = init.parameters ?? {};
   told = init;
   parameters = known(PARAMETERS, others);
   dynamics = known(DYNAMICS, given ?? {});
+  looks = known(APPRAISAL, appraisal ?? {});
   moodiness = known(MOOD, mood ?? {});
   if (parameters.signals !== "off") throw new Error("she sees no signals here: signals is off");
   if (parameters.scripted !== "felt") throw new Error("she has no script here: scripted is felt");
@@ -693,6 +695,7 @@ async function begin(init) {
     owedS: null, // How long ago she was first called, until she comes.
     duty: [], // Of recent ticks, whether no call waited for too long.
     isOnErrand: 0,
+    isLost: false, // She gave up, and nothing good has happened since.
     ended: 0, // Errands, and those of them that she completed.
     completed: 0,
     appraisal: {

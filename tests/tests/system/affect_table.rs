@@ -24,6 +24,7 @@ type Setting = (&'static str, &'static str, &'static [&'static str]);
 const IN_HALL: Setting = ("`hors_doeuvres`", HALL, &[]);
 const IN_CROWD: Setting = ("`crowded_hall`", CROWD, &[]);
 const IN_PANTRY: Setting = ("`pantry`", PANTRY, &[]);
+const IN_MUSEUM: Setting = ("`museum`", "configs/museum.toml", &[]);
 const WITH_PARTITION: Setting = ("`partition`", PARTITION, &[]);
 const WITH_PLANS: Setting = ("`deliberate`", "configs/deliberate.toml", &[]);
 const WITH_ANGER: Setting = (
@@ -130,7 +131,7 @@ fn components() -> Vec<Row> {
     }
     let is_sad =
         |change: &Change<'_>, robot: &str| text(change, robot, "facial_expression") == "sad";
-    rows.push(share("facial expression: sad", IN_PANTRY, BUTLER, is_sad));
+    rows.push(share("facial expression: sad", IN_PANTRY, BOTH, is_sad));
 
     for (word, sign) in [("valence: positive", 1.0), ("valence: negative", -1.0)] {
         rows.push(share(word, IN_HALL, BOTH, move |change, robot| {
@@ -200,12 +201,36 @@ fn components() -> Vec<Row> {
         ("lost goal", IN_PANTRY),
     ] {
         let word = format!("causal chain: {kind}");
-        let robots = if kind == "lost goal" { BUTLER } else { BOTH };
-        rows.push(share(word, setting, robots, move |change, robot| {
+        rows.push(share(word, setting, BOTH, move |change, robot| {
             let chain = text(change, robot, "causal_chain");
             chain
                 .split("; ")
                 .any(|clause| clause.starts_with(&format!("{kind}: ")))
+        }));
+    }
+
+    rows
+}
+
+fn moods_and_beliefs() -> Vec<Row> {
+    let mut rows = Vec::new();
+    for (word, sign) in [("positive mood", 1.0), ("negative mood", -1.0)] {
+        rows.push(share(word, IN_MUSEUM, BOTH, move |change, robot| {
+            sign * change.hall.number(robot, "mood") > 0.0
+        }));
+    }
+    rows.push(share("negative mood", IN_PANTRY, BOTH, |change, robot| {
+        change.hall.number(robot, "mood") < 0.0
+    }));
+    for (word, belief) in [
+        ("belief: \"I can't do this\", with its cause", "cannot"),
+        ("belief: \"I can indeed do this\", with its cause", "can"),
+    ] {
+        rows.push(share(word, IN_PANTRY, BOTH, move |change, robot| {
+            let variables = change.hall.variables(robot);
+            let has = |name: &str| variables.get(name).and_then(Variable::as_str);
+            let is_explained = has("belief_because").is_some_and(|cause| !cause.is_empty());
+            has("belief") == Some(belief) && is_explained
         }));
     }
 
@@ -221,8 +246,8 @@ fn emotions() -> Vec<Row> {
         ("FRUSTRATED", IN_HALL, BOTH),
         ("FRUSTRATED", IN_CROWD, BOTH),
         ("ANGRY", WITH_ANGER, BOTH),
-        ("DISCOURAGED", IN_PANTRY, BUTLER),
-        ("HOPEFUL", IN_PANTRY, BUTLER),
+        ("DISCOURAGED", IN_PANTRY, BOTH),
+        ("HOPEFUL", IN_PANTRY, BOTH),
     ] {
         rows.push(share(emotion, setting, robots, move |change, robot| {
             change.hall.emotion(robot) == emotion
@@ -239,8 +264,8 @@ fn emotions() -> Vec<Row> {
         ("FRUSTRATED", "CONCERNED", IN_CROWD, BOTH),
         ("FRUSTRATED", "HAPPY", IN_HALL, BOTH),
         ("FRUSTRATED", "HAPPY", IN_CROWD, BOTH),
-        ("FRUSTRATED", "DISCOURAGED", IN_PANTRY, BUTLER),
-        ("DISCOURAGED", "HOPEFUL", IN_PANTRY, BUTLER),
+        ("FRUSTRATED", "DISCOURAGED", IN_PANTRY, BOTH),
+        ("DISCOURAGED", "HOPEFUL", IN_PANTRY, BOTH),
     ] {
         let word = format!("{from} → {to}");
         rows.push(times(word, setting, robots, move |change, robot| {
@@ -271,7 +296,7 @@ fn emotions() -> Vec<Row> {
     rows.push(times(
         "DISCOURAGED → any other than HOPEFUL",
         IN_PANTRY,
-        BUTLER,
+        BOTH,
         |change, robot| {
             change.events.iter().any(|event| {
                 matches!(event, Event::Emotion { robot: who, from: Some(from), to }
@@ -396,6 +421,7 @@ fn behaviors() -> Vec<Row> {
 fn rows() -> Vec<Row> {
     let mut rows = components();
     rows.extend(emotions());
+    rows.extend(moods_and_beliefs());
     rows.extend(behaviors());
     rows
 }

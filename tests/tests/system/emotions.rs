@@ -50,7 +50,7 @@ fn a_moment_of_a_run_has_its_place_in_the_tree_and_all_components() {
     );
     // He has been HAPPY for most of the time.
     assert!(
-        felt.lines().any(|line| line == ">   positive mood"),
+        felt.lines().any(|line| line == ">     positive mood"),
         "{felt}"
     );
     for name in [

@@ -12,8 +12,9 @@ impl Butler {
     /// Judges this moment, and follows the episode of his emotion.
     pub(super) fn check(&mut self, cars: &Cars<'_>) {
         let pressure = self.appraised_pressure();
+        let prediction_s = self.parameters.appraisal.prediction_s;
         let checks = &mut self.state.checks;
-        checks.measure(pressure, cars.tick_s());
+        checks.measure(pressure, prediction_s, cars.tick_s());
 
         self.state.appraisal = self.appraisal(cars);
         self.follow_episode(cars.tick_s());
@@ -45,7 +46,7 @@ impl Butler {
     ///
     /// Goal congruence is the pressure: 1 for none, -1 for one that saturates his emotion. Novelty is that of the pressure.
     /// Controllability is the share of what he can do about it that he has not done yet: to call, to ask to hurry, to
-    /// intercept. The situation changes without him if the refiller comes, refills him, or has an errand. Certainty falls with
+    /// intercept; none while he believes that he cannot. The situation changes without him if the refiller comes, refills him, or has an errand. Certainty falls with
     /// the age of her last answer. What he owes are treats for those who reach for one, and what he expects of himself is a
     /// tray that is never empty.
     fn appraisal(&self, cars: &Cars<'_>) -> Appraisal {
@@ -56,7 +57,11 @@ impl Butler {
         let may_intercept =
             behavior != ButlerBehavior::Intercept && self.context(cars).may_intercept();
         let open = [!state.called, !state.hurried, may_intercept];
-        let count = open.iter().filter(|is_open| **is_open).count();
+        let count = if state.mind.beliefs.are_of_failure() {
+            0
+        } else {
+            open.iter().filter(|is_open| **is_open).count()
+        };
 
         let stale_s = self.parameters.query_stale_s;
         let modifiability = match state.refiller.behavior(stale_s) {
@@ -102,11 +107,16 @@ impl Butler {
             Happy => "the service",
             Discouraged => "the failed chase",
             _ if was_worse => "her approach",
-            _ if !state.called => "the low tray",
+            _ if !state.called && !is_hers => "the low tray",
             _ => "the delay",
         };
 
-        let amount = format!("{} {}", state.treats, self.parameters.goods);
+        let goods = &self.parameters.goods;
+        let amount = match state.treats {
+            0 => format!("no {goods}"),
+            1 => format!("one of the {goods}"),
+            treats => format!("{treats} {goods}"),
+        };
         let circumstances = Circumstances {
             other: Some(refiller),
             goal: Some(&self.parameters.goal),

@@ -3,8 +3,6 @@
 use affect::{Episode, Prediction, RecentShare};
 use serde::{Deserialize, Serialize};
 
-use crate::checks::{PREDICTION_S, RECENT_S};
-
 /// What he remembers to appraise his situation.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -20,15 +18,21 @@ pub(super) struct ButlerChecks {
 
 impl ButlerChecks {
     /// Adds a tick in which guests took so many treats and so many times reached for an empty tray.
-    pub(super) fn count(&mut self, served: u32, missed: u32, has_treats: bool, tick_s: f64) {
+    pub(super) fn count(
+        &mut self,
+        [served, missed]: [u32; 2],
+        has_treats: bool,
+        recent_s: f64,
+        tick_s: f64,
+    ) {
         let asked = served.saturating_add(missed);
-        self.guests.add(served, asked, RECENT_S, tick_s);
-        self.supply.add(has_treats.into(), 1, RECENT_S, tick_s);
+        self.guests.add(served, asked, recent_s, tick_s);
+        self.supply.add(has_treats.into(), 1, recent_s, tick_s);
     }
 
     /// Adds the pressure of a tick, from which novelty follows.
-    pub(super) fn measure(&mut self, pressure: f64, tick_s: f64) {
-        self.pressure.observe(pressure, PREDICTION_S, tick_s);
+    pub(super) fn measure(&mut self, pressure: f64, prediction_s: f64, tick_s: f64) {
+        self.pressure.observe(pressure, prediction_s, tick_s);
     }
 
     /// How far the pressure is from what its trend predicted.

@@ -117,9 +117,10 @@ impl CarsRobotInterface for Butler {
             self.recruit(cars);
         }
         let state = &mut self.state;
-        let [served, missed] = [state.served - served, state.missed - missed];
+        let asked = [state.served - served, state.missed - missed];
         let has_treats = state.treats > 0;
-        state.checks.count(served, missed, has_treats, tick_s);
+        let recent_s = self.parameters.appraisal.recent_s;
+        state.checks.count(asked, has_treats, recent_s, tick_s);
         self.observe_refiller(cars);
         self.believe(cars);
         self.measure(cars);

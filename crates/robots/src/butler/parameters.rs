@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::deliberation::Deliberation;
 use super::tables::ButlerBehavior;
 use crate::bounds::{not_negative, positive};
+use crate::checks::AppraisalParameters;
 use crate::drive::LOOK_S;
 use crate::policy::Policy;
 use crate::recruitment::recruiter::RecruiterParameters;
@@ -107,6 +108,8 @@ pub struct ButlerParameters {
     pub approach: Approach,
     /// What he deliberates about: beliefs and plans. Default nothing.
     pub deliberation: Deliberation,
+    /// How far he looks to appraise his situation.
+    pub appraisal: AppraisalParameters,
     /// His mood.
     pub mood: MoodParameters,
     /// Constants of his emotions.
@@ -195,6 +198,7 @@ impl Default for ButlerParameters {
             rate: Rate::default(),
             approach: Approach::default(),
             deliberation: Deliberation::default(),
+            appraisal: AppraisalParameters::default(),
             mood: MoodParameters::default(),
             dynamics: DynamicsParameters::default(),
         }
@@ -220,6 +224,7 @@ impl ButlerParameters {
             ));
         }
 
+        self.appraisal.check()?;
         positive("exchange_radius_m", self.exchange_radius_m)?;
         positive("v_refill_mps", self.v_refill_mps)?;
         positive("turn_mean_s", self.turn_mean_s)?;

@@ -16,7 +16,11 @@ impl Leguin {
     pub(super) fn check(&mut self, cars: &Cars<'_>) {
         let pressure = urgency(&self.state.measures, &self.behavior()).value();
         let checks = &mut self.state.checks;
-        checks.measure(pressure, cars.tick_s());
+        checks.measure(
+            pressure,
+            self.parameters.appraisal.prediction_s,
+            cars.tick_s(),
+        );
 
         self.state.appraisal = self.appraisal(pressure);
         self.follow_episode(cars.tick_s());
@@ -38,7 +42,8 @@ impl Leguin {
     /// Her judgment of this moment.
     ///
     /// Goal congruence is the pressure of her errand: 1 for none, -1 where her patience ends. Novelty is that of the pressure.
-    /// Controllability is the share of her patience with a blocked way that is left. The situation changes without her if the
+    /// Controllability is the share of her patience with a blocked way that is left. After she gave up an errand it is lost, and
+    /// nothing can be done about it, until something brings her nearer to her goal again, or while she believes that she cannot. The situation changes without her if the
     /// waiter comes to meet her or takes treats, or, while she waits at the table, may call; a crowd in her way may move.
     /// Certainty falls with the time since she last knew where the waiter is. What she owes are answers to his calls, and what
     /// she expects of herself are errands that she completes.
@@ -56,9 +61,15 @@ impl Leguin {
             _ => 0.0,
         };
 
+        let is_lost = checks.are_of_loss() || self.state.beliefs.are_of_failure();
+        let [goal_congruence, controllability] = if is_lost {
+            [-1.0, 0.0]
+        } else {
+            [1.0 - 2.0 * pressure, 1.0 - measures.blocked.min(1.0)]
+        };
         Appraisal::new(
-            1.0 - 2.0 * pressure,
-            1.0 - measures.blocked.min(1.0),
+            goal_congruence,
+            controllability,
             waiter.location_certainty(stale_s),
         )
         .with_novelty(checks.novelty())
@@ -94,13 +105,10 @@ impl Leguin {
 
         let goal = format!("to bring {} to {waiter}", self.parameters.goods);
         let circumstances = Circumstances {
-            other: Some(match &agency {
-                Agency::Oneself => waiter,
-                Agency::Other(name) => name,
-            }),
+            other: Some(waiter),
             goal: Some(&goal),
             ..Circumstances::default()
         };
-        Schemata::standard().cause(emotion.name(), agency.clone(), event, &circumstances)
+        Schemata::standard().cause(emotion.name(), agency, event, &circumstances)
     }
 }

@@ -3,11 +3,6 @@
 use affect::{Episode, Prediction, RecentShare};
 use serde::{Deserialize, Serialize};
 
-use crate::checks::{PREDICTION_S, RECENT_S};
-
-/// Time in which she is to answer a call, s \[I\].
-const ANSWER_S: f64 = 20.0;
-
 /// What she remembers to appraise her situation.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -20,6 +15,8 @@ pub(super) struct LeguinChecks {
     /// The ticks in which no call was overdue.
     duty: RecentShare,
     is_on_errand: bool,
+    /// Whether she gave up, and nothing good has happened since.
+    is_lost: bool,
     /// Errands that have ended, and those of them that she completed.
     ended: u32,
     completed: u32,
@@ -36,6 +33,22 @@ impl LeguinChecks {
         self.is_on_errand = true;
     }
 
+    /// She gives up.
+    pub(super) fn give_up(&mut self) {
+        self.is_lost = true;
+        self.end_errand();
+    }
+
+    /// Something brought her nearer to her goal: what was lost is past.
+    pub(super) fn progress(&mut self) {
+        self.is_lost = false;
+    }
+
+    /// Whether her errand is lost.
+    pub(super) fn are_of_loss(&self) -> bool {
+        self.is_lost
+    }
+
     /// She has met the waiter, for an exchange.
     pub(super) fn complete_errand(&mut self) {
         self.owed_s = None;
@@ -43,17 +56,16 @@ impl LeguinChecks {
         self.end_errand();
     }
 
-    /// She turns back, or her errand is completed.
-    pub(super) fn end_errand(&mut self) {
+    fn end_errand(&mut self) {
         self.ended += u32::from(self.is_on_errand);
         self.is_on_errand = false;
     }
 
-    /// Adds a tick.
-    pub(super) fn advance(&mut self, tick_s: f64) {
+    /// Adds a tick. She is to answer a call within `answer_s`, and is judged by the last `recent_s`.
+    pub(super) fn advance(&mut self, answer_s: f64, recent_s: f64, tick_s: f64) {
         self.owed_s = self.owed_s.map(|owed_s| owed_s + tick_s);
-        let is_overdue = self.owed_s.is_some_and(|owed_s| owed_s > ANSWER_S);
-        self.duty.add((!is_overdue).into(), 1, RECENT_S, tick_s);
+        let is_overdue = self.owed_s.is_some_and(|owed_s| owed_s > answer_s);
+        self.duty.add((!is_overdue).into(), 1, recent_s, tick_s);
     }
 
     /// Of the errands that have ended, the share that she completed.
@@ -66,8 +78,8 @@ impl LeguinChecks {
     }
 
     /// Adds the pressure of a tick, from which novelty follows.
-    pub(super) fn measure(&mut self, pressure: f64, tick_s: f64) {
-        self.pressure.observe(pressure, PREDICTION_S, tick_s);
+    pub(super) fn measure(&mut self, pressure: f64, prediction_s: f64, tick_s: f64) {
+        self.pressure.observe(pressure, prediction_s, tick_s);
     }
 
     /// How far the pressure is from what its trend predicted.

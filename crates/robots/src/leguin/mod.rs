@@ -118,7 +118,9 @@ impl CarsRobotInterface for Leguin {
         let tick_s = cars.tick_s();
         self.bsg.advance(tick_s);
         self.state.advance(behavior, tick_s);
-        self.state.checks.advance(tick_s);
+        let recent_s = self.parameters.appraisal.recent_s;
+        let answer_s = self.parameters.answer_s;
+        self.state.checks.advance(answer_s, recent_s, tick_s);
         self.observe_waiter(cars);
         self.heed_signals();
         self.observe_way(tick_s);
@@ -131,6 +133,9 @@ impl CarsRobotInterface for Leguin {
             .emotion
             .update(&self.state.measures, self.bsg.current(), cars);
         self.state.inputs.record(progress);
+        if progress.is_some_and(|progress| progress.signed > 0.0) {
+            self.state.checks.progress();
+        }
         self.check(cars);
     }
 
@@ -500,7 +505,7 @@ impl Leguin {
             }
             LeguinAct::ComeHome => state.inputs.note(Input::Home),
             LeguinAct::GiveUp => {
-                state.checks.end_errand();
+                state.checks.give_up();
                 state.beliefs.give_up();
                 state.given_up += 1;
                 state.hurried = false;

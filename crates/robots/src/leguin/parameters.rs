@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::belief::BeliefParameters;
 use crate::bounds::{not_negative, positive};
+use crate::checks::AppraisalParameters;
 use crate::drive::LOOK_S;
 use crate::policy::Policy;
 use crate::recruitment::shame::HelperParameters;
@@ -80,6 +81,8 @@ pub struct LeguinParameters {
     pub stand_off_m: f64,
     /// Age at which the last answer of the waiter no longer counts, s. Default 5 \[I\].
     pub query_stale_s: f64,
+    /// Time in which she is to answer a call, s. Default 20 \[I\].
+    pub answer_s: f64,
     /// Mean time from one turn to the next while she searches for a waiter of whom nothing is known, s. Default 5 \[I\].
     pub turn_mean_s: f64,
     /// Time for which she looks around before each step after she was blocked, s. Default 2 \[I\].
@@ -90,6 +93,8 @@ pub struct LeguinParameters {
     pub recruitment: HelperParameters,
     /// Her beliefs about herself.
     pub deliberation: BeliefParameters,
+    /// How far she looks to appraise her situation.
+    pub appraisal: AppraisalParameters,
     /// Her mood.
     pub mood: MoodParameters,
     /// Constants of her emotions.
@@ -126,11 +131,13 @@ impl Default for LeguinParameters {
             settle_m: 6.0 * FT_M,
             stand_off_m: 3.0 * FT_M,
             query_stale_s: 5.0,
+            answer_s: 20.0,
             turn_mean_s: 5.0,
             look_s: LOOK_S,
             joke_mean_s: 60.0,
             recruitment: HelperParameters::default(),
             deliberation: BeliefParameters::default(),
+            appraisal: AppraisalParameters::default(),
             mood: MoodParameters::default(),
             dynamics: DynamicsParameters::default(),
         }
@@ -173,6 +180,8 @@ impl LeguinParameters {
         self.script.check()?;
         self.recruitment.check()?;
         self.deliberation.check()?;
+        self.appraisal.check()?;
+        not_negative("answer_s", self.answer_s)?;
         not_negative("arrive_m", self.arrive_m)?;
         not_negative("settle_s", self.settle_s)?;
         not_negative("settle_m", self.settle_m)?;
