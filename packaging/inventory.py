@@ -3,8 +3,8 @@
 
     packaging/inventory.py FOLDER        writes FOLDER/sbom.cdx.json and FOLDER/THIRD-PARTY.txt
 
-It reads Cargo.lock, the packages that cargo has on this machine, and the list of the console's vendored files, and needs no
-network after a build. The same sources give the same bytes, but for the time, which SOURCE_DATE_EPOCH sets.
+It reads Cargo.lock, the packages that cargo has on this machine, and the lists of vendored files (the console's page, the fonts of
+figures), and needs no network after a build. The same sources give the same bytes, but for the time, which SOURCE_DATE_EPOCH sets.
 """
 
 import json
@@ -20,7 +20,11 @@ import uuid
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 PACKAGES = {"cars", "console", "robots", "simulator"}  # of the programs
 TARGET = "x86_64-unknown-linux-gnu"
-VENDORED = ROOT / "crates" / "console" / "assets" / "vendor"
+# Folders of files from other projects, and where these are found.
+VENDORED = {
+    ROOT / "crates" / "console" / "assets" / "vendor": "pkg:npm/",
+    ROOT / "crates" / "pictures" / "fonts": "pkg:github/liberationfonts/",
+}
 LICENSE_FILES = re.compile(r"(un)?licen[sc]e|copying|copyright|notice", re.IGNORECASE)
 CODE = {".c", ".h", ".json", ".rs", ".toml", ".yml"}
 
@@ -94,21 +98,24 @@ def reference(package):
 
 
 def vendored():
-    """The packages of the console's page, from the table of its files: name, version, license, text."""
-    page = (VENDORED / "README.md").read_text()
-    rows = re.findall(r"^\| `.*` \| (\S+) \| (\S+) \| (\S+), `(\S+)` \|$", page, re.MULTILINE)
-    if len(rows) != page.count("\n| `"):
-        raise SystemExit(f"{VENDORED}/README.md has rows without a license and its file")
-    return [(name, version, spdx, (VENDORED / file).read_text().strip()) for name, version, spdx, file in rows]
+    """The vendored packages, from the tables of their files: name, version, license, text, package URL."""
+    found = []
+    for folder, place in VENDORED.items():
+        page = (folder / "README.md").read_text()
+        rows = re.findall(r"^\| `.*` \| (\S+) \| (\S+) \| (\S+), `(\S+)` \|$", page, re.MULTILINE)
+        if len(rows) != page.count("\n| `"):
+            raise SystemExit(f"{folder}/README.md has rows without a license and its file")
+        for name, version, spdx, file in rows:
+            found.append((name, version, spdx, (folder / file).read_text().strip(), f"{place}{name}@{version}"))
+    return found
 
 
 def sbom(roots, packages, scopes, graph, checksums):
     """The document about the programs of packages. Parts that only build the programs are `excluded`."""
     components = [component(part, checksums, scopes[id]) for id, part in packages.items() if id in scopes]
-    page = []
-    for name, version, spdx, _ in vendored():
-        purl = f"pkg:npm/{name}@{version}"
-        page.append(purl)
+    files = []
+    for name, version, spdx, _, purl in vendored():
+        files.append(purl)
         components.append(
             {
                 "type": "library",
@@ -132,7 +139,7 @@ def sbom(roots, packages, scopes, graph, checksums):
         "version": package["version"],
         "licenses": [{"expression": license_of(package)}],
     }
-    dependencies.append({"ref": "CARS", "dependsOn": sorted([*(reference(packages[root]) for root in roots), *page])})
+    dependencies.append({"ref": "CARS", "dependsOn": sorted([*(reference(packages[root]) for root in roots), *files])})
     seconds = int(os.environ.get("SOURCE_DATE_EPOCH", time.time()))
     return {
         "$schema": "http://cyclonedx.org/schema/bom-1.6.schema.json",
@@ -164,7 +171,7 @@ def notices(packages, scopes):
         shipped[title] = license_of(package)
         for text in texts_of(pathlib.Path(package["manifest_path"]).parent):
             texts.setdefault(text, []).append(title)
-    for name, version, spdx, text in vendored():
+    for name, version, spdx, text, _ in vendored():
         title = f"{name} {version}"
         shipped[title] = spdx
         texts.setdefault(text, []).append(title)

@@ -1,5 +1,6 @@
 //! Figures for papers: as SVG and PDF in the width of a column, in light colors, with their data as CSV and a Vega-Lite specification.
 
+mod font;
 mod pdf;
 mod shapes;
 mod sheet;

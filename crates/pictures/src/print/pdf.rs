@@ -1,10 +1,11 @@
-//! Shapes as a PDF file of one page, in fonts that every reader has: Helvetica, and Symbol for arrows and infinity.
+//! Shapes as a PDF file of one page, with its fonts.
 //!
 //! Written here because it is little: paths and texts, uncompressed. A library that turns any SVG into PDF takes 160 s of processor time
 //! to build.
 
 use std::fmt::Write;
 
+use crate::print::font::{FIRST, Font, code, to_unicode};
 use crate::print::shapes::{PrintedShape, PrintedText, Segment};
 use crate::print::sheet::Paint;
 use crate::print::size::PrintSize;
@@ -12,47 +13,8 @@ use crate::print::size::PrintSize;
 /// Points of a millimeter.
 pub(crate) const POINTS_PER_MM: f64 = 72.0 / 25.4;
 
-/// Widths of the letters of Helvetica from the space to `~`, thousandths of its size.
-const REGULAR: [u16; 95] = [
-    278, 278, 355, 556, 556, 889, 667, 191, 333, 333, 389, 584, 278, 333, 278, 278, 556, 556, 556,
-    556, 556, 556, 556, 556, 556, 556, 278, 278, 584, 584, 584, 556, 1015, 667, 667, 722, 722, 667,
-    611, 778, 722, 278, 500, 667, 556, 833, 722, 778, 667, 778, 722, 667, 611, 722, 667, 944, 667,
-    667, 611, 278, 278, 278, 469, 556, 333, 556, 556, 500, 556, 556, 278, 556, 556, 222, 222, 500,
-    222, 833, 556, 556, 556, 556, 333, 500, 278, 556, 500, 722, 500, 500, 500, 334, 260, 334, 584,
-];
-/// The same of Helvetica-Bold.
-const BOLD: [u16; 95] = [
-    278, 333, 474, 556, 556, 889, 722, 238, 333, 333, 389, 584, 278, 333, 278, 278, 556, 556, 556,
-    556, 556, 556, 556, 556, 556, 556, 333, 333, 584, 584, 584, 611, 975, 722, 722, 722, 722, 667,
-    611, 778, 722, 278, 556, 722, 611, 833, 722, 778, 667, 778, 722, 667, 611, 722, 667, 944, 667,
-    667, 611, 333, 278, 333, 584, 556, 333, 556, 611, 556, 611, 556, 333, 611, 611, 278, 278, 556,
-    278, 889, 611, 611, 611, 611, 389, 556, 333, 611, 556, 778, 556, 556, 500, 389, 280, 389, 584,
-];
-/// Letters outside of ASCII that have a code of their own, with their widths. The first of them has no code in PDF's usual encoding, and gets
-/// one that is free there.
-const OTHERS: [(char, u8, u16); 13] = [
-    ('\u{2212}', 0x7f, 584),
-    ('\u{2026}', 0x85, 1000),
-    ('\u{2018}', 0x91, 222),
-    ('\u{2019}', 0x92, 222),
-    ('\u{201c}', 0x93, 333),
-    ('\u{201d}', 0x94, 333),
-    ('\u{2022}', 0x95, 350),
-    ('\u{2013}', 0x96, 556),
-    ('\u{2014}', 0x97, 1000),
-    ('\u{a0}', 0xa0, 278),
-    ('\u{b1}', 0xb1, 584),
-    ('\u{b7}', 0xb7, 278),
-    ('\u{d7}', 0xd7, 584),
-];
-/// Letters of the font Symbol, with their codes and widths.
-const SYMBOLS: [(char, u8, u16); 5] = [
-    ('∞', 0xa5, 713),
-    ('↔', 0xab, 1042),
-    ('←', 0xac, 987),
-    ('→', 0xae, 987),
-    ('↓', 0xaf, 603),
-];
+/// The fonts by their names in a file, and whether they are bold.
+const FONTS: [(&str, bool); 2] = [("F0", false), ("F1", true)];
 
 /// A file with these shapes.
 pub(crate) fn pdf(shapes: &[PrintedShape], size: &PrintSize, title: &str) -> Vec<u8> {
@@ -83,46 +45,86 @@ pub(crate) fn pdf(shapes: &[PrintedShape], size: &PrintSize, title: &str) -> Vec
     for (index, (fill, stroke)) in opacities.iter().enumerate() {
         states += &format!("/G{index} << /ca {fill} /CA {stroke} >> ");
     }
-    let font = |name: &str, encoding: &str| {
-        format!("<< /Type /Font /Subtype /Type1 /BaseFont /{name}{encoding} >>")
-    };
-    let latin = " /Encoding << /BaseEncoding /WinAnsiEncoding /Differences [127 /minus] >>";
-    let objects = [
-        "<< /Type /Catalog /Pages 2 0 R >>".to_owned(),
-        "<< /Type /Pages /Kids [3 0 R] /Count 1 >>".to_owned(),
-        format!(
-            "<< /Type /Page /Parent 2 0 R /MediaBox [0 0 {width} {height}] /Contents 4 0 R /Resources << \
-             /Font << /F0 5 0 R /F1 6 0 R /F2 7 0 R >> /ExtGState << {states}>> >> >>"
-        ),
-        format!(
-            "<< /Length {} >>\nstream\n{content}endstream",
-            content.len()
-        ),
-        font("Helvetica", latin),
-        font("Helvetica-Bold", latin),
-        font("Symbol", ""),
-        format!("<< /Title {} >>", utf16(title)),
+    let mut objects = vec![
+        "<< /Type /Catalog /Pages 2 0 R >>".into(),
+        "<< /Type /Pages /Kids [3 0 R] /Count 1 >>".into(),
+        Vec::new(),
+        stream("", content.as_bytes()),
+        stream("", to_unicode().as_bytes()),
     ];
+    let mut fonts = String::new();
+    for (name, is_bold) in FONTS {
+        if content.contains(&format!("/{name} ")) {
+            fonts += &format!("/{name} {} 0 R ", objects.len() + 1);
+            add_font(&mut objects, Font::of(is_bold));
+        }
+    }
+    objects[2] = format!(
+        "<< /Type /Page /Parent 2 0 R /MediaBox [0 0 {width} {height}] /Contents 4 0 R /Resources << \
+         /Font << {fonts}>> /ExtGState << {states}>> >> >>"
+    )
+    .into();
+    objects.push(format!("<< /Title {} >>", utf16(title)).into());
     file(&objects)
 }
 
+/// An object with content.
+fn stream(entries: &str, content: &[u8]) -> Vec<u8> {
+    let head = format!("<< {entries}/Length {} >>\nstream\n", content.len());
+    [head.as_bytes(), content, b"\nendstream"].concat()
+}
+
+/// Adds a font, its descriptor and its file. Without an encoding, codes are those of the font's own table.
+fn add_font(objects: &mut Vec<Vec<u8>>, font: &Font) {
+    let Font {
+        name,
+        bounds,
+        stem,
+        file_length,
+        ..
+    } = font;
+    let descriptor = objects.len() + 2;
+    let widths = font.widths.map(|width| width.to_string()).join(" ");
+    objects.push(
+        format!(
+            "<< /Type /Font /Subtype /TrueType /BaseFont /{name} /FirstChar {FIRST} /LastChar 255 /Widths [{widths}] \
+             /FontDescriptor {descriptor} 0 R /ToUnicode 5 0 R >>"
+        )
+        .into(),
+    );
+    objects.push(
+        format!(
+            "<< /Type /FontDescriptor /FontName /{name} /Flags 4 /FontBBox [{bounds}] /ItalicAngle 0 /Ascent 905 \
+             /Descent -212 /CapHeight 688 /StemV {stem} /FontFile2 {} 0 R >>",
+            descriptor + 1
+        )
+        .into(),
+    );
+    let entries = format!("/Filter /FlateDecode /Length1 {file_length} ");
+    objects.push(stream(&entries, font.file));
+}
+
 /// Puts objects, of which the last one is the information about the file, into a file with the table of their places.
-fn file(objects: &[String]) -> Vec<u8> {
-    let mut file = "%PDF-1.4\n".to_owned();
+fn file(objects: &[Vec<u8>]) -> Vec<u8> {
+    // Four bytes above 127 tell programs that the file is not text.
+    let mut file = b"%PDF-1.4\n%\xe2\xe3\xcf\xd3\n".to_vec();
     let mut places = String::new();
     for (index, object) in objects.iter().enumerate() {
         places += &format!("{:010} 00000 n \n", file.len());
-        file += &format!("{} 0 obj\n{object}\nendobj\n", index + 1);
+        file.extend(format!("{} 0 obj\n", index + 1).bytes());
+        file.extend(object);
+        file.extend(b"\nendobj\n");
     }
 
     let count = objects.len() + 1;
     let table = file.len();
-    file += &format!("xref\n0 {count}\n0000000000 65535 f \n{places}");
-    file += &format!(
-        "trailer\n<< /Size {count} /Root 1 0 R /Info {} 0 R >>\nstartxref\n{table}\n%%EOF\n",
+    let end = format!(
+        "xref\n0 {count}\n0000000000 65535 f \n{places}\
+         trailer\n<< /Size {count} /Root 1 0 R /Info {} 0 R >>\nstartxref\n{table}\n%%EOF\n",
         count - 1
     );
-    file.into_bytes()
+    file.extend(end.bytes());
+    file
 }
 
 /// A length, to the hundredth.
@@ -185,7 +187,8 @@ fn add_path(content: &mut String, path: &[Segment]) {
 
 fn add_text(content: &mut String, text: &PrintedText, opacities: &mut Vec<(f64, f64)>) {
     let runs = text.runs.iter();
-    let width: f64 = runs.map(|(paint, words)| width_px(words, paint)).sum();
+    let widths = runs.map(|(paint, words)| Font::of(paint.is_bold).width_em(words) * paint.font_px);
+    let width: f64 = widths.sum();
     let before = width * text.before;
     // Glyphs stand upright although y runs downward.
     let matrix = if text.is_upward {
@@ -210,55 +213,7 @@ fn add_text(content: &mut String, text: &PrintedText, opacities: &mut Vec<(f64, 
 }
 
 fn add_words(content: &mut String, words: &str, paint: &Paint) {
-    let size = point(paint.font_px);
-    let mut font = 9;
-    for c in words.chars() {
-        let (code, _, is_symbol) = glyph(c, paint.is_bold);
-        let wanted = if is_symbol {
-            2
-        } else {
-            u8::from(paint.is_bold)
-        };
-        if wanted != font {
-            if font != 9 {
-                *content += "> Tj ";
-            }
-            font = wanted;
-            *content += &format!("/F{font} {size} Tf <");
-        }
-        *content += &format!("{code:02X}");
-    }
-    if font != 9 {
-        *content += "> Tj ";
-    }
-}
-
-/// Width of a text, pixels.
-pub(crate) fn width_px(words: &str, paint: &Paint) -> f64 {
-    let widths = words.chars().map(|c| f64::from(glyph(c, paint.is_bold).1));
-    widths.sum::<f64>() / 1000.0 * paint.font_px
-}
-
-/// The code of a letter, its width in thousandths, and whether it is one of the font Symbol. A letter that no font has is a question mark.
-fn glyph(c: char, is_bold: bool) -> (u8, u16, bool) {
-    let widths = if is_bold { &BOLD } else { &REGULAR };
-    let ascii = |c: char| widths.get((c as usize).wrapping_sub(0x20)).copied();
-    if let Some(width) = ascii(c) {
-        return (c as u8, width, false);
-    }
-    let find = |table: &[(char, u8, u16)]| {
-        let found = table.iter().find(|(letter, ..)| *letter == c);
-        found.map(|(_, code, width)| (*code, *width))
-    };
-    if let Some((code, width)) = find(&OTHERS) {
-        return (code, width, false);
-    }
-    if let Some((code, width)) = find(&SYMBOLS) {
-        return (code, width, true);
-    }
-    // Letters of western languages, which are about as wide as most.
-    if matches!(c, '\u{a1}'..='\u{ff}') {
-        return (c as u32 as u8, 556, false);
-    }
-    (b'?', 556, false)
+    let font = u8::from(paint.is_bold);
+    let codes: String = words.chars().map(|c| format!("{:02X}", code(c))).collect();
+    *content += &format!("/F{font} {} Tf <{codes}> Tj ", point(paint.font_px));
 }

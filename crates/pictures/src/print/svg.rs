@@ -5,8 +5,8 @@ use crate::print::shapes::{PrintedShape, PrintedText, Segment};
 use crate::print::sheet::{Color, Paint};
 use crate::print::size::PrintSize;
 
-/// Fonts of the texts: those of the PDF first.
-const FONTS: &str = "Helvetica, Arial, 'Liberation Sans', sans-serif";
+/// Fonts of the texts: that of the PDF first, then those of the same widths.
+const FONTS: &str = "'Liberation Sans', Helvetica, Arial, sans-serif";
 
 /// A picture of these shapes.
 pub(crate) fn svg(
@@ -119,7 +119,8 @@ fn write_text(svg: &mut Markup, text: &PrintedText) {
         return;
     }
 
-    tag.open();
+    // Some programs drop the space at the end of a part otherwise.
+    tag.with("xml:space", "preserve").open();
     for (paint, words) in &text.runs {
         painted(svg.tag("tspan"), paint).content(words);
     }
