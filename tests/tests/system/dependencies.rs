@@ -201,3 +201,65 @@ fn vendored_packages_are_the_published_ones_and_their_patches() {
         );
     }
 }
+
+/// Whether rustdoc runs or compiles a block of code in these documentation comments.
+fn has_example(text: &str) -> bool {
+    let mut is_in_block = false;
+    for line in text.lines().map(str::trim_start) {
+        let comment = line.strip_prefix("//!").or(line.strip_prefix("///"));
+        let Some(language) = comment.and_then(|comment| comment.trim().strip_prefix("```")) else {
+            continue;
+        };
+        is_in_block = !is_in_block;
+        let mut words = language.split([',', ' ']);
+        let is_run = words.all(|word| {
+            ["", "rust", "no_run", "should_panic", "compile_fail"].contains(&word)
+                || word.starts_with("edition")
+                || word.starts_with("E0")
+        });
+        if is_in_block && is_run {
+            return true;
+        }
+    }
+    false
+}
+
+/// Cargo builds and starts a test program for the examples of each library that does not state that it has none.
+#[test]
+fn libraries_test_their_examples_and_none_without_any() {
+    let metadata = metadata(&root(), &["--offline", "--locked", "--no-deps"]).unwrap();
+    let mut libraries = 0;
+    for package in metadata["packages"].as_array().unwrap() {
+        let folder = Path::new(package["manifest_path"].as_str().unwrap()).parent();
+        let folder = folder.unwrap();
+        if folder.starts_with(root().join("vendor")) {
+            continue;
+        }
+        for target in package["targets"].as_array().unwrap() {
+            let is_library = ["lib", "cdylib"].map(|kind| target["kind"][0] == kind);
+            if !is_library.contains(&true) {
+                continue;
+            }
+            let texts = sources(folder);
+            let has_example = texts.values().any(|text| has_example(text));
+            let name = &package["name"];
+            assert_eq!(
+                target["doctest"], has_example,
+                "{name}: `doctest = false` belongs in [lib] if and only if no comment has an example"
+            );
+            libraries += 1;
+        }
+    }
+    assert!(libraries > 20, "{libraries}");
+}
+
+#[test]
+fn examples_in_comments_are_found() {
+    assert!(has_example("/// ```\n/// run();\n/// ```\nfn run() {}"));
+    assert!(has_example("    //! ```compile_fail,E0594\n    //! ```"));
+    assert!(has_example(
+        "/// ```text\n/// a\n/// ```\n/// ```no_run\n/// ```"
+    ));
+    assert!(!has_example("/// ```text\n/// a\n/// ```\n// ```\n"));
+    assert!(!has_example("/// ```ignore\n/// ```\nlet text = \"```\";"));
+}
