@@ -58,7 +58,7 @@ pub(crate) fn conform(args: &ConformArgs) -> Result<ExitCode> {
     let report = match check(args) {
         Ok(report) => report,
         Err(error) => {
-            terminal::note(render(error.as_ref()));
+            terminal::note(format_args!("Error: {}", render(error.as_ref())));
             return Ok(ExitCode::from(2));
         }
     };

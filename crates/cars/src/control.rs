@@ -442,7 +442,8 @@ fn describe(status: &Status) -> String {
     }
 
     for (reason, count) in &status.ignored {
-        text += &format!("ignored {count} messages: {reason}\n");
+        let messages = if *count == 1 { "message" } else { "messages" };
+        text += &format!("ignored {count} {messages}: {reason}\n");
     }
 
     text

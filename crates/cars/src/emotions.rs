@@ -204,8 +204,8 @@ fn moment(args: &EmotionsArgs, at: &TickOfRun) -> Result<String> {
     else {
         return Err(refusal!(
             help = format!("name an earlier tick, or a time such as {run}@31s"),
-            "the recording of {run} has no tick {tick}; it has {}",
-            recording.len()
+            "the recording of {run} has no tick {tick}: its last one is {}",
+            recording.len().saturating_sub(1)
         ));
     };
     if let Some(robot) = &args.robot

@@ -1,6 +1,5 @@
 //! `cars net`: plays faults on real links.
 
-use std::collections::BTreeSet;
 use std::fmt::Display;
 use std::io::BufRead;
 use std::net::SocketAddr;
@@ -90,7 +89,7 @@ pub(crate) fn net(command: NetCommand) -> Result<ExitCode> {
 fn proxy(args: ProxyArgs) -> Result<ExitCode> {
     let closes = args.close;
     let plan = match args.plan.zip(args.robot) {
-        Some((file, robot)) => Some(FaultPlan::load(&file, &BTreeSet::from([robot]))?),
+        Some((file, robot)) => Some(FaultPlan::load_of(&file, &robot)?),
         None => None,
     };
 

@@ -181,9 +181,14 @@ fn commands(robot: &RobotSummary) -> String {
 
 fn moves(robot: &RobotSummary) -> String {
     let mut lines = vec![format!("{} blocked", robot.blocked)];
-    for (count, what) in [(robot.missed, "ticks missed"), (robot.returns, "returns")] {
-        if count > 0 {
-            lines.push(format!("{count} {what}"));
+    for (count, one, many) in [
+        (robot.missed, "tick missed", "ticks missed"),
+        (robot.returns, "return", "returns"),
+    ] {
+        match count {
+            0 => {}
+            1 => lines.push(format!("1 {one}")),
+            _ => lines.push(format!("{count} {many}")),
         }
     }
     lines.join("\n")
@@ -216,6 +221,18 @@ mod tests {
             commands(&robot(&more)),
             format!("{lines}\n2 with 2 further texts\n3 received")
         );
+    }
+
+    #[test]
+    fn one_tick_and_one_return_are_in_the_singular() {
+        let counted = |missed, returns| {
+            let mut robot = robot(&[]);
+            robot.missed = missed;
+            robot.returns = returns;
+            moves(&robot)
+        };
+        assert_eq!(counted(1, 2), "0 blocked\n1 tick missed\n2 returns");
+        assert_eq!(counted(2, 1), "0 blocked\n2 ticks missed\n1 return");
     }
 
     #[test]

@@ -279,6 +279,7 @@ fn what_cannot_be_checked_is_reported() {
         let error = String::from_utf8_lossy(&output.stderr).replace("\n  │ ", " ");
 
         assert_eq!(output.status.code(), Some(2), "{command:?}: {error}");
+        assert!(error.to_lowercase().starts_with("error:"), "{error}");
         assert!(error.contains(reason), "{command:?}: {error}");
     }
 }

@@ -107,7 +107,7 @@ fn what_is_unknown_is_refused_with_what_there_is() {
         ),
         (
             &["emotions", "--at", "hall@999"],
-            "has no tick 999; it has 11",
+            "has no tick 999: its last one is 10",
         ),
         (&["emotions", "--at", "hall"], "RUN@TICK"),
     ] {

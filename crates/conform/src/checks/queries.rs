@@ -391,8 +391,8 @@ pub(super) fn at_once(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFail
 
     let (mut harness, is_asking) = waiting::for_another(kit)?;
     if !is_asking {
-        let reason = "no fault was found, but the robot queried no other one, so that this was not checked while it \
-                      waits for another robot's answer";
+        let reason = "the robot answers while it waits for its news; it queried no other robot, so whether it does while \
+                      it waits for an answer was not checked";
         findings.skip("query.at-once", reason);
         return Ok(());
     }

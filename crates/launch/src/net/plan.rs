@@ -86,11 +86,34 @@ impl FaultPlan {
     /// # Errors
     /// [`FileError`] with line and caret.
     pub fn check(path: &Path) -> Result<usize, FileError> {
-        let source = Source::read(path)?;
+        Ok(Self::parse_any(&Source::read(path)?)?.faults.len())
+    }
+
+    /// Reads what a plan for the links of any robots does with the link of this one.
+    ///
+    /// # Errors
+    /// [`FileError`] with line and caret, or if the plan leaves the link alone.
+    pub fn load_of(path: &Path, robot: &RobotName) -> Result<Self, FileError> {
+        Self::parse_any(&Source::read(path)?)?.of(robot)
+    }
+
+    fn of(mut self, robot: &RobotName) -> Result<Self, FileError> {
+        let robots: Vec<&str> = self.robots().into_iter().map(RobotName::as_str).collect();
+        let robots = robots.join(", ");
+        self.faults.retain(|fault| fault.robot == *robot);
+
+        if self.faults.is_empty() {
+            return Err(FileError::new(format!(
+                "the plan has no fault of the link of {robot}, but of {robots}"
+            )));
+        }
+        Ok(self)
+    }
+
+    fn parse_any(source: &Source) -> Result<Self, FileError> {
         let raw: RawPlan = source.parse()?;
         let named = raw.faults.iter().map(|fault| fault.robot.get_ref().clone());
-        let robots = named.collect();
-        Ok(Self::parse(&source, &robots)?.faults.len())
+        Self::parse(source, &named.collect())
     }
 
     /// The partitions of a scenario as cuts of real links, at `speed` simulated seconds per second. Every link leads to the
@@ -355,6 +378,21 @@ mod tests {
         assert_eq!(shown("Butler", 1), "bandwidth 64000 bit/s");
         assert_eq!(shown("Butler", 2), "whole");
         assert!(plan.check_cuts_only("a namespace's link").is_err());
+    }
+
+    #[test]
+    fn a_proxy_plays_what_a_plan_for_several_links_does_with_its_own() {
+        let text =
+            fault("Leguin", "5 s", "5 s", "\"cut\"") + &fault("Butler", "1 s", "1 s", "\"cut\"");
+        let named = |name: &str| name.parse::<RobotName>().unwrap();
+        let plan = parse(&text).unwrap().of(&named("Butler")).unwrap();
+        assert_eq!(plan.robots(), BTreeSet::from([&named("Butler")]));
+
+        let error = parse(&text).unwrap().of(&named("Vonda")).unwrap_err();
+        assert_eq!(
+            error.in_words(),
+            "the plan has no fault of the link of Vonda, but of Butler, Leguin"
+        );
     }
 
     #[test]
