@@ -33,10 +33,12 @@ impl LeguinChecks {
         self.is_on_errand = true;
     }
 
-    /// She gives up.
-    pub(super) fn give_up(&mut self) {
+    /// She gives up; returns whether that was an errand, and not her wait after an exchange.
+    pub(super) fn give_up(&mut self) -> bool {
+        let was_on_errand = self.is_on_errand;
         self.is_lost = true;
         self.end_errand();
+        was_on_errand
     }
 
     /// Something brought her nearer to her goal: what was lost is past.

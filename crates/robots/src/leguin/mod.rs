@@ -505,8 +505,9 @@ impl Leguin {
             }
             LeguinAct::ComeHome => state.inputs.note(Input::Home),
             LeguinAct::GiveUp => {
-                state.checks.give_up();
-                state.beliefs.give_up();
+                if state.checks.give_up() {
+                    state.beliefs.give_up();
+                }
                 state.given_up += 1;
                 state.hurried = false;
                 state.way = Closing::default();
