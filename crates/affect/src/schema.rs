@@ -380,7 +380,7 @@ impl Node {
 /// let concerned = Schemata::standard().get("CONCERNED").ok_or("no schema")?;
 /// assert_eq!(
 ///     concerned.causal_chain.filled(&circumstances).spoken(),
-///     "I want to serve the guests; 7 treats are left; Leguin is not here; something bad can happen soon; \
+///     "I want to serve the guests; I have 7 treats left; Leguin is not here; something bad can happen soon; \
 ///      I do not want it; I do not know if it will happen; because of this I feel bad."
 /// );
 /// let path = Schemata::standard().path("CONCERNED");

@@ -22,6 +22,11 @@ use crate::named;
 const WIDTH: usize = 80;
 /// Columns of the names of components.
 const NAMES: usize = 22;
+/// What robots with beliefs publish of them, and what it means.
+const BELIEFS: [(&str, &str); 2] = [
+    ("belief", "whether the robot believes that it can"),
+    ("belief_because", "what made it believe so"),
+];
 /// Where unmarked emotions of a valence belong.
 const POSITIVE: &str = "positive emotion";
 const NEGATIVE: &str = "negative emotion";
@@ -312,7 +317,8 @@ fn components(variables: &StateVariables) -> String {
             Variable::Number(number) => {
                 let word = word(meaning.variable, *number, &IntensityLabel::CUTS);
                 let word = word.map(|word| format!(", {word}")).unwrap_or_default();
-                format!("{number:.2}{word}")
+                let decimals = if number.abs() < 0.005 { 4 } else { 2 };
+                format!("{number:.decimals$}{word}")
             }
             other => protocol::plain::escape_line(&other.to_string()),
         };
@@ -321,6 +327,13 @@ fn components(variables: &StateVariables) -> String {
             meaning.variable,
             &format!("{value}: {}", meaning.meaning),
         );
+    }
+
+    for (variable, meaning) in BELIEFS {
+        if let Some(value) = variables.get(variable).and_then(Variable::as_str) {
+            let value = protocol::plain::escape_line(value);
+            text += &line("  ", variable, &format!("{value}: {meaning}"));
+        }
     }
 
     let chain = variables.get(CAUSAL_CHAIN).and_then(Variable::as_str);

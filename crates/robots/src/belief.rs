@@ -150,8 +150,11 @@ impl Beliefs {
     }
 
     /// Continues with what a lost incarnation published. What encourages must be news to this one, too.
-    pub(crate) fn take_over(&mut self, last: &StateVariables) {
+    pub(crate) fn take_over(&mut self, last: &StateVariables, parameters: BeliefParameters) {
         self.was_encouraged = true;
+        if !parameters.beliefs.is_on() {
+            return;
+        }
         self.because = text(last, BECAUSE).unwrap_or_default().to_owned();
         self.belief = match text(last, BELIEF) {
             Some(CAN) => Belief::Can,

@@ -109,8 +109,20 @@ impl<M, B> SwitchableGenerator<M, B> {
         Ok(())
     }
 
-    /// Continues from what a lost incarnation published: its urgency, the emotion of its action tendency, and its mood.
-    pub(crate) fn take_over(&mut self, last: &StateVariables) {
+    /// Continues from what a lost incarnation published: its urgency, the emotion of its action tendency, and its mood. What a
+    /// script showed was not its own. Without beliefs it has none of their emotions, and has the one that leads to them.
+    pub(crate) fn take_over(&mut self, last: &StateVariables, has_beliefs: bool) {
+        if !self.switch.is_on() {
+            return;
+        }
+        if let Some(mood) = number(last, affect::frame::MOOD) {
+            let state = self.generator.state().clone();
+            self.generator.restore(state.with_mood(mood));
+        }
+        if !self.script.is_empty() {
+            return;
+        }
+
         let tendency = text(last, affect::frame::ACTION_TENDENCY);
         let emotion = StandardEmotion::ALL.into_iter().find(|emotion| {
             let schema = Schemata::standard().get(emotion.name());
@@ -118,15 +130,18 @@ impl<M, B> SwitchableGenerator<M, B> {
         });
         let urgency = number(last, affect::frame::URGENCY);
 
-        if let (Some(emotion), Some(urgency)) = (emotion, urgency)
-            && self.switch.is_on()
-        {
+        if let (Some(emotion), Some(urgency)) = (emotion, urgency) {
+            let emotion = match emotion {
+                StandardEmotion::Discouraged if !has_beliefs => StandardEmotion::Frustrated,
+                StandardEmotion::Hopeful if !has_beliefs => StandardEmotion::Concerned,
+                other => other,
+            };
             let urgency = Urgency::saturating(urgency);
             let state = self
                 .generator
                 .dynamics()
                 .taken_over(Feeling { emotion, urgency });
-            let mood = number(last, affect::frame::MOOD).unwrap_or(state.mood());
+            let mood = self.mood();
             self.generator.restore(state.with_mood(mood));
         }
     }

@@ -232,7 +232,7 @@ fn the_causal_chain_has_the_goal_and_whether_it_is_achieved() {
     assert_eq!(
         chain(&stage).spoken(),
         format!(
-            "I want to serve the guests; {treats} treats are left; Leguin is not here; something bad can happen soon; I do \
+            "I want to serve the guests; I have {treats} treats left; Leguin is not here; something bad can happen soon; I do \
              not want it; I do not know if it will happen; because of this I feel bad."
         )
     );

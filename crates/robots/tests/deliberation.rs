@@ -335,3 +335,18 @@ fn a_discouraged_robot_says_why_and_a_later_incarnation_still_knows() {
     }
     assert_eq!(belief(&stage, "Butler"), ["cannot", "2 chases given up"]);
 }
+
+#[test]
+fn a_discouraged_butler_does_not_act_by_what_he_repeats_or_sees_either() {
+    for more in ["resend = 'on'", "signals = 'on'"] {
+        let parameters = format!("{more}\n{BELIEFS}");
+        let mut stage = walled(0, butler(), &parameters);
+        assert!(stage.step_until(600.0, |stage| stage.emotion("Butler") == "DISCOURAGED"));
+        let sent = stage.commands_of("Butler").len();
+        while stage.emotion("Butler") == "DISCOURAGED" && stage.tick < 2400 {
+            stage.step();
+            assert_ne!(stage.behavior("Butler"), "INTERCEPT", "{more}");
+        }
+        assert!(stage.commands_of("Butler").len() <= sent + 1, "{more}");
+    }
+}

@@ -46,6 +46,14 @@ pub fn expectations(source: &Source, roster: &[RobotName]) -> Result<Vec<Expecta
     Ok(expectations)
 }
 
+/// Puts the mood that a robot had at the end of a run in the place of the run's name, in the content of a scenario file.
+///
+/// # Errors
+/// [`FileError`] if there is no such run, it is not over, or the robot has no mood in it.
+pub fn carry_moods_over(content: &mut toml::Table) -> Result<(), FileError> {
+    raw::mood::carry_all_over(content).map_err(FileError::new)
+}
+
 impl Scenario {
     /// Reads, changes and checks a scenario file.
     ///

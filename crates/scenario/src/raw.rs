@@ -4,7 +4,7 @@ pub(super) mod change;
 mod expect;
 pub(super) mod fault;
 mod guests;
-mod mood;
+pub(super) mod mood;
 mod network;
 mod numbers;
 mod place;

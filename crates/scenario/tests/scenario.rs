@@ -860,7 +860,7 @@ fn a_robot_begins_with_the_mood_in_which_it_ended_another_run() {
     let missing = shown(&in_the_mood_of("\"no such run\"").unwrap_err());
     assert!(missing.contains("there is no run no such run"), "{missing}");
     let unfinished = shown(&in_the_mood_of(&path).unwrap_err());
-    assert!(unfinished.contains("it is not over"), "{unfinished}");
+    assert!(unfinished.contains("one that is not over"), "{unfinished}");
     let number = shown(&in_the_mood_of("3").unwrap_err());
     assert!(number.contains("in quotation marks"), "{number}");
 

@@ -60,6 +60,11 @@ class BeliefParameters:
     beliefs: Literal["off"] = "off"
     discouraged_after: int = 2
 
+    def check(self) -> None:
+        """:raises ValueError: what is wrong with the values, if anything is."""
+        if self.discouraged_after < 1:
+            raise ValueError("deliberation.discouraged_after must be at least 1")
+
 
 @dataclass(frozen=True)
 class AppraisalParameters:
@@ -142,6 +147,7 @@ class Parameters:
             raise ValueError(f"haste_onset, {onset:g}, and haste_full, {full:g}, must ascend up to 1")
         self.dynamics.check()
         self.mood.check()
+        self.deliberation.check()
         if not 0.0 <= self.caution <= 1.0:
             raise ValueError(f"caution must lie in [0, 1], not {self.caution:g}")
 

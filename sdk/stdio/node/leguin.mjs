@@ -647,7 +647,13 @@ async function finishTick() {
 function known(defaults, given) {
   const unknown = Object.keys(given).find((name) => !(name in defaults));
   if (unknown) throw new Error(`there is no parameter ${unknown}`);
+  const wrong = Object.keys(given).find((name) => typeof given[name] !== typeof defaults[name]);
+  if (wrong) throw new Error(`${wrong} must be a ${typeof defaults[wrong]}, not ${JSON.stringify(given[wrong])}`);
   return { ...defaults, ...given };
+}
+
+function within(name, value, least, most) {
+  if (!(value >= least && value <= most)) throw new Error(`${name} must be from ${least} to ${most}, not ${value}`);
 }
 
 /** Back to the initial state; a former incarnation that was lost has published what it knew. */
@@ -658,10 +664,14 @@ async function begin(init) {
   dynamics = known(DYNAMICS, given ?? {});
   looks = known(APPRAISAL, appraisal ?? {});
   moodiness = known(MOOD, mood ?? {});
-  if (parameters.signals !== "off") throw new Error("she sees no signals here: signals is off");
-  if (parameters.scripted !== "felt") throw new Error("she has no script here: scripted is felt");
-  if ((recruitment?.by ?? "off") !== "off") throw new Error("she is not recruited here: recruitment.by is off");
-  if ((deliberation?.beliefs ?? "off") !== "off") throw new Error("she has no beliefs here: deliberation.beliefs is off");
+  within("mood.start", moodiness.start, -1, 1);
+  within("mood.weight", moodiness.weight, 0, 1);
+  within("mood.tau_s", moodiness.tau_s, Number.MIN_VALUE, Number.MAX_VALUE);
+  within("caution", parameters.caution, 0, 1);
+  if (parameters.signals !== "off") throw new Error("this Leguin sees no signals: set signals to off");
+  if (parameters.scripted !== "felt") throw new Error("this Leguin has no script: set scripted to felt");
+  if ((recruitment?.by ?? "off") !== "off") throw new Error("this Leguin is not recruited: set recruitment.by to off");
+  if ((deliberation?.beliefs ?? "off") !== "off") throw new Error("this Leguin has no beliefs: set deliberation.beliefs to off");
   const own = Stream.named(init.seed, init.stream);
   her = {
     at: init.location,
@@ -754,7 +764,11 @@ async function tick({ location, blocked = false, sensed = [], commands = [] }) {
 }
 
 for (let message = await receive(); message.type !== "end"; message = await receive()) {
-  if (message.type === "init") await begin(message);
-  else await tick(message);
+  if (message.type === "init") {
+    await begin(message).catch((error) => {
+      process.stderr.write(`error: ${error.message}\n`);
+      process.exit(1);
+    });
+  } else await tick(message);
 }
 process.exit(0);

@@ -170,3 +170,38 @@ fn a_mood_is_carried_over_to_the_next_run_which_depends_on_no_other_record() {
     let (_, text) = lab.fails(&[&museum[..], &["night", "--set", &from]].concat());
     assert!(text.contains("there is no run"), "{text}");
 }
+
+#[test]
+fn a_change_that_takes_beliefs_away_takes_their_emotions_too() {
+    let lab = Lab::new();
+    let off = "change=[{ at = \"100 s\", set = [\"robot.*.params.deliberation.beliefs=off\"] }]";
+    let pantry = [
+        "run",
+        "configs/pantry.toml",
+        "-q",
+        "--set",
+        "expect=[]",
+        "--set",
+        off,
+    ];
+    lab.ok(&[
+        &pantry[..],
+        &["--seed", "4", "--duration", "200 s", "--run", "off"],
+    ]
+    .concat());
+
+    let mut before = 0;
+    for tick in lab.recorded("off") {
+        for report in tick.reports.values() {
+            let is_of_belief = matches!(report.emotion_state.as_str(), "DISCOURAGED" | "HOPEFUL");
+            if tick.tick() < 200 {
+                before += usize::from(is_of_belief);
+            } else {
+                assert!(!is_of_belief, "tick {}", tick.tick());
+                assert!(report.state_variables.get("belief").is_none());
+            }
+        }
+    }
+    assert!(before > 0, "a robot was DISCOURAGED before");
+    lab.ok(&["verify", "off"]);
+}

@@ -112,9 +112,12 @@ impl Subject {
         check_faults(&scenario, 0)?;
         make_robots_with(&scenario, file, &|_, class| maker(class))?;
 
+        // The file of a finding depends on no run.
+        let mut content = source.parse()?;
+        scenario::carry_moods_over(&mut content)?;
         Ok(Self {
             file: file.to_owned(),
-            content: source.parse()?,
+            content,
             folder,
             scenario,
             maker,

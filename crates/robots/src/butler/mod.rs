@@ -195,8 +195,10 @@ impl Robot for Butler {
     }
 
     fn resume(&mut self, cars: &mut Cars<'_>, last: &StateVariables) {
-        self.state.take_over(last, self.parameters.treat_capacity);
-        self.emotion.take_over(last);
+        let beliefs = self.parameters.deliberation.beliefs();
+        self.state
+            .take_over(last, self.parameters.treat_capacity, beliefs);
+        self.emotion.take_over(last, beliefs.beliefs.is_on());
         self.resume_recruiting(last);
 
         // An exchange cannot be resumed in the middle; its need is still there, and the refiller may still be near.
@@ -574,7 +576,7 @@ impl Butler {
         let is_ready = state.refiller.is_unknown(stale_s)
             || matches!(refiller, Some("WAIT" | "REFILL" | "EXCHANGE"));
         let is_here = state.refiller.is_within(parameters.exchange_radius_m, cars);
-        let repeats_call = self.is_due(state.since_call_s) && state.need;
+        let repeats_call = self.is_due(state.since_call_s) && state.need && !self.despairs();
 
         ButlerContext {
             urge: self.urge(),
@@ -626,6 +628,12 @@ impl Butler {
         }
     }
 
+    /// Whether he does nothing about it any more: DISCOURAGED, he is not inclined to do anything \[I\].
+    fn despairs(&self) -> bool {
+        self.parameters.policy() == Policy::Emotion
+            && self.feeling().emotion == StandardEmotion::Discouraged
+    }
+
     /// How far he goes to be refilled, by his policy.
     fn urge(&self) -> Urge {
         let parameters = &self.parameters;
@@ -639,7 +647,11 @@ impl Butler {
                 let own = self
                     .deliberator
                     .urge(emotion, &self.state.mind, self.state.need);
-                own.max(self.signaled_urge())
+                if self.despairs() {
+                    own
+                } else {
+                    own.max(self.signaled_urge())
+                }
             }
             Policy::Rules => Urge::at(
                 self.pressure(),

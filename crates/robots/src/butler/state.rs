@@ -12,6 +12,7 @@ use super::checks::ButlerChecks;
 use super::deliberation::Mind;
 use super::parameters::ButlerParameters;
 use super::tables::{ButlerBehavior, ButlerMeasures};
+use crate::belief::BeliefParameters;
 use crate::chance::Chance;
 use crate::checks;
 use crate::closing::Closing;
@@ -258,7 +259,12 @@ impl ButlerMemory {
     }
 
     /// Continues from what a lost incarnation published. Estimates recover by themselves within seconds.
-    pub(super) fn take_over(&mut self, last: &StateVariables, capacity: u32) {
+    pub(super) fn take_over(
+        &mut self,
+        last: &StateVariables,
+        capacity: u32,
+        beliefs: BeliefParameters,
+    ) {
         self.treats = number(last, "treats")
             .map_or(capacity, saturated)
             .min(capacity);
@@ -275,6 +281,6 @@ impl ButlerMemory {
 
         self.start = location(last, "start_x_m", "start_y_m").unwrap_or(self.start);
         self.table = location(last, "table_x_m", "table_y_m");
-        self.mind.beliefs.take_over(last);
+        self.mind.beliefs.take_over(last, beliefs);
     }
 }

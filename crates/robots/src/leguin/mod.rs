@@ -192,8 +192,9 @@ impl Robot for Leguin {
     }
 
     fn resume(&mut self, cars: &mut Cars<'_>, last: &StateVariables) {
-        self.state.take_over(last);
-        self.emotion.take_over(last);
+        let beliefs = self.parameters.deliberation;
+        self.state.take_over(last, beliefs);
+        self.emotion.take_over(last, beliefs.beliefs.is_on());
         self.resume_shame(last);
 
         let name = text(last, "behavior");

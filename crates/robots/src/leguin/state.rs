@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::checks::LeguinChecks;
 use super::parameters::LeguinParameters;
 use super::tables::{Errand, LeguinBehavior, LeguinMeasures};
-use crate::belief::Beliefs;
+use crate::belief::{BeliefParameters, Beliefs};
 use crate::chance::Chance;
 use crate::checks;
 use crate::closing::Closing;
@@ -143,7 +143,7 @@ impl LeguinMemory {
     }
 
     /// Continues from what a lost incarnation published.
-    pub(super) fn take_over(&mut self, last: &StateVariables) {
+    pub(super) fn take_over(&mut self, last: &StateVariables, beliefs: BeliefParameters) {
         self.hurried = flag(last, "hurried");
         self.pending = match text(last, "pending") {
             Some(REFILL) => Some(Errand::Refill),
@@ -152,7 +152,7 @@ impl LeguinMemory {
         };
         self.trips = count(last, "trips");
         self.given_up = count(last, "given_up");
-        self.beliefs.take_over(last);
+        self.beliefs.take_over(last, beliefs);
         self.home = location(last, "home_x_m", "home_y_m").unwrap_or(self.home);
     }
 }

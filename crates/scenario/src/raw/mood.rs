@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use config::Source;
+use config::{Source, bulk};
 use protocol::RobotName;
 use toml::{Table, Value};
 
@@ -46,6 +46,38 @@ pub(super) fn carry_over(
     Ok(())
 }
 
+/// Does so for all robots of a file's content, for a file that is written from it.
+pub(in super::super) fn carry_all_over(content: &mut Table) -> Result<(), String> {
+    let robots = content.get_mut("robot").and_then(Value::as_array_mut);
+    let Some(robots) = robots else {
+        return Ok(());
+    };
+    let names_a_run = |robot: &Value| {
+        let mut value = Some(robot);
+        for key in FROM {
+            value = value.and_then(|value| value.get(key));
+        }
+        value.is_some()
+    };
+    if !robots.iter().any(names_a_run) {
+        return Ok(());
+    }
+
+    // Robots of one table had moods of their own.
+    bulk::separate_all(robots);
+    for robot in robots {
+        let name = robot
+            .get("name")
+            .and_then(Value::as_str)
+            .map(RobotName::new);
+        let parameters = robot.get_mut(FROM[0]).and_then(Value::as_table_mut);
+        if let (Some(Ok(name)), Some(parameters)) = (name, parameters) {
+            carry_over(parameters, &name, true)?;
+        }
+    }
+    Ok(())
+}
+
 /// The mood that the robot published last in a run.
 fn last_mood(run: &str, robot: &RobotName) -> Result<f64, String> {
     let candidates: [PathBuf; 2] = [Path::new(RUNS).join(run), PathBuf::from(run)];
@@ -58,7 +90,8 @@ fn last_mood(run: &str, robot: &RobotName) -> Result<f64, String> {
     let file = folder.join(SUMMARY);
     if !file.is_file() {
         return Err(format!(
-            "mood.from: the run {run} has no {SUMMARY}: it is not over"
+            "mood.from: there is no {SUMMARY} in {}: it is not a run, or one that is not over",
+            folder.display()
         ));
     }
     let source = Source::read(&file).map_err(|error| format!("mood.from: {error}"))?;
