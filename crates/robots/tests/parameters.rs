@@ -30,6 +30,7 @@ fn in_si(value: &toml::Value) -> serde_json::Value {
                 let factor = match unit {
                     "ft" | "ft/s" => FT_M,
                     "s" => 1.0,
+                    "h" => 3600.0,
                     _ => return None,
                 };
                 Some(number.parse::<f64>().ok()? * factor)

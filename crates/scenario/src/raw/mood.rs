@@ -47,7 +47,7 @@ pub(super) fn carry_over(
 }
 
 /// Does so for all robots of a file's content, for a file that is written from it.
-pub(in super::super) fn carry_all_over(content: &mut Table) -> Result<(), String> {
+pub(crate) fn carry_all_over(content: &mut Table) -> Result<(), String> {
     let robots = content.get_mut("robot").and_then(Value::as_array_mut);
     let Some(robots) = robots else {
         return Ok(());
