@@ -57,6 +57,15 @@ pub(crate) enum Encouragement {
 }
 
 impl Encouragement {
+    /// What encourages of the two, the nearer one first.
+    pub(crate) fn of(is_near: bool, comes: bool) -> Option<Self> {
+        if is_near {
+            Some(Self::IsNear)
+        } else {
+            comes.then_some(Self::Comes)
+        }
+    }
+
     fn words(self) -> &'static str {
         match self {
             Self::IsNear => "is near",

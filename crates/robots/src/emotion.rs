@@ -7,6 +7,7 @@ use affect::{
 };
 use robot::{Cars, StateVariables};
 
+use crate::policy::Policy;
 use crate::published::{number, text};
 use crate::script::{Script, ScriptRole};
 use crate::switch::Switch;
@@ -81,6 +82,12 @@ impl<M, B> SwitchableGenerator<M, B> {
         self.switch.is_on() && self.feeling().emotion == StandardEmotion::Happy
     }
 
+    /// Whether a robot that acts by this policy does nothing about its goal any more: DISCOURAGED, it is not inclined to do
+    /// anything \[I\].
+    pub(crate) fn despairs(&self, policy: Policy) -> bool {
+        policy == Policy::Emotion && self.feeling().emotion == StandardEmotion::Discouraged
+    }
+
     /// The name under which the emotion is published.
     pub(crate) fn name(&self) -> &'static str {
         self.shown()
@@ -115,14 +122,23 @@ impl<M, B> SwitchableGenerator<M, B> {
         if !self.switch.is_on() {
             return;
         }
-        if let Some(mood) = number(last, affect::frame::MOOD) {
-            let state = self.generator.state().clone();
-            self.generator.restore(state.with_mood(mood));
-        }
-        if !self.script.is_empty() {
-            return;
-        }
 
+        let taken_over = if self.script.is_empty() {
+            self.taken_over(last, has_beliefs)
+        } else {
+            None
+        };
+        let mood = number(last, affect::frame::MOOD).unwrap_or(self.mood());
+        let state = taken_over.unwrap_or(self.save());
+        self.generator.restore(state.with_mood(mood));
+    }
+
+    /// The state of the emotion that a lost incarnation published; `None` if it published none.
+    fn taken_over(
+        &self,
+        last: &StateVariables,
+        has_beliefs: bool,
+    ) -> Option<EmotionState<StandardEmotion>> {
         let tendency = text(last, affect::frame::ACTION_TENDENCY);
         let emotion = StandardEmotion::ALL.into_iter().find(|emotion| {
             let schema = Schemata::standard().get(emotion.name());
@@ -130,19 +146,13 @@ impl<M, B> SwitchableGenerator<M, B> {
         });
         let urgency = number(last, affect::frame::URGENCY);
 
-        if let (Some(emotion), Some(urgency)) = (emotion, urgency) {
-            let emotion = match emotion {
-                StandardEmotion::Discouraged if !has_beliefs => StandardEmotion::Frustrated,
-                StandardEmotion::Hopeful if !has_beliefs => StandardEmotion::Concerned,
-                other => other,
-            };
-            let urgency = Urgency::saturating(urgency);
-            let state = self
-                .generator
-                .dynamics()
-                .taken_over(Feeling { emotion, urgency });
-            let mood = self.mood();
-            self.generator.restore(state.with_mood(mood));
-        }
+        let emotion = match emotion? {
+            StandardEmotion::Discouraged if !has_beliefs => StandardEmotion::Frustrated,
+            StandardEmotion::Hopeful if !has_beliefs => StandardEmotion::Concerned,
+            other => other,
+        };
+        let urgency = Urgency::saturating(urgency?);
+        let dynamics = self.generator.dynamics();
+        Some(dynamics.taken_over(Feeling { emotion, urgency }))
     }
 }

@@ -24,19 +24,6 @@ fn deaf(seed: u64) -> Stage {
     stage
 }
 
-/// Leguin behind a wall, on her way to a Butler with treats for ever.
-fn walled_in() -> Stage {
-    let mut stage = Stage::pair(1, "treat_mean_s = 1e9", "");
-    stage.obstacles = (0..12)
-        .flat_map(|i| {
-            let along = 2.0 * f64::from(i) + 1.0;
-            [feet(along, 9.0), feet(9.0, along)]
-        })
-        .collect();
-    stage.command("Leguin", "refill");
-    stage
-}
-
 fn text(stage: &Stage, robot: &str, variable: &str) -> String {
     stage.report(robot).state_variables[variable].to_string()
 }
@@ -156,7 +143,7 @@ fn a_leguin_who_is_told_to_hurry_holds_butler_responsible() {
 
 #[test]
 fn a_leguin_who_is_blocked_holds_the_crowd_responsible_and_fails_her_own_standards() {
-    let mut stage = walled_in();
+    let mut stage = Stage::walled_in("");
     assert!(stage.step_until(10.0, |stage| stage.behavior("Leguin") == "REFILL"));
     assert_eq!(stage.number("Leguin", "internal_standards"), 1.0);
     assert_eq!(stage.number("Leguin", "external_norms"), 1.0);

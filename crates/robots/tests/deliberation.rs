@@ -251,25 +251,12 @@ fn belief(stage: &Stage, robot: &str) -> [String; 2] {
     })
 }
 
-/// Leguin behind a wall, called to a Butler with treats for ever, whose gate is the last of the obstacles.
-fn walled_leguin(leguin: &str) -> Stage {
-    let mut stage = Stage::pair(1, "treat_mean_s = 1e9", leguin);
-    stage.obstacles = (0..12)
-        .flat_map(|i| {
-            let along = 2.0 * f64::from(i) + 1.0;
-            [feet(along, 9.0), feet(9.0, along)]
-        })
-        .collect();
-    stage.command("Leguin", "refill");
-    stage
-}
-
 const DESPAIRING: &str =
     "block_patience_s = 10.0\ndeliberation = { beliefs = 'on', discouraged_after = 1 }";
 
 #[test]
 fn a_leguin_who_believes_that_she_cannot_is_discouraged_and_does_not_set_out() {
-    let mut stage = walled_leguin(DESPAIRING);
+    let mut stage = Stage::walled_in(DESPAIRING);
     assert!(stage.step_until(120.0, |stage| stage.emotion("Leguin") == "DISCOURAGED"));
     assert_eq!(belief(&stage, "Leguin"), ["cannot", "1 errand given up"]);
     assert_eq!(
@@ -290,7 +277,7 @@ fn a_leguin_who_believes_that_she_cannot_is_discouraged_and_does_not_set_out() {
 
 #[test]
 fn a_discouraged_leguin_is_hopeful_and_sets_out_when_the_waiter_is_near() {
-    let mut stage = walled_leguin(DESPAIRING);
+    let mut stage = Stage::walled_in(DESPAIRING);
     assert!(stage.step_until(120.0, |stage| stage.emotion("Leguin") == "DISCOURAGED"));
     assert!(stage.step_until(60.0, |stage| stage.behavior("Leguin") == "WAIT"));
     stage.command("Leguin", "refill");
@@ -311,7 +298,7 @@ fn a_discouraged_leguin_is_hopeful_and_sets_out_when_the_waiter_is_near() {
 
 #[test]
 fn without_beliefs_leguin_sets_out_again_and_again() {
-    let mut stage = walled_leguin("block_patience_s = 10.0");
+    let mut stage = Stage::walled_in("block_patience_s = 10.0");
     for _ in 0..3 {
         assert!(stage.step_until(60.0, |stage| stage.behavior("Leguin") == "GO_HOME"));
         assert!(stage.step_until(60.0, |stage| stage.behavior("Leguin") == "WAIT"));

@@ -82,6 +82,15 @@ const UNPLEASANT_FIRST: &[(&str, Case)] = &[
     ("CONFIDENT", |tick| tick.is("CONFIDENT")),
     ("HAPPY", |tick| tick.is("HAPPY")),
 ];
+/// The last one is HAPPY: at the table her controllability says nothing.
+const UNPLEASANT_ON_HER_WAY_FIRST: &[(&str, Case)] = &[
+    ("FRUSTRATED", |tick| tick.is("FRUSTRATED")),
+    ("CONCERNED on her way", |tick| {
+        tick.is("CONCERNED") && tick.behavior == "REFILL"
+    }),
+    ("CONFIDENT", |tick| tick.is("CONFIDENT")),
+    ("HAPPY", |tick| tick.is("HAPPY")),
+];
 const PLEASANT_FIRST: &[(&str, Case)] = &[
     ("HAPPY", |tick| tick.is("HAPPY")),
     ("CONFIDENT", |tick| tick.is("CONFIDENT")),
@@ -140,27 +149,14 @@ const DIRECTIONS: &[Direction] = &[
         "goal_congruence",
         CROWD,
         "Leguin",
-        &[
-            ("FRUSTRATED", |tick| tick.is("FRUSTRATED")),
-            ("CONCERNED on her way", |tick| {
-                tick.is("CONCERNED") && tick.behavior == "REFILL"
-            }),
-            ("CONFIDENT", |tick| tick.is("CONFIDENT")),
-            ("HAPPY", |tick| tick.is("HAPPY")),
-        ],
+        UNPLEASANT_ON_HER_WAY_FIRST,
     ),
     direction("controllability", HALL, "Butler", UNPLEASANT_FIRST),
     direction(
         "controllability",
         CROWD,
         "Leguin",
-        &[
-            ("FRUSTRATED", |tick| tick.is("FRUSTRATED")),
-            ("CONCERNED on her way", |tick| {
-                tick.is("CONCERNED") && tick.behavior == "REFILL"
-            }),
-            ("CONFIDENT", |tick| tick.is("CONFIDENT")),
-        ],
+        UNPLEASANT_ON_HER_WAY_FIRST.split_at(3).0,
     ),
     direction("controllability", PANTRY, "Butler", DESPAIRING),
     direction("controllability", PANTRY, "Leguin", DESPAIRING),

@@ -46,9 +46,9 @@ impl Butler {
     ///
     /// Goal congruence is the pressure: 1 for none, -1 for one that saturates his emotion. Novelty is that of the pressure.
     /// Controllability is the share of what he can do about it that he has not done yet: to call, to ask to hurry, to
-    /// intercept; none while he believes that he cannot. The situation changes without him if the refiller comes, refills him, or has an errand. Certainty falls with
-    /// the age of her last answer. What he owes are treats for those who reach for one, and what he expects of himself is a
-    /// tray that is never empty.
+    /// intercept; none while he believes that he cannot. The situation changes without him if the refiller comes, refills him,
+    /// or has an errand. Certainty falls with the age of her last answer. What he owes are treats for those who reach for one,
+    /// and what he expects of himself is a tray that is never empty.
     fn appraisal(&self, cars: &Cars<'_>) -> Appraisal {
         let state = &self.state;
         let checks = &state.checks;

@@ -466,16 +466,17 @@ impl Butler {
         let sensing_range_m = cars.welcome().sensing_range_m;
         let comes_nearer =
             state.refiller_left && state.approach.speed_mps() > self.parameters.v_serve_mps;
-        let encouragement = if state.refiller.is_within(sensing_range_m, cars) {
-            Some(Encouragement::IsNear)
-        } else {
-            comes_nearer.then_some(Encouragement::Comes)
-        };
+        let is_near = state.refiller.is_within(sensing_range_m, cars);
 
         let parameters = self.parameters.deliberation.beliefs();
         let refiller = state.refiller.name();
         let beliefs = &mut state.mind.beliefs;
-        if beliefs.update(parameters, "chase", refiller, encouragement) {
+        if beliefs.update(
+            parameters,
+            "chase",
+            refiller,
+            Encouragement::of(is_near, comes_nearer),
+        ) {
             state.inputs.note(Input::Encouraged);
         }
     }
@@ -576,7 +577,9 @@ impl Butler {
         let is_ready = state.refiller.is_unknown(stale_s)
             || matches!(refiller, Some("WAIT" | "REFILL" | "EXCHANGE"));
         let is_here = state.refiller.is_within(parameters.exchange_radius_m, cars);
-        let repeats_call = self.is_due(state.since_call_s) && state.need && !self.despairs();
+        let repeats_call = self.is_due(state.since_call_s)
+            && state.need
+            && !self.emotion.despairs(parameters.policy());
 
         ButlerContext {
             urge: self.urge(),
@@ -620,18 +623,13 @@ impl Butler {
         let shown = self.state.refiller.emotion(self.parameters.query_stale_s);
         let is_signaled = self.parameters.signals.is_on()
             && self.state.need
+            && !self.emotion.despairs(self.parameters.policy())
             && shown == Some(StandardEmotion::Frustrated);
         if is_signaled {
             Urge::Intercept
         } else {
             Urge::None
         }
-    }
-
-    /// Whether he does nothing about it any more: DISCOURAGED, he is not inclined to do anything \[I\].
-    fn despairs(&self) -> bool {
-        self.parameters.policy() == Policy::Emotion
-            && self.feeling().emotion == StandardEmotion::Discouraged
     }
 
     /// How far he goes to be refilled, by his policy.
@@ -647,11 +645,7 @@ impl Butler {
                 let own = self
                     .deliberator
                     .urge(emotion, &self.state.mind, self.state.need);
-                if self.despairs() {
-                    own
-                } else {
-                    own.max(self.signaled_urge())
-                }
+                own.max(self.signaled_urge())
             }
             Policy::Rules => Urge::at(
                 self.pressure(),

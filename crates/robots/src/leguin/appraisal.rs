@@ -15,12 +15,9 @@ impl Leguin {
     /// Judges this moment, and follows the episode of her emotion.
     pub(super) fn check(&mut self, cars: &Cars<'_>) {
         let pressure = urgency(&self.state.measures, &self.behavior()).value();
+        let prediction_s = self.parameters.appraisal.prediction_s;
         let checks = &mut self.state.checks;
-        checks.measure(
-            pressure,
-            self.parameters.appraisal.prediction_s,
-            cars.tick_s(),
-        );
+        checks.measure(pressure, prediction_s, cars.tick_s());
 
         self.state.appraisal = self.appraisal(pressure);
         self.follow_episode(cars.tick_s());
@@ -43,10 +40,10 @@ impl Leguin {
     ///
     /// Goal congruence is the pressure of her errand: 1 for none, -1 where her patience ends. Novelty is that of the pressure.
     /// Controllability is the share of her patience with a blocked way that is left. After she gave up an errand it is lost, and
-    /// nothing can be done about it, until something brings her nearer to her goal again, or while she believes that she cannot. The situation changes without her if the
-    /// waiter comes to meet her or takes treats, or, while she waits at the table, may call; a crowd in her way may move.
-    /// Certainty falls with the time since she last knew where the waiter is. What she owes are answers to his calls, and what
-    /// she expects of herself are errands that she completes.
+    /// nothing can be done about it, until something brings her nearer to her goal again, or while she believes that she cannot.
+    /// The situation changes without her if the waiter comes to meet her or takes treats, or, while she waits at the table, may
+    /// call; a crowd in her way may move. Certainty falls with the time since she last knew where the waiter is. What she owes
+    /// are answers to his calls, and what she expects of herself are errands that she completes.
     fn appraisal(&self, pressure: f64) -> Appraisal {
         let measures = &self.state.measures;
         let waiter = &self.state.waiter;

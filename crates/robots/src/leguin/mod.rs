@@ -311,16 +311,17 @@ impl Leguin {
         let state = &mut self.state;
         let sensing_range_m = cars.welcome().sensing_range_m;
         let comes = state.waiter.behavior(self.parameters.query_stale_s) == Some("INTERCEPT");
-        let encouragement = if state.waiter.is_within(sensing_range_m, cars) {
-            Some(Encouragement::IsNear)
-        } else {
-            comes.then_some(Encouragement::Comes)
-        };
+        let is_near = state.waiter.is_within(sensing_range_m, cars);
 
         let parameters = self.parameters.deliberation;
         let waiter = state.waiter.name();
         let beliefs = &mut state.beliefs;
-        if beliefs.update(parameters, "errand", waiter, encouragement) {
+        if beliefs.update(
+            parameters,
+            "errand",
+            waiter,
+            Encouragement::of(is_near, comes),
+        ) {
             state.inputs.note(Input::Encouraged);
         }
     }
@@ -443,19 +444,13 @@ impl Leguin {
             gives_up: self.gives_up(),
             is_happy: parameters.schematic.is_on() && self.emotion.is_happy(),
             pending: state.pending,
-            despairs: self.despairs(),
+            despairs: self.emotion.despairs(parameters.policy()),
             waiter_is_needy_here: self.is_needed() && waiter_is_here,
             exchange_is_over: self.bsg.has_lasted(parameters.exchange_s),
             sent_home: state.sent_home,
             is_home: self.is_home(),
             has_joke: state.jokes.are_due(),
         }
-    }
-
-    /// Whether she does not set out any more: DISCOURAGED, she is not inclined to do anything \[I\].
-    fn despairs(&self) -> bool {
-        self.parameters.policy() == Policy::Emotion
-            && self.feeling().emotion == StandardEmotion::Discouraged
     }
 
     /// Whether she turns back, by her policy. Not before she has set out: what frustrated her before is over.

@@ -151,6 +151,19 @@ impl Stage {
         stage
     }
 
+    /// Leguin with these parameters behind a wall, called by a Butler with treats for ever.
+    pub(crate) fn walled_in(leguin: &str) -> Self {
+        let mut stage = Self::pair(1, "treat_mean_s = 1e9", leguin);
+        stage.obstacles = (0..12)
+            .flat_map(|i| {
+                let along = 2.0 * f64::from(i) + 1.0;
+                [feet(along, 9.0), feet(9.0, along)]
+            })
+            .collect();
+        stage.command("Leguin", "refill");
+        stage
+    }
+
     /// Tick 0.
     pub(crate) fn begin(&mut self) {
         self.exchange(&BTreeMap::new());
