@@ -249,7 +249,7 @@ fn felt(run: &RunName, tick: Tick, tick_s: f64, robot: &RobotName, report: &Repo
 
     text += &place(emotion, valence);
     if let Some(mood) = variables.get(MOOD).and_then(Variable::as_f64) {
-        text += &place_of_mood(mood);
+        text += &place_of_mood(mood, valence);
     }
     text.push('\n');
     text += &components(variables);
@@ -285,17 +285,23 @@ fn place(emotion: &str, valence: f64) -> String {
     text
 }
 
-/// The node of a mood in the tree, with a mark, below the one of its valence; empty for a mood of 0, which is neither.
-fn place_of_mood(mood: f64) -> String {
+/// The node of a mood in the tree, with a mark, below the one of its valence, which is there already if the emotion has the same
+/// one; empty for a mood of 0, which is neither.
+fn place_of_mood(mood: f64, valence: f64) -> String {
     let name = match mood {
         _ if mood < 0.0 => "negative mood",
         _ if mood > 0.0 => "positive mood",
         _ => return String::new(),
     };
     let path = Schemata::standard().path(name);
+    let shown = if (mood < 0.0) == (valence < 0.0) {
+        2
+    } else {
+        1
+    };
 
     let mut text = String::new();
-    for (depth, node) in path.iter().enumerate().skip(1) {
+    for (depth, node) in path.iter().enumerate().skip(shown) {
         let mark = if node.name == name { "> " } else { "  " };
         text += &format!("{mark}{}{}\n", "  ".repeat(depth), node.name);
     }

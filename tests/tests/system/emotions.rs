@@ -53,6 +53,9 @@ fn a_moment_of_a_run_has_its_place_in_the_tree_and_all_components() {
         felt.lines().any(|line| line == ">     positive mood"),
         "{felt}"
     );
+    let happy = lab.ok(&["emotions", "Leguin", "--at", "hall@1200"]);
+    assert_eq!(happy.matches("positive affect").count(), 1, "{happy}");
+    assert!(happy.contains("\n>     positive mood\n"), "{happy}");
     for name in [
         "mood",
         "valence",
