@@ -302,6 +302,8 @@ pub enum Cause {
     Burst,
     /// The two are cut off from each other.
     Partition,
+    /// The two are farther apart than their radios reach.
+    OutOfRange,
     /// The target missed the tick in which it arrived.
     Missed,
     /// More arrives at the target in this tick than its news hold.
@@ -318,6 +320,7 @@ impl std::fmt::Display for Cause {
             Self::Loss => "by chance",
             Self::Burst => "in a burst",
             Self::Partition => "in a partition",
+            Self::OutOfRange => "out of range",
             Self::Missed => "because the robot missed the tick",
             Self::Overflow => "because too much arrives at once",
             Self::Unknown => "because there is no such robot",

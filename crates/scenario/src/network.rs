@@ -16,6 +16,15 @@ pub struct Network {
     pub partitions: Vec<Partition>,
     /// Single commands that are lost.
     pub lost: Vec<LostCommand>,
+    /// How far the robots' radios reach; `None` for any distance.
+    pub radio: Option<Radio>,
+}
+
+/// The radios of the robots.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Radio {
+    /// Greatest distance between the centers of two robots at which a message passes, meters.
+    pub range_m: f64,
 }
 
 /// A single command that is lost, whatever chance decides. Commands are counted over the epoch, whatever incarnation of the

@@ -6,7 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use protocol::event::{Cause, Event};
-use protocol::messages::{CommandText, Cut, Delivery};
+use protocol::messages::{CommandText, Cut, Delivery, Point};
 use protocol::random::{Stream, stream, unit};
 use protocol::{RobotName, Seq, Tick};
 
@@ -85,7 +85,7 @@ const MAX_DELIVERED_BYTES: usize = 512 * 1024;
 type Pair = (RobotName, RobotName);
 
 /// The decisions of the network at the beginning of a tick.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct NetworkDecisions {
     /// Commands that arrive in this tick, by target, ordered by sender and number. A duplicated command is in the list twice.
     pub delivered: BTreeMap<RobotName, Vec<Arrival>>,
@@ -110,6 +110,8 @@ pub struct Medium {
     bursts: BTreeMap<(MessageKind, Pair), BurstState>,
     /// Links that are cut now.
     cut: BTreeMap<Pair, Scope>,
+    /// Where the robots of the roster stand now, if that matters.
+    places: Vec<Point>,
     /// Number of commands sent so far on each link, and of those with texts that the scenario names.
     counts: BTreeMap<Counted, u64>,
 }
@@ -168,6 +170,7 @@ impl Medium {
             arrivals: BTreeMap::new(),
             bursts: BTreeMap::new(),
             cut: BTreeMap::new(),
+            places: Vec::new(),
             counts: BTreeMap::new(),
         };
 
@@ -211,9 +214,10 @@ impl Medium {
         self.sent.push(command);
     }
 
-    /// The decisions at the beginning of `tick`.
-    pub fn decide(&mut self, tick: Tick) -> NetworkDecisions {
+    /// The decisions at the beginning of `tick`, in which the robots of the roster stand at these places.
+    pub fn decide(&mut self, tick: Tick, places: &[Point]) -> NetworkDecisions {
         let mut decision = NetworkDecisions::default();
+        self.places = places.to_vec();
         // Cuts come first, so that a command which is sent or arrives in the tick in which a cut begins is lost. Bursts advance before
         // any command draws. What arrives in this tick includes what was decided in it.
         self.update_cuts(tick, &mut decision.events);
@@ -399,6 +403,9 @@ impl Medium {
         if cut.contains(kind) {
             return Some(Cause::Partition);
         }
+        if self.is_out_of_range(pair) {
+            return Some(Cause::OutOfRange);
+        }
         if drawn < channel.loss {
             return Some(Cause::Loss);
         }
@@ -406,6 +413,18 @@ impl Medium {
         let state = self.bursts.get(&(kind, pair.clone()))?;
         let burst = channel.burst.filter(|_| state.is_bad)?;
         (drawn < burst.loss).then_some(Cause::Burst)
+    }
+
+    /// Whether two robots of the roster are farther apart than their radios reach.
+    fn is_out_of_range(&self, (from, to): &Pair) -> bool {
+        let Some(radio) = self.network.radio else {
+            return false;
+        };
+        let place = |robot| self.places.get(self.roster.binary_search(robot).ok()?);
+        match (place(from), place(to)) {
+            (Some(from), Some(to)) => from.distance_m(*to) > radio.range_m,
+            _ => false,
+        }
     }
 
     fn deliver(&mut self, tick: Tick, decision: &mut NetworkDecisions) {
@@ -447,16 +466,20 @@ impl Medium {
 
     /// Decides once for each asker, target and tick whether queries are answered, for which both directions are needed.
     fn decide_queries(&self, tick: Tick, decision: &mut NetworkDecisions) {
-        let is_perfect = self.cut.is_empty() && !self.network.touches_queries();
-        if is_perfect {
+        let is_drawn = self.network.touches_queries();
+        if self.cut.is_empty() && !is_drawn && self.network.radio.is_none() {
             return;
         }
 
         for (asker, target) in pairs(&self.roster) {
             // Nothing is drawn in turn, so it does not matter for which pairs, and in which ticks, this is reached.
             let answer_is_cut = self.is_cut(&target, &asker, MessageKind::Queries);
-            let name = format!("medium/query/{tick}/{asker}/{target}");
-            let drawn = unit(&mut stream(self.seed, &name));
+            let drawn = if is_drawn {
+                let name = format!("medium/query/{tick}/{asker}/{target}");
+                unit(&mut stream(self.seed, &name))
+            } else {
+                1.0
+            };
             let pair = (asker.clone(), target.clone());
             let channel = self.channel(MessageKind::Queries, &pair);
             let lost = self.loss(MessageKind::Queries, &channel, &pair, drawn);
@@ -464,7 +487,7 @@ impl Medium {
                 continue;
             }
 
-            // A partition has its own events, so only random losses are recorded.
+            // A partition has its own events, and distance follows from places: only random losses are recorded.
             if let Some(because @ (Cause::Loss | Cause::Burst)) = lost
                 && !answer_is_cut
             {

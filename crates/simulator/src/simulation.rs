@@ -233,7 +233,8 @@ impl Simulation {
         let verdicts = self.world.advance_with(&self.proposals(), &reactions);
         self.note_moves(&verdicts);
 
-        let decision = self.medium.decide(self.now);
+        let places = self.world.robots().iter().copied().map(to_wire);
+        let decision = self.medium.decide(self.now, &places.collect::<Vec<_>>());
         self.events.extend(decision.events);
         self.arriving = decision.delivered;
         // Beside the network's decisions: robots that have no state of the last tick to answer with.

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use protocol::event::Cause;
-use protocol::messages::{CommandText, Performative};
+use protocol::messages::{CommandText, Performative, Point};
 use protocol::{Event, RobotName};
 use scenario::Scenario;
 use scenario::diagnostic::{FileError, Source};
@@ -58,7 +58,7 @@ fn play(
     let one = |tick: u64| {
         medium.accept(command("A", "B", tick));
         also(tick, &mut medium);
-        (tick + 1, medium.decide(tick + 1))
+        (tick + 1, medium.decide(tick + 1, &[]))
     };
     (1..=ticks).map(one).collect()
 }
@@ -365,7 +365,7 @@ fn lost_queries_are_one_verdict_for_asker_target_and_tick() {
 fn a_person_at_the_console_is_not_on_the_robots_network() {
     let mut medium = medium("network.commands = { loss = 1.0, delay = \"5 s\" }");
     medium.accept(command("operator", "A", 1));
-    let decision = medium.decide(2);
+    let decision = medium.decide(2, &[]);
     assert!(decision.events.is_empty() && decision.delivered[&name("A")].len() == 1);
 }
 
@@ -421,7 +421,7 @@ fn a_command_is_counted_from_the_beginning_of_the_run() {
             medium.set_network(later.clone());
         }
         medium.accept(command("A", "B", tick));
-        decisions.insert(tick + 1, medium.decide(tick + 1));
+        decisions.insert(tick + 1, medium.decide(tick + 1, &[]));
     }
     assert_eq!(lost(&decisions), [(5, Cause::Scripted)]);
 }
@@ -498,7 +498,7 @@ fn impossible_networks_are_refused_where_they_stand() {
 #[test]
 fn the_resolved_file_has_the_same_network() {
     let network = "[network]\ncommands = { loss = 0.25, duplication = 0.1, delay = \"1 s\", burst = { enter = 0.1, leave = 0.5 } }\n\
-                   queries = { loss = 0.1 }\n[[network.link]]\nfrom = \"A\"\nto = \"B\"\ncommands = { loss = 1.0 }\n\
+                   queries = { loss = 0.1 }\nradio = { range = \"4.5 m\" }\n[[network.link]]\nfrom = \"A\"\nto = \"B\"\ncommands = { loss = 1.0 }\n\
                    [[network.partition]]\ngroups = [[\"A\"], [\"B\", \"C\"]]\nfrom = \"5 s\"\nuntil = \"7 s\"\none_way = true\ncuts = [\"queries\"]\n\
                    [[network.lose]]\nfrom = \"A\"\nto = \"B\"\nnumber = 3\ntext = \"refill\"\n\
                    [[network.lose]]\nfrom = \"B\"\nto = \"A\"\nnumber = 1\n";
@@ -514,4 +514,58 @@ fn the_resolved_file_has_the_same_network() {
     .unwrap();
 
     assert_eq!(again.network, scenario.network);
+}
+
+#[test]
+fn a_message_passes_as_far_as_the_radios_reach_and_no_farther() {
+    let mut medium = medium("network.radio = { range = \"5 m\" }");
+    let [at_the_limit, beyond] = [3.0, 3.0 + 1e-9].map(|x| [Point::default(), Point::new(x, 4.0)]);
+
+    medium.accept(command("A", "B", 1));
+    let decision = medium.decide(2, &at_the_limit);
+    assert_eq!(decision.delivered[&name("B")].len(), 1);
+    assert!(decision.unreachable.is_empty() && decision.events.is_empty());
+
+    medium.accept(command("A", "B", 2));
+    medium.accept(command("operator", "B", 1));
+    let decision = medium.decide(3, &beyond);
+    assert_eq!(
+        lost(&BTreeMap::from([(3, decision.clone())])),
+        [(2, Cause::OutOfRange)]
+    );
+    assert_eq!(decision.delivered[&name("B")].len(), 1, "the operator's");
+    assert_eq!(decision.unreachable[&name("A")], [name("B")]);
+    assert_eq!(decision.unreachable[&name("B")], [name("A")]);
+}
+
+#[test]
+fn distance_changes_no_chance_of_the_messages_that_are_in_range() {
+    let rules = "network.commands = { loss = 0.5 }\nnetwork.queries = { loss = 0.5 }";
+    let mut near = medium(rules);
+    let mut moving = medium(&format!("{rules}\nnetwork.radio = {{ range = \"5 m\" }}"));
+    let places = |x| [Point::default(), Point::new(x, 0.0)];
+    let mut in_range = 0;
+    for tick in 1..=200 {
+        near.accept(command("A", "B", tick));
+        moving.accept(command("A", "B", tick));
+        let one = near.decide(tick + 1, &places(1.0));
+        let other = moving.decide(tick + 1, &places(if tick % 2 == 0 { 1.0 } else { 6.0 }));
+        if tick % 2 == 0 {
+            assert_eq!(one.events, other.events);
+            assert_eq!(one.unreachable, other.unreachable);
+            in_range += other.delivered.len();
+        } else {
+            assert!(other.delivered.is_empty());
+        }
+    }
+    assert!((20..80).contains(&in_range), "{in_range} of 100 arrived");
+}
+
+#[test]
+fn a_radio_that_reaches_nobody_is_refused() {
+    for range in ["0 m", "-1 m"] {
+        let error = parse(&format!("network.radio = {{ range = \"{range}\" }}")).unwrap_err();
+        let words = error.in_words();
+        assert!(words.contains("farther than 0 m"), "{words}");
+    }
 }

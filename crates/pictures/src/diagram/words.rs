@@ -32,6 +32,7 @@ pub(crate) fn cause(cause: Cause) -> &'static str {
         Cause::Loss => "by chance",
         Cause::Burst => "burst",
         Cause::Partition => "partition",
+        Cause::OutOfRange => "out of range",
         Cause::Missed => "tick missed",
         Cause::Overflow => "too much",
         Cause::Unknown => "no such robot",

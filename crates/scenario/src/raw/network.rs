@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use config::units::Time;
+use config::units::{Length, Time};
 use config::{FileError, Source};
 use protocol::RobotName;
 use serde::{Deserialize, Serialize};
@@ -11,7 +11,7 @@ use world::Triangular;
 
 use super::super::checked::RobotSpec;
 use super::super::network::{
-    Burst, Channel, Counted, LinkRule, LostCommand, Network, Partition, ticks,
+    Burst, Channel, Counted, LinkRule, LostCommand, Network, Partition, Radio, ticks,
 };
 use super::numbers::Range;
 use super::times;
@@ -28,6 +28,7 @@ const MAX_ENTRIES: usize = 10_000;
 pub(super) struct NetworkTable {
     commands: Option<Spanned<ChannelTable>>,
     queries: Option<Spanned<ChannelTable>>,
+    radio: Option<RadioTable>,
     #[serde(default, rename = "link", skip_serializing_if = "Vec::is_empty")]
     links: Vec<Spanned<LinkTable>>,
     #[serde(default, rename = "partition", skip_serializing_if = "Vec::is_empty")]
@@ -58,6 +59,12 @@ struct BurstTable {
     enter: f64,
     leave: f64,
     loss: Option<f64>,
+}
+
+#[derive(Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+struct RadioTable {
+    range: Spanned<Length>,
 }
 
 #[derive(Debug, Deserialize, Serialize)]
@@ -129,6 +136,7 @@ pub(super) fn check(
     let mut network = Network {
         commands: checker.commands(raw.commands)?.unwrap_or_default(),
         queries: checker.queries(raw.queries)?.unwrap_or_default(),
+        radio: raw.radio.map(|radio| checker.radio(&radio)).transpose()?,
         ..Network::default()
     };
     for link in raw.links {
@@ -181,6 +189,14 @@ impl Checker<'_> {
             },
             number,
         })
+    }
+
+    fn radio(&self, raw: &RadioTable) -> Result<Radio, FileError> {
+        let Length(range_m) = *raw.range.get_ref();
+        if range_m > 0.0 && range_m.is_finite() {
+            return Ok(Radio { range_m });
+        }
+        Err(self.refuse(raw.range.span(), "a radio reaches farther than 0 m"))
     }
 
     fn commands(&self, raw: Option<Spanned<ChannelTable>>) -> Result<Option<Channel>, FileError> {
@@ -324,6 +340,9 @@ impl NetworkTable {
         Some(unplaced(Self {
             commands: Some(unplaced(network.commands.into())),
             queries: Some(unplaced(network.queries.into())),
+            radio: network.radio.map(|radio| RadioTable {
+                range: unplaced(Length(radio.range_m)),
+            }),
             links: links.map(unplaced).collect(),
             partitions: partitions.map(unplaced).collect(),
             lost: network.lost.iter().map(LoseTable::from).collect(),
