@@ -24,7 +24,7 @@ pub use protocol::DEFAULT_ENDPOINT;
 pub use declared::Declared;
 pub use error::BusError;
 pub use inbox::{Inbox, OnArrival, Worker, WorkerThread};
-pub use middleware::{Bus, Publisher, Query, check_exposure, check_run};
+pub use middleware::{Bus, Publisher, Query, WatchedPublisher, check_exposure, check_run};
 pub use protection::check_key_file;
 pub use qos::Qos;
 pub use reply::{QUERY_TIMEOUT, Reply};

@@ -134,13 +134,23 @@ impl Bus {
         self.declare_publisher(key, CongestionControl::Block)
     }
 
+    /// The same of a publisher that knows whether it has subscribers. Each one costs: the middleware starts a task for each of a
+    /// session's watched publishers that a declared subscriber matches. So there may be a few for each robot of a process, and not
+    /// one for each pair of robots.
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed or the key is not legal.
+    pub fn watched_publisher(&self, key: &str) -> Result<WatchedPublisher, BusError> {
+        WatchedPublisher::new(self.publisher(key)?)
+    }
+
     /// Declares a publisher of what only observers subscribe to. Its messages are dropped where an observer does not keep
     /// up: an observer must not hold the clock.
     ///
     /// # Errors
     /// [`BusError::Use`] if the session is closed or the key is not legal.
-    pub fn observer_publisher(&self, key: &str) -> Result<Publisher, BusError> {
-        self.declare_publisher(key, CongestionControl::Drop)
+    pub fn observer_publisher(&self, key: &str) -> Result<WatchedPublisher, BusError> {
+        WatchedPublisher::new(self.declare_publisher(key, CongestionControl::Drop)?)
     }
 
     fn declare_publisher(
@@ -155,21 +165,7 @@ impl Bus {
             .wait();
         let inner = used("publish on", key, declared)?;
 
-        // The listener first, then the status: a subscriber that comes in between is seen by one of
-        // them. It is a hint, so the order of memory does not matter.
-        let watched = Arc::new(AtomicBool::new(false));
-        let seen = watched.clone();
-        let listener = inner
-            .matching_listener()
-            .callback(move |status| seen.store(status.matching(), Ordering::Relaxed))
-            .background()
-            .wait();
-        used("watch subscribers of", key, listener)?;
-        let matching =
-            used("watch subscribers of", key, inner.matching_status().wait())?.matching();
-        watched.fetch_or(matching, Ordering::Relaxed);
-
-        Ok(Publisher { inner, watched })
+        Ok(Publisher { inner })
     }
 
     /// Puts one message.
@@ -453,7 +449,6 @@ impl Bus {
 #[derive(Debug)]
 pub struct Publisher {
     inner: zenoh::pubsub::Publisher<'static>,
-    watched: Arc<AtomicBool>,
 }
 
 impl Publisher {
@@ -464,6 +459,44 @@ impl Publisher {
     pub fn put(&self, message: Vec<u8>) -> Result<(), BusError> {
         let put = send(message, |message| self.inner.put(message).wait());
         used("put on", self.inner.key_expr().as_str(), put)
+    }
+}
+
+/// A declared publisher of one key that knows whether it has subscribers.
+#[derive(Debug)]
+pub struct WatchedPublisher {
+    publisher: Publisher,
+    watched: Arc<AtomicBool>,
+}
+
+impl WatchedPublisher {
+    fn new(publisher: Publisher) -> Result<Self, BusError> {
+        let inner = &publisher.inner;
+        let key = inner.key_expr().as_str();
+
+        // The listener first, then the status: a subscriber that comes in between is seen by one of
+        // them. It is a hint, so the order of memory does not matter.
+        let watched = Arc::new(AtomicBool::new(false));
+        let seen = watched.clone();
+        let listener = inner
+            .matching_listener()
+            .callback(move |status| seen.store(status.matching(), Ordering::Relaxed))
+            .background()
+            .wait();
+        used("watch subscribers of", key, listener)?;
+        let matching =
+            used("watch subscribers of", key, inner.matching_status().wait())?.matching();
+        watched.fetch_or(matching, Ordering::Relaxed);
+
+        Ok(Self { publisher, watched })
+    }
+
+    /// Puts a message.
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed.
+    pub fn put(&self, message: Vec<u8>) -> Result<(), BusError> {
+        self.publisher.put(message)
     }
 
     /// Whether there are subscribers.

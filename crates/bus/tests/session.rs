@@ -155,7 +155,7 @@ fn a_publisher_knows_whether_it_has_subscribers() {
     let star = Star::new("matching");
     let a = star.client();
     let b = star.client();
-    let publisher = a.publisher("state").unwrap();
+    let publisher = a.watched_publisher("state").unwrap();
     let (_received, subscriber) = subscribe(&b, "state");
 
     let begun = Instant::now();

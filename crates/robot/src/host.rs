@@ -13,7 +13,10 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use bus::{Bus, BusError, Declared, Inbox, OnArrival, Publisher, Role, Worker, WorkerThread};
+use bus::{
+    Bus, BusError, Declared, Inbox, OnArrival, Publisher, Role, WatchedPublisher, Worker,
+    WorkerThread,
+};
 use lockstep::{
     Admission, Begin, IncarnationNotice, Leave, ParticipantOutput, StateQuery, Timeouts, Turn,
 };
@@ -143,8 +146,8 @@ struct HostedRobot {
     senses_bodies: bool,
     explanation: String,
     report: Publisher,
-    state: Publisher,
-    panel: Publisher,
+    state: WatchedPublisher,
+    panel: WatchedPublisher,
     /// Publishers of the commands to the robots that it has commanded.
     commands: BTreeMap<RobotName, Publisher>,
     token: Option<Declared>,
@@ -200,7 +203,7 @@ impl Host {
                 welcome: None,
                 explanation: String::new(),
                 report: bus.publisher(&keys.report(&name))?,
-                state: bus.publisher(&keys.query(&name, STATE))?,
+                state: bus.watched_publisher(&keys.query(&name, STATE))?,
                 panel: bus.observer_publisher(&keys.panel(&name))?,
                 commands: BTreeMap::new(),
                 token: None,

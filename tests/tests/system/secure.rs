@@ -532,9 +532,9 @@ fn declarations_in_anothers_name_are_refused() {
         });
     let watching = watching.unwrap();
     let forbidden = other(0).command(&butler, &RobotName::operator());
-    let forbidden = castle.operator.publisher(&forbidden).unwrap();
+    let forbidden = castle.operator.watched_publisher(&forbidden).unwrap();
     let allowed = other(0).query(&butler, STATE);
-    let allowed = castle.operator.publisher(&allowed).unwrap();
+    let allowed = castle.operator.watched_publisher(&allowed).unwrap();
 
     let thief = castle.enter("Vonda");
     let mut declared = Vec::new();

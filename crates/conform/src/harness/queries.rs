@@ -33,6 +33,6 @@ impl Harness<'_> {
 
     /// Whether there is a subscriber to what is put on a key.
     pub(crate) fn has_subscriber(&self, key: &str) -> Result<bool, RuleFailure> {
-        Ok(self.kit.bus.publisher(key)?.has_subscribers())
+        Ok(self.kit.bus.watched_publisher(key)?.has_subscribers())
     }
 }

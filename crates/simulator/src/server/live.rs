@@ -174,7 +174,7 @@ impl Server<LiveRun> {
             outputs: Vec::new(),
             timers: Timers::default(),
             departed: Departed::default(),
-            orders: Orders::new(bus.publisher(&keys.faults())?, options.is_launched),
+            orders: Orders::new(bus.watched_publisher(&keys.faults())?, options.is_launched),
             with_bodies: BTreeSet::new(),
             epoch: LiveEpoch::begin(scenario, number, folder, &frontend, replay_log)?,
             pause_at: 0,

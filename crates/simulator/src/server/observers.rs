@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use bus::{Bus, BusError, Publisher, Query};
+use bus::{Bus, BusError, Query, WatchedPublisher};
 use protocol::encode;
 use protocol::keys::Keys;
 use protocol::messages::{
@@ -35,8 +35,8 @@ pub(super) enum TickVisibility {
 }
 
 pub(super) struct Observers {
-    world: Publisher,
-    log: Publisher,
+    world: WatchedPublisher,
+    log: WatchedPublisher,
     /// When the last tick began of which a frame is put; `None` puts one of the next tick.
     frame_at: Option<Instant>,
     /// When the last tick began whose panels were asked for.
@@ -186,7 +186,7 @@ impl PastLines {
 }
 
 /// Puts what observers receive: what cannot be put is worth no more than a note.
-pub(super) fn put_lossy(to: &Publisher, message: Vec<u8>) {
+pub(super) fn put_lossy(to: &WatchedPublisher, message: Vec<u8>) {
     if let Err(error) = to.put(message) {
         tracing::debug!("{error}");
     }

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use bus::{Publisher, Query};
+use bus::{Query, WatchedPublisher};
 use protocol::messages::{FaultKind, FaultOrder, ProcessOrder};
 use protocol::{Epoch, RobotName, Tick};
 
@@ -12,7 +12,7 @@ const ARRIVAL: Duration = Duration::from_secs(4);
 
 /// Orders to the launcher.
 pub(super) struct Orders {
-    pub(super) publisher: Publisher,
+    pub(super) publisher: WatchedPublisher,
     /// The order that has been carried out last.
     pub(super) done: Option<(Epoch, Tick)>,
     pub(super) has_complained: bool,
@@ -26,7 +26,7 @@ pub(super) struct Orders {
 
 impl Orders {
     /// No orders yet; `is_launched` is whether a launcher has started this simulator.
-    pub(super) fn new(publisher: Publisher, is_launched: bool) -> Self {
+    pub(super) fn new(publisher: WatchedPublisher, is_launched: bool) -> Self {
         Self {
             publisher,
             done: None,

@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-use bus::{Bus, BusError, Declared, Publisher, Query};
+use bus::{Bus, BusError, Declared, Query, WatchedPublisher};
 use lockstep::StateQuery;
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{
@@ -39,8 +39,8 @@ pub struct RecordedRun {
 
 /// What is put in the place of a robot.
 struct ShownRobot {
-    state: Publisher,
-    panel: Publisher,
+    state: WatchedPublisher,
+    panel: WatchedPublisher,
     /// In ticks for which it reported.
     token: Option<Declared>,
 }

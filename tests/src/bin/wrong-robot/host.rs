@@ -7,7 +7,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use bus::{Bus, BusError, Declared, Publisher, Reply, Role};
+use bus::{Bus, BusError, Declared, Reply, Role, WatchedPublisher};
 use lockstep::{Leave, ParticipantOutput, RobotTimer, Timeouts};
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{Clock, CommandText, PublicState, Report, TickUpdate, Waiting, Welcome};
@@ -44,7 +44,7 @@ pub(crate) struct Host {
     pub(crate) timers: BTreeMap<RobotTimer, Instant>,
     pub(crate) welcome: Option<Welcome>,
     pub(crate) walker: Option<Walker>,
-    pub(crate) states: Publisher,
+    pub(crate) states: WatchedPublisher,
     pub(crate) token: Option<Declared>,
     pub(crate) declared: Vec<Declared>,
     pub(crate) leave: Option<Leave>,
@@ -93,7 +93,7 @@ impl Host {
             has_reported: Arc::default(),
             wrong: wrong.clone(),
         };
-        let states = bus.publisher(&keys.query(&name, STATE))?;
+        let states = bus.watched_publisher(&keys.query(&name, STATE))?;
 
         let mut host = Self {
             shared,
