@@ -151,6 +151,7 @@ fn describe_experiment(path: &Path) -> Result<String> {
         experiment,
         set: Vec::new(),
         robots: Robots::InProcess,
+        own: None,
     })?;
     let needs_processes = plan.needs_processes()?;
     if needs_processes.is_none() {

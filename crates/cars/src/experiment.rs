@@ -1,7 +1,7 @@
 //! `cars experiment`: plays experiments over many seeds, in a folder that is resumed after any interruption, and prints tables
 //! with confidence intervals.
 
-mod launcher;
+pub(crate) mod launcher;
 mod replay;
 mod tables;
 
@@ -15,13 +15,13 @@ use config::Override;
 use config::units::Time;
 use experiments::engine::{self, EngineOptions, OUT, Queue, WORKER};
 use experiments::shell;
-use experiments::{Experiment, LaunchText, Plan, Provenance, Request, Results, Robots, Store};
+use experiments::{Experiment, Plan, Provenance, Request, Results, Robots, Store};
 use indicatif::{ProgressBar, ProgressStyle};
-use launch::{is_launch_file, scenario_file};
+use launch::scenario_file;
 use protocol::messages::Verdict;
 use protocol::random::MAX_SEED;
 
-use self::launcher::launcher;
+use self::launcher::{ProcessArgs, processes_of};
 use crate::errors::{Result, refusal};
 use crate::named;
 use crate::submit::EngineArgs;
@@ -134,6 +134,8 @@ struct Workers {
     /// Play units that failed once more.
     #[arg(long)]
     retry_failed: bool,
+    #[command(flatten)]
+    processes: ProcessArgs,
 }
 
 /// `cars experiment merge`.
@@ -199,6 +201,10 @@ pub(crate) fn experiment(args: ExperimentArgs) -> Result<ExitCode> {
 }
 
 fn run(args: &ExperimentRunArgs) -> Result<ExitCode> {
+    if args.plan.processes {
+        // Before the first session, and before any thread.
+        bus::runtime::use_one_thread();
+    }
     let (plan, folder) = args.plan.save()?;
     if args.plan_only {
         let units = plan.units();
@@ -231,6 +237,9 @@ fn submit(args: &SubmitArgs) -> Result<ExitCode> {
 
 fn play_units(args: &UnitArgs) -> Result<ExitCode> {
     let plan = Plan::load(&args.folder)?;
+    if *plan.robots() != Robots::InProcess {
+        bus::runtime::use_one_thread();
+    }
     plan.check_program()?;
     plan.check()?;
     let first = *args.units.start();
@@ -323,20 +332,19 @@ impl PlanArgs {
             experiment.scenario.clone_from(scenario);
         }
 
-        let launch = Some(experiment.scenario.clone());
-        let launch = launch.filter(|path| is_launch_file(path).unwrap_or(false));
-        experiment.scenario = scenario_file(&experiment.scenario)?;
-        let robots = match launch {
-            _ if !self.processes => Robots::InProcess,
-            Some(path) => Robots::Launched(LaunchText::read(&path)?),
-            None => Robots::Programs,
+        let robots = if self.processes {
+            processes_of(&experiment.scenario)?
+        } else {
+            Robots::InProcess
         };
+        experiment.scenario = scenario_file(&experiment.scenario)?;
         let name = self.file.file_stem().unwrap_or_default();
         Ok(Request {
             name: name.to_string_lossy().into_owned(),
             experiment,
             set: self.set.clone(),
             robots,
+            own: None,
         })
     }
 }
@@ -371,14 +379,18 @@ fn play(plan: &Plan, folder: &Path, workers: &Workers, units: Range<usize>) -> R
         count - open
     ));
 
+    let launches = workers.processes.launches()?;
     be_quiet_about_units();
     let style = ProgressStyle::with_template("{bar:40} {pos}/{len} runs, {eta} left")?;
     let bar = ProgressBar::new(open as u64).with_style(style);
     let done = || bar.inc(1);
     engine::play(
-        plan, folder, &mut store, &mut queue, &options, &launcher, &done,
+        plan, folder, &mut store, &mut queue, &options, &launches, &done,
     )?;
     bar.finish_and_clear();
+    for remark in launches.remarks() {
+        terminal::note(remark);
+    }
     Ok(store)
 }
 

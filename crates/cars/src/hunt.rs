@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -11,14 +12,16 @@ use config::units::Time;
 use config::{Changes, Override};
 use experiments::hunt::{
     CommandFate, Coverage, FaultClass, Feature, Finding, HuntBudget, HuntOptions, HuntProgress,
-    HuntReport, Link, Subject, hunt as go,
+    HuntReport, HuntRobots, Link, Subject, hunt as go,
 };
 use experiments::shell;
+use experiments::{ByClass, Robots};
 use indicatif::{ProgressBar, ProgressStyle};
 use protocol::random::MAX_SEED;
 use terminal::OutputError;
 
 use crate::errors::{Result, render};
+use crate::experiment::launcher::{ProcessArgs, processes_of};
 use crate::named;
 
 /// Time for which a hunt draws plans if neither a time nor a number of plans is given, seconds.
@@ -65,6 +68,11 @@ pub(crate) struct HuntArgs {
     /// Where scenario files of findings are written.
     #[arg(long, short, default_value = "hunt", value_name = "DIR")]
     out: PathBuf,
+    /// Launch every run as real processes, so that robots in any language take part. The results are the same.
+    #[arg(long)]
+    processes: bool,
+    #[command(flatten)]
+    process_use: ProcessArgs,
     /// Print JSON: findings and coverage.
     #[arg(long)]
     json: bool,
@@ -83,12 +91,27 @@ pub(crate) fn hunt(args: &HuntArgs) -> ExitCode {
 }
 
 fn play(args: &HuntArgs) -> Result<HuntReport> {
+    if args.processes {
+        // Before the first session, and before any thread.
+        bus::runtime::use_one_thread();
+    }
     let file = launch::scenario_file(&args.file)?;
     let changes = Changes {
         set: args.set.clone(),
         ..Changes::default()
     };
-    let subject = Subject::load(&file, &changes)?;
+    let launches = Arc::new(args.process_use.launches()?);
+    let robots = match args.processes {
+        false => HuntRobots::InProcess(ByClass::of_project()),
+        true => {
+            let launch = match processes_of(&args.file)? {
+                Robots::Launched(launch) => Some(launch),
+                Robots::InProcess | Robots::Programs => None,
+            };
+            HuntRobots::Processes(launches.clone(), launch)
+        }
+    };
+    let subject = Subject::load_with(&file, &changes, robots)?;
     ctrlc::set_handler(|| STOP.store(true, Ordering::Relaxed))?;
 
     if subject.scenario.expectations.is_empty() {
@@ -122,6 +145,9 @@ fn play(args: &HuntArgs) -> Result<HuntReport> {
         }),
     })?;
     bar.finish_and_clear();
+    for remark in launches.remarks() {
+        terminal::note(remark);
+    }
 
     let printed = if args.json {
         let json = serde_json::to_string_pretty(&report)?;

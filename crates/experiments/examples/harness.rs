@@ -10,7 +10,7 @@ use std::path::Path;
 
 use config::Changes;
 use experiments::engine::{self, EngineOptions, Queue};
-use experiments::{Experiment, Plan, Request, Robots, Store};
+use experiments::{Experiment, Launches, Plan, Request, Robots, Store};
 use lab::run::Local;
 use protocol::RunName;
 use scenario::Scenario;
@@ -34,6 +34,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         experiment,
         set: Vec::new(),
         robots: Robots::InProcess,
+        own: None,
     })?;
 
     let mut bare = Vec::new();
@@ -117,14 +118,13 @@ fn play(plan: &Plan) -> Result<f64, Box<dyn Error>> {
     plan.save(folder.path())?;
     let mut store = Store::open(folder.path())?;
     let mut queue = Queue::of(plan, &store, &options);
-    let no_launcher = || unreachable!("robots are in this process");
     engine::play(
         plan,
         folder.path(),
         &mut store,
         &mut queue,
         &options,
-        &no_launcher,
+        &Launches::none(),
         &|| {},
     )?;
     Ok(processor_s()? - begun_s)

@@ -13,8 +13,8 @@ use lab::LabError;
 use record::folder::check_no_links;
 use xxhash_rust::xxh3::xxh3_64;
 
+use super::launches::Launches;
 use super::plan::{FILE, PLAN, Plan, Robots, UNITS, Unit};
-use super::processes::Launcher;
 use super::provenance::PROVENANCE;
 use super::results::{RESULTS, RUNS};
 use super::store::Store;
@@ -54,7 +54,7 @@ struct Shared<'a> {
     plan: &'a Plan,
     queue: &'a Queue,
     retries_failed: bool,
-    launcher: Launcher<'a>,
+    launches: &'a Launches,
     store: Mutex<Current<'a>>,
 }
 
@@ -118,16 +118,16 @@ pub fn play(
     store: &mut Store,
     queue: &mut Queue,
     options: &EngineOptions,
-    launcher: Launcher<'_>,
+    launches: &Launches,
     done: &(impl Fn() + Sync),
 ) -> Result<(), LabError> {
     let _first = first(folder, queue)?;
-    try_arms(plan, store, queue, launcher, done)?;
+    try_arms(plan, store, queue, launches, done)?;
     let shared = Shared {
         plan,
         queue,
         retries_failed: options.retries_failed,
-        launcher,
+        launches,
         store: Mutex::new(Current {
             store,
             refreshed: Instant::now(),
@@ -170,7 +170,7 @@ fn try_arms(
     plan: &Plan,
     store: &mut Store,
     queue: &mut Queue,
-    launcher: Launcher<'_>,
+    launches: &Launches,
     done: &impl Fn(),
 ) -> Result<(), LabError> {
     if *plan.robots() == Robots::InProcess || queue.units.len() < plan.units() {
@@ -190,7 +190,7 @@ fn try_arms(
             return Ok(());
         }
         let unit = plan.unit(*number);
-        let result = plan.play(&unit, launcher);
+        let result = plan.play(&unit, launches);
         store.add(unit.key, result.clone())?;
         done();
         match result {
@@ -257,7 +257,7 @@ impl Shared<'_> {
                 None => return,
                 Some(false) => {}
                 Some(true) => {
-                    let result = self.plan.play(&unit, self.launcher);
+                    let result = self.plan.play(&unit, self.launches);
                     self.note(&unit, result);
                 }
             }

@@ -32,7 +32,7 @@ pub use coverage::{CommandFate, Coverage, Feature};
 pub use draw::Ground;
 pub use fault::{Effect, FaultClass, Link, Messages, PlannedFault, TickSpan};
 pub use shrink::{Bounds, ScenarioParts, Shrunk, shrink};
-pub use trial::{FailedExpectation, Maker, RUNS, SentMessage, Subject, Trial, TrialResult};
+pub use trial::{FailedExpectation, HuntRobots, RUNS, SentMessage, Subject, Trial, TrialResult};
 
 use file::Heading;
 

@@ -2,13 +2,15 @@
 //!
 //! A plan is one file with all that its units need, so that a process on another machine plays them from it alone.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use config::{Changes, FileError, Override, Source};
 use lab::LabError;
+use protocol::RobotName;
 use record::folder::check_no_links;
 use scenario::Scenario;
 use serde::{Deserialize, Serialize};
@@ -17,6 +19,7 @@ use xxhash_rust::xxh3::Xxh3;
 use super::case::Case;
 use super::condition::{Condition, OWN_OPTIONS};
 use super::file::{Arm, Experiment};
+use super::own::{ByClass, OwnRobots, RobotSource};
 use super::script;
 use super::setting::Setting;
 use crate::shell;
@@ -44,6 +47,8 @@ pub struct Request {
     pub set: Vec<Override>,
     /// How its units are played.
     pub robots: Robots,
+    /// Robots of the caller's own, where they play in this process.
+    pub own: Option<OwnRobots>,
 }
 
 /// How the robots of a unit run. The run is the same.
@@ -66,6 +71,8 @@ pub struct Plan {
     conditions: Vec<Condition>,
     written: WrittenPlan,
     cells: Vec<PlannedCell>,
+    /// What makes robots of the caller's own; a plan that was read from a file has none.
+    own: Option<Arc<dyn RobotSource>>,
 }
 
 /// `plan.json`: the plan, and a digest of it. A plan that is not as it was written would play one thing under the name of another.
@@ -93,6 +100,9 @@ struct WrittenPlan {
     #[serde(default)]
     origin: Option<String>,
     robots: Robots,
+    /// Digests of robots of the caller's own, by their names or patterns.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    own_robots: BTreeMap<String, String>,
     /// Conditions and arms in the order of the units: the units of a cell are its seeds.
     cells: Vec<WrittenCell>,
 }
@@ -281,9 +291,15 @@ impl Plan {
             file: experiment.source().text.clone(),
             origin: origin_of(experiment.source()),
             robots: request.robots.clone(),
+            own_robots: request
+                .own
+                .as_ref()
+                .map_or_else(BTreeMap::new, |own| own.digests.clone()),
             cells,
         };
-        Self::of(written, experiment.clone())
+        let mut plan = Self::of(written, experiment.clone())?;
+        plan.own = request.own.as_ref().map(|own| own.source.clone());
+        Ok(plan)
     }
 
     /// Reads the plan in the folder of an experiment.
@@ -339,6 +355,10 @@ impl Plan {
             if let Robots::Launched(launch) = &written.robots {
                 add_text(&mut content, &launch.text);
             }
+            for (robots, digest) in &written.own_robots {
+                add_text(&mut content, robots);
+                add_text(&mut content, digest);
+            }
             let mut yoked_to = None;
             if let Some(other) = &arm.yoked_to {
                 let arm = arms.iter().position(|arm| arm.name == *other);
@@ -358,6 +378,7 @@ impl Plan {
             conditions,
             written,
             cells,
+            own: None,
         })
     }
 
@@ -460,6 +481,9 @@ impl Plan {
         if before.measures != now.measures {
             changes.push("the measures have changed: every unit is another one".to_owned());
         }
+        if before.own_robots != now.own_robots {
+            changes.push("the robots have changed: every unit is another one".to_owned());
+        }
         let mut changed = Vec::new();
         for cell in &now.cells {
             let mut others = before.cells.iter();
@@ -496,6 +520,46 @@ impl Plan {
     #[must_use]
     pub fn robots(&self) -> &Robots {
         &self.written.robots
+    }
+
+    /// The names or patterns of the robots that only the program that has planned the experiment can make.
+    #[must_use]
+    pub fn own_robots(&self) -> Vec<&str> {
+        self.written.own_robots.keys().map(String::as_str).collect()
+    }
+
+    /// Checks that robots of the caller's own can be made.
+    ///
+    /// # Errors
+    /// If another program has planned the experiment, with robots that this one does not know.
+    pub fn check_own_robots(&self) -> Result<(), LabError> {
+        let own = self.own_robots();
+        if own.is_empty() || self.own.is_some() {
+            return Ok(());
+        }
+        Err(LabError::refused(format!(
+            "this experiment has robots of a program of its own: {}",
+            own.join(", ")
+        ))
+        .with_help("play it as it was planned: `cars.experiment(FILE, robots={…})` in Python"))
+    }
+
+    /// The robots of all its scenarios.
+    ///
+    /// # Errors
+    /// If a scenario cannot be used.
+    pub fn roster(&self) -> Result<BTreeSet<RobotName>, FileError> {
+        let mut roster = BTreeSet::new();
+        for cell in 0..self.cells.len() {
+            let scenario = self.scenario(cell, self.unit(0).seed, Vec::new())?;
+            roster.extend(scenario.robots.into_keys());
+        }
+        Ok(roster)
+    }
+
+    /// What makes the robots that play in this process.
+    pub(super) fn robot_source(&self) -> Arc<dyn RobotSource> {
+        self.own.clone().unwrap_or_else(ByClass::of_project)
     }
 
     /// The conditions, in the order of the units.

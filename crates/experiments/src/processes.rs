@@ -1,86 +1,21 @@
-//! Plays a run with its robots as processes, and reads what is observed of it from its record.
+//! Files of a run whose robots are processes: the launch file that it is played by, and its record.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
 
 use config::FileError;
 use observe::Observation;
 use protocol::Event;
-use protocol::messages::End;
 use record::RunFolder;
 use record::names::RECORDING;
 use recording::{Recording, Ticks};
 use scenario::Scenario;
 use toml::{Table, Value};
 
-use super::follow::{EndedRun, Follow};
+use super::follow::Follow;
 use super::plan::LaunchText;
 use export::draft::unwritable;
 use lab::LabError;
-use lab::folder::read_summary;
-use lab::scratch::Scratch;
 use lab::states::LastStates;
-
-/// Name of the run of a unit, and of its folder.
-const RUN: &str = "unit";
-/// Longest part of the output of a launch that is kept as the reason of its failure, bytes.
-const MAX_REASON: usize = 2000;
-
-/// Makes the command `cars`, whose process ends with this one.
-pub type Launcher<'a> = &'a (dyn Fn() -> Command + Sync);
-
-/// Launches a scenario and shows its record to a follower. Without a launch file the robots are the programs of the project.
-///
-/// # Errors
-/// If the launch fails, or its record cannot be read to its end.
-pub(super) fn follow(
-    mut scenario: Scenario,
-    launch: Option<&LaunchText>,
-    launcher: Launcher<'_>,
-    follower: &mut impl Follow,
-) -> Result<EndedRun, LabError> {
-    let folder = Scratch::new().map_err(LabError::failed)?;
-    scenario.record.frames = true;
-    scenario.record.panels = false;
-    scenario.record.log = false;
-    let file = write_launch(&scenario, launch, folder.path())?;
-
-    let mut command = launcher();
-    command
-        .arg("launch")
-        .arg(file)
-        .arg("--out")
-        .arg(folder.path())
-        .args(["--run", RUN, "--speed", "max", "--no-console", "--quiet"])
-        .stdin(Stdio::null());
-    let output = command.output().map_err(LabError::failed)?;
-    let run = RunFolder::at(folder.path().join(RUN));
-    // A launch that failed says why, and its record, which may be damaged, does not. Verdicts are exit statuses, too, and say
-    // nothing against it.
-    let summary = read_summary(&run).ok().flatten();
-    let summary = summary.filter(|summary| {
-        let is_judged = summary.verdict().exit_status() != 0;
-        summary.end == Some(End::Finished) && (output.status.success() || is_judged)
-    });
-    let Some(summary) = summary else {
-        return Err(failed(&output, folder.path()));
-    };
-
-    read(&scenario, &run, follower)?;
-    EndedRun::of(&summary)
-}
-
-/// The failure of a launch, with what it printed.
-fn failed(output: &Output, folder: &Path) -> LabError {
-    let printed = String::from_utf8_lossy(&output.stderr);
-    // The name of the folder is drawn at random.
-    let printed = printed.replace(&folder.display().to_string(), "");
-    let mut end = printed.len().min(MAX_REASON);
-    while !printed.is_char_boundary(end) {
-        end -= 1;
-    }
-    LabError::failed(format!("the launch failed: {}", printed[..end].trim()))
-}
 
 /// Writes the scenario and a launch file for it; returns the launch file.
 ///
@@ -170,7 +105,11 @@ fn write(path: &Path, text: &str) -> Result<(), FileError> {
 }
 
 /// Shows a recorded run to a follower.
-fn read(scenario: &Scenario, run: &RunFolder, follower: &mut impl Follow) -> Result<(), LabError> {
+pub(super) fn read(
+    scenario: &Scenario,
+    run: &RunFolder,
+    follower: &mut impl Follow,
+) -> Result<(), LabError> {
     let recording = Recording::open(&run.file(RECORDING))?;
     let mut ticks = Ticks::of(recording);
     let mut states = LastStates::default();

@@ -13,11 +13,12 @@ use scenario::Scenario;
 use serde::{Deserialize, Serialize};
 
 use super::follow::{EndedRun, Follow};
+use super::launches::Launches;
+use super::own::RunRobots;
 use super::plan::{Plan, Robots, Unit};
-use super::processes::{self, Launcher};
 use super::script::EmotionScript;
 use lab::LabError;
-use lab::run::{Local, check_faults, make_robots, play};
+use lab::run::{Local, check_faults, make_robots_with, play_with};
 
 /// What a unit gives: its measures, or the reason why it has none.
 pub type UnitResult = Result<Played, String>;
@@ -48,8 +49,9 @@ impl Plan {
     /// Checks that every arm can be played under every condition.
     ///
     /// # Errors
-    /// If a scenario has robots or faults that need processes, and there are none.
+    /// If a scenario has robots or faults that need processes, and there are none, or robots that only another program has.
     pub fn check(&self) -> Result<(), LabError> {
+        self.check_own_robots()?;
         match self.needs_processes()? {
             Some(reason) => Err(reason),
             None => Ok(()),
@@ -66,52 +68,78 @@ impl Plan {
         }
 
         let seed = self.unit(0).seed;
+        let source = self.robot_source();
         for cell in 0..self.cells() {
             let scenario = self.scenario(cell, seed, Vec::new())?;
-            let checked = check_faults(&scenario, 0)
-                .and_then(|()| make_robots(&scenario, &self.experiment.scenario));
+            let robots = source.begin();
+            let checked = check_faults(&scenario, 0).and_then(|()| {
+                make_robots_with(&scenario, &self.experiment.scenario, &|name, class| {
+                    robots.make(name, class)
+                })
+            });
             if let Err(reason) = checked {
-                return Ok(Some(reason));
+                return Ok(Some(explained(robots.as_ref(), reason)));
             }
         }
         Ok(None)
     }
 
     /// Checks that robots in this process begin with their parameters, in every arm under every condition, and that those of some
-    /// arm have the variables that are measured: plays tick 0. A plan that has been saved has passed this.
+    /// arm have the variables that are measured: plays tick 0. A plan that has been saved has passed this. A cell in which a robot
+    /// of the caller's own fails is left to its units.
     ///
     /// # Errors
     /// If a robot does not begin, at the place of the change that it refuses, with the arm and the condition; or at a measure
-    /// of a variable that it has in no arm.
+    /// of a variable that it has in no arm. If robots of the caller's own fail in all cells, the first failure.
     pub fn check_begins(&self) -> Result<(), LabError> {
         if *self.robots() != Robots::InProcess {
             return Ok(());
         }
 
         let run = RunName::unknown();
-        let begin = |scenario: Scenario| {
+        let source = self.robot_source();
+        let file = &self.experiment.scenario;
+        let begin = |scenario: Scenario, robots: &dyn RunRobots| {
             caught(|| {
-                let mut local = Local::new(scenario, &run)?;
+                let made =
+                    make_robots_with(&scenario, file, &|name, class| robots.make(name, class))?;
+                let mut local = Local::with_robots(scenario, 1, &run, made)?;
                 local.simulation.init(&mut local.robots)?;
                 Ok(local)
             })
         };
         let mut published: BTreeMap<RobotName, BTreeSet<String>> = BTreeMap::new();
+        let mut own_failures = Vec::new();
 
         let seed = self.unit(0).seed;
         for cell in 0..self.cells() {
             let scenario = self.scenario(cell, seed, Vec::new())?;
-            match begin(scenario) {
+            let robots = source.begin();
+            match begin(scenario, robots.as_ref()) {
                 Ok(local) => add_variables(&mut published, &local),
                 Err(reason) => {
+                    if let Some(failure) = robots.failure() {
+                        own_failures.push(failure);
+                        continue;
+                    }
                     let case = self.case(cell)?;
                     return Err(case
-                        .refused(&reason, |scenario| begin(scenario).err())
+                        .refused(&reason, |scenario| {
+                            begin(scenario, source.begin().as_ref()).err()
+                        })
                         .into());
                 }
             }
         }
-        self.experiment.check_variables(&published)?;
+        if own_failures.len() == self.cells()
+            && let Some(first) = own_failures.first()
+        {
+            return Err(LabError::refused(first.clone()));
+        }
+        // What a robot that fails would publish is not known.
+        if own_failures.is_empty() {
+            self.experiment.check_variables(&published)?;
+        }
         Ok(())
     }
 
@@ -146,8 +174,8 @@ impl Plan {
     ///
     /// # Errors
     /// The reason why the unit cannot be played to its end, for people.
-    pub fn play(&self, unit: &Unit<'_>, launcher: Launcher<'_>) -> UnitResult {
-        caught(|| self.measure(unit, launcher))
+    pub fn play(&self, unit: &Unit<'_>, launches: &Launches) -> UnitResult {
+        caught(|| self.measure(unit, launches))
     }
 
     /// The scenario of a unit. That of a yoked unit takes the run whose emotions its robots show, which is played for it: so
@@ -155,23 +183,19 @@ impl Plan {
     ///
     /// # Errors
     /// If the scenario cannot be used, or that run cannot be played.
-    pub fn scenario_of(
-        &self,
-        unit: &Unit<'_>,
-        launcher: Launcher<'_>,
-    ) -> Result<Scenario, LabError> {
+    pub fn scenario_of(&self, unit: &Unit<'_>, launches: &Launches) -> Result<Scenario, LabError> {
         let Some((cell, seed)) = unit.yoke else {
             return Ok(self.scenario(unit.cell, unit.seed, Vec::new())?);
         };
 
         let other = self.scenario(cell, seed, Vec::new())?;
         let mut script = EmotionScript::default();
-        self.follow(other, launcher, &mut script)?;
+        self.follow(other, launches, &mut script)?;
         let script: Vec<Override> = script.changes().map_err(LabError::refused)?;
         Ok(self.scenario(unit.cell, unit.seed, script)?)
     }
 
-    fn measure(&self, unit: &Unit<'_>, launcher: Launcher<'_>) -> Result<Played, LabError> {
+    fn measure(&self, unit: &Unit<'_>, launches: &Launches) -> Result<Played, LabError> {
         let condition_s = unit.condition.time_s;
         // Where it lasts for the whole run there is no time after it, not even the last tick.
         let condition_s = condition_s.unwrap_or((0.0, f64::INFINITY));
@@ -180,14 +204,14 @@ impl Plan {
             probes: Vec::new(),
             words: Words::of(&experiment.measures, &experiment.expectations),
         };
-        let scenario = self.scenario_of(unit, launcher)?;
+        let scenario = self.scenario_of(unit, launches)?;
         let roster = scenario.roster();
         for measure in &experiment.measures {
             let probe = Probe::new(measure, &roster, condition_s);
             gauge.probes.push((&measure.name, probe));
         }
 
-        let ended = self.follow(scenario, launcher, &mut gauge)?;
+        let ended = self.follow(scenario, launches, &mut gauge)?;
         let mut measures = BTreeMap::new();
         for (name, probe) in gauge.probes {
             measures.insert(name.to_owned(), probe.measured(&ended.summary));
@@ -204,16 +228,33 @@ impl Plan {
     fn follow(
         &self,
         scenario: Scenario,
-        launcher: Launcher<'_>,
+        launches: &Launches,
         follower: &mut impl Follow,
     ) -> Result<EndedRun, LabError> {
         match self.robots() {
-            Robots::InProcess => follow_in_process(scenario, follower),
-            Robots::Programs => processes::follow(scenario, None, launcher, follower),
-            Robots::Launched(launch) => {
-                processes::follow(scenario, Some(launch), launcher, follower)
-            }
+            Robots::InProcess => self.follow_in_process(scenario, follower),
+            Robots::Programs => launches.follow(scenario, None, follower),
+            Robots::Launched(launch) => launches.follow(scenario, Some(launch), follower),
         }
+    }
+
+    fn follow_in_process(
+        &self,
+        scenario: Scenario,
+        follower: &mut impl Follow,
+    ) -> Result<EndedRun, LabError> {
+        let source = self.robot_source();
+        let robots = source.begin();
+        follow_with(scenario, robots.as_ref(), follower)
+            .map_err(|error| explained(robots.as_ref(), error))
+    }
+}
+
+/// The error of a run, or what a robot of the caller's own says about it.
+fn explained(robots: &dyn RunRobots, error: LabError) -> LabError {
+    match robots.failure() {
+        Some(reason) => LabError::failed(reason),
+        None => error,
     }
 }
 
@@ -232,10 +273,16 @@ fn add_variables(published: &mut BTreeMap<RobotName, BTreeSet<String>>, local: &
     }
 }
 
-fn follow_in_process(scenario: Scenario, follower: &mut impl Follow) -> Result<EndedRun, LabError> {
+/// Plays a scenario in this process to its end.
+fn follow_with(
+    scenario: Scenario,
+    robots: &dyn RunRobots,
+    follower: &mut impl Follow,
+) -> Result<EndedRun, LabError> {
     let run = RunName::unknown();
     let mut summary = None;
-    let simulation = play(scenario, &run, |simulation, record| {
+    let make = |name: &_, class: &_| robots.make(name, class);
+    let simulation = play_with(scenario, &run, &make, |simulation, record| {
         let summary = summary.get_or_insert_with(|| simulation.begin_summary(&run));
         for event in record.events.iter() {
             simulation.count(summary, record.tick, event);

@@ -105,9 +105,22 @@ fn wait_until(
 pub fn play(
     scenario: Scenario,
     run: &RunName,
+    each: impl FnMut(&Simulation, &TickRecord) -> Result<(), LabError>,
+) -> Result<Simulation, LabError> {
+    play_with(scenario, run, &of_class, each)
+}
+
+/// Plays a scenario as [`play`] does; `make` makes the robots.
+///
+/// # Errors
+/// As [`play`].
+pub fn play_with(
+    scenario: Scenario,
+    run: &RunName,
+    make: Make<'_>,
     mut each: impl FnMut(&Simulation, &TickRecord) -> Result<(), LabError>,
 ) -> Result<Simulation, LabError> {
-    play_with_robots(scenario, run, &of_class, |local, record, _| {
+    play_with_robots(scenario, run, make, |local, record, _| {
         each(&local.simulation, record)
     })
 }

@@ -9,7 +9,7 @@ use std::convert::Infallible;
 use std::ffi::{OsStr, OsString};
 use std::io::ErrorKind;
 use std::os::unix::process::CommandExt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use nix::sys::signal::SigSet;
@@ -67,6 +67,14 @@ impl StartError {
 pub fn command(at_exit: AtExit, program: impl AsRef<OsStr>) -> Command {
     let mut command = Command::new(own_program());
     command.args(prefix(at_exit)).arg(program);
+    command
+}
+
+/// The command of `cars`, at this path, that ends with the thread of this process that starts it.
+#[must_use]
+pub fn cars(at_exit: AtExit, cars: &Path) -> Command {
+    let mut command = Command::new(cars);
+    command.args(prefix(at_exit)).arg(cars);
     command
 }
 

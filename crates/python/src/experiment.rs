@@ -1,25 +1,27 @@
 //! Experiments: as `cars experiment run` plays them, with robots in this process.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use config::units::Time;
 use experiments::engine::{self, EngineOptions, Queue};
-use experiments::{Experiment, Plan, Provenance, Request, Results, Robots, Store};
+use experiments::{Experiment, Launches, Plan, Provenance, Request, Results, Robots, Store};
 use lab::LabError;
 use protocol::random::MAX_SEED;
 use pyo3::prelude::*;
 
 use crate::error::{argument, read, reported};
 use crate::interrupt::interruptible;
+use crate::make::Makers;
+use crate::processes::ProcessArguments;
 use crate::run::{overrides, scenario_of};
 
-/// Plays what has not been played of an experiment, and writes its results into its folder, which is returned with the names of
-/// units that cannot be trusted.
+/// Plays what has not been played of an experiment, and writes its results into its folder, which is returned with what people may
+/// want to know, a sentence each.
 #[pyfunction]
-#[pyo3(signature = (file, *, out, scenario, seeds, duration, set, jobs, retry_failed))]
+#[pyo3(signature = (file, *, out, scenario, seeds, duration, set, jobs, retry_failed, robots, digests, processes))]
 #[expect(clippy::too_many_arguments, reason = "they are named in Python")]
 pub(crate) fn experiment(
     py: Python<'_>,
@@ -31,7 +33,11 @@ pub(crate) fn experiment(
     set: Vec<String>,
     jobs: Option<usize>,
     retry_failed: bool,
-) -> PyResult<PathBuf> {
+    robots: BTreeMap<String, Py<PyAny>>,
+    digests: BTreeMap<String, String>,
+    processes: Option<ProcessArguments>,
+) -> PyResult<(PathBuf, Vec<String>)> {
+    let makers = Makers::new(robots)?;
     let duration = read::<Time>("duration", duration)?;
     let set = overrides(&set)?;
     let mut experiment = Experiment::find(&file).map_err(reported)?;
@@ -45,6 +51,13 @@ pub(crate) fn experiment(
     if let Some(scenario) = scenario {
         experiment.scenario = scenario;
     }
+    let (robots, launches) = match &processes {
+        None => (Robots::InProcess, Launches::none()),
+        Some(processes) => (
+            processes.robots(&experiment.scenario)?,
+            processes.launches(py)?,
+        ),
+    };
     experiment.scenario = scenario_of(&experiment.scenario)?;
 
     let name = file
@@ -57,8 +70,11 @@ pub(crate) fn experiment(
         name,
         experiment,
         set,
-        robots: Robots::InProcess,
+        robots,
+        own: makers.own(digests),
     };
+    let plan = py.detach(|| Plan::new(&request)).map_err(reported)?;
+    makers.check(&plan.roster().map_err(reported)?)?;
     let jobs = jobs.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
 
     let stopper: Arc<Mutex<Option<Arc<AtomicBool>>>> = Arc::default();
@@ -66,7 +82,7 @@ pub(crate) fn experiment(
     let own = folder.clone();
     let played = interruptible(
         py,
-        move || play(&request, &own, jobs, retry_failed, &stopper),
+        move || play(plan, &launches, &own, jobs, retry_failed, &stopper),
         move || {
             let stopper = is_stopped.lock().unwrap_or_else(PoisonError::into_inner);
             if let Some(stopper) = stopper.as_ref() {
@@ -74,8 +90,7 @@ pub(crate) fn experiment(
             }
         },
     )?;
-    played.map_err(reported)?;
-    Ok(folder)
+    Ok((folder, played.map_err(reported)?))
 }
 
 /// Seeds as they may be: two or more, each once.
@@ -94,13 +109,13 @@ fn checked(seeds: Vec<u64>) -> PyResult<Vec<u64>> {
 }
 
 fn play(
-    request: &Request,
+    plan: Plan,
+    launches: &Launches,
     folder: &Path,
     jobs: usize,
     retries_failed: bool,
     stopper: &Mutex<Option<Arc<AtomicBool>>>,
-) -> Result<(), LabError> {
-    let plan = Plan::new(request)?;
+) -> Result<Vec<String>, LabError> {
     plan.check()?;
     plan.check_begins()?;
     plan.save(folder)?;
@@ -113,15 +128,13 @@ fn play(
     let mut store = Store::open(folder)?;
     let mut queue = Queue::of(&plan, &store, &options);
     *stopper.lock().unwrap_or_else(PoisonError::into_inner) = Some(queue.stopper());
-    // No unit is launched: all robots are in this process.
-    let launcher = || Command::new("cars");
     engine::play(
         &plan,
         folder,
         &mut store,
         &mut queue,
         &options,
-        &launcher,
+        launches,
         &|| {},
     )?;
     if !plan.is_in(folder)? {
@@ -132,7 +145,7 @@ fn play(
     }
     Results::of(plan, &store).write(folder)?;
     Provenance::here().write(folder)?;
-    Ok(())
+    Ok(launches.remarks())
 }
 
 /// The fields of `cars.Verdict`.

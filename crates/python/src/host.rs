@@ -2,7 +2,6 @@
 
 use std::sync::Once;
 
-use bus::runtime::{ONE_THREAD, OWN_SENDER, RUNTIME_VARIABLE};
 use clap::Parser;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -10,6 +9,7 @@ use robot::{End, Host, HostError as RobotHostError, Robot, RobotArgs, RobotName}
 
 use crate::error::HostError;
 use crate::interrupt::interruptible;
+use crate::processes::use_one_thread;
 use crate::runner::{FirstException, PythonRobot};
 
 type Robots = Vec<(RobotName, Box<dyn Robot>)>;
@@ -99,16 +99,6 @@ fn play(
 fn exception(error: &RobotHostError, failure: &FirstException) -> PyErr {
     let raised = failure.take();
     raised.unwrap_or_else(|| HostError::new_err(error.to_string()))
-}
-
-/// Sets the middleware's threads up, before its first use in this process. The environment is changed through Python, which may.
-fn use_one_thread(py: Python<'_>) -> PyResult<()> {
-    let chosen = std::env::var(RUNTIME_VARIABLE);
-    if chosen.is_err() || chosen.is_ok_and(|chosen| chosen == OWN_SENDER) {
-        let environment = py.import("os")?.getattr("environ")?;
-        environment.set_item(RUNTIME_VARIABLE, ONE_THREAD)?;
-    }
-    Ok(())
 }
 
 /// Prints diagnostics to the standard error, from the first call on.

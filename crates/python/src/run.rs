@@ -8,6 +8,7 @@ use ::export::tables;
 use config::shipped::{self, LAUNCHES, SCENARIOS};
 use config::units::Time;
 use config::{Override, Speed, seed};
+use experiments::RunRobots;
 use lab::LabError;
 use lab::folder::{find as find_folder, read_summary, recorded_epochs};
 use lab::run::{check_faults, execute_with};
@@ -64,7 +65,7 @@ pub(crate) fn run(
     };
 
     let failure = FirstException::default();
-    let makers = Makers::new(robots, &failure);
+    let makers = Makers::new(robots)?;
     py.detach(|| play(&file, &options, &makers, &failure))
 }
 
@@ -76,7 +77,7 @@ fn play(
 ) -> PyResult<(PathBuf, String)> {
     let scenario = scenario_of(file)?;
     let scenario = Scenario::load(&scenario, &options.changes()).map_err(reported)?;
-    makers.check(&scenario)?;
+    makers.check(&scenario.robots.keys().cloned().collect())?;
     check_faults(&scenario, 0).map_err(reported)?;
     let run = options.run_name(file).map_err(reported)?;
     let made = options.folder(&run, &scenario).map_err(reported)?;
@@ -90,7 +91,8 @@ fn play(
             LabError::Interrupted
         })
     };
-    let make = |name: &_, class: &_| makers.make(name, class);
+    let robots = makers.of_run(failure);
+    let make = |name: &_, class: &_| robots.make(name, class);
     let played = execute_with(scenario, &made.run, folder, speed, &make, goes_on);
     // What Python raised is the reason, whatever became of it on its way.
     if let Some(error) = failure.take() {

@@ -29,6 +29,15 @@ impl FirstException {
         first.take()
     }
 
+    /// The exception, which stays.
+    pub(crate) fn get(&self) -> Option<PyErr> {
+        // The lock of Python first, as where one is set.
+        Python::attach(|py| {
+            let first = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            Some(first.as_ref()?.clone_ref(py))
+        })
+    }
+
     fn is_set(&self) -> bool {
         let first = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         first.is_some()

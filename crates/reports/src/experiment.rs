@@ -18,7 +18,7 @@ use super::study::{Study, label, lines};
 use super::transitions::transitions;
 use super::words::{capitalized, counted, utc};
 use experiments::shell;
-use experiments::{Example, Provenance, Results, Robots, Shown, UnitOutcome};
+use experiments::{Example, Launches, Provenance, Results, Robots, Shown, UnitOutcome};
 use lab::LabError;
 use lab::folder::recorded_epoch;
 use lab::run::execute;
@@ -397,6 +397,10 @@ fn write_example(
         page.remark(
             "Its robots are processes, which a report does not start: record it by the command above and report the run.",
         );
+    } else if !study.results.plan.own_robots().is_empty() {
+        page.remark(
+            "Its robots are of a program of its own, which a report does not start: play the scenario of the run with them and report that run.",
+        );
     } else if let Err(error) = write_course(page, study, outcome, names) {
         page.remark(format!("It cannot be shown: {error}."));
     }
@@ -412,8 +416,7 @@ fn write_course(
 ) -> Result<(), LabError> {
     let plan = &study.results.plan;
     let unit = plan.unit(outcome.unit);
-    let mut scenario =
-        plan.scenario_of(&unit, &|| unreachable!("its robots run in this process"))?;
+    let mut scenario = plan.scenario_of(&unit, &Launches::none())?;
     scenario.record.frames = study.shows(Shown::Floor) || study.shows(Shown::Runs);
     let place = tempfile::tempdir().map_err(LabError::failed)?;
     let run = RunName::unknown();

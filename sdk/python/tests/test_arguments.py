@@ -38,7 +38,7 @@ RUN: list[tuple[dict[str, Any], type[Exception], str]] = [
     ({"name": 3}, TypeError, "name must be a text, not 3"),
     ({"name": "a/b"}, ValueError, "name: "),
     ({"out": 3}, TypeError, "out must be a path"),
-    ({"robots": [Still]}, TypeError, "robots must be a mapping from names of robots to classes"),
+    ({"robots": [Still]}, TypeError, "robots must be a mapping from names or patterns of robots to classes"),
     ({"robots": {"Butler": Still()}}, TypeError, r"robots\['Butler'\] must be a class derived from cars.Robot, or a function"),
     ({"robots": {"Butler": dict}}, TypeError, r"robots\['Butler'\] must make an object of a class derived from cars.Robot"),
 ]

@@ -6,9 +6,11 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use experiments::hunt::{FaultClass, HuntBudget, HuntOptions, Subject, hunt};
+use experiments::ByClass;
+use experiments::hunt::{FaultClass, HuntBudget, HuntOptions, HuntRobots, Subject, hunt};
 use scenario::Changes;
 
 fn main() -> Result<ExitCode, Box<dyn std::error::Error>> {
@@ -18,7 +20,8 @@ fn main() -> Result<ExitCode, Box<dyn std::error::Error>> {
     };
 
     let changes = Changes::default();
-    let subject = Subject::load_by(Path::new(scenario), &changes, system_tests::planted::make)?;
+    let robots = HuntRobots::InProcess(Arc::new(ByClass(system_tests::planted::make)));
+    let subject = Subject::load_with(Path::new(scenario), &changes, robots)?;
     let options = HuntOptions {
         seed: seed.parse()?,
         budget: HuntBudget::Plans(plans.parse()?),

@@ -1,7 +1,7 @@
 //! A population of runs, and samples of it.
 
 use experiments::engine::{self, EngineOptions, Queue};
-use experiments::{Experiment, Measured, Plan, Request, Results, Robots, Store};
+use experiments::{Experiment, Launches, Measured, Plan, Request, Results, Robots, Store};
 use protocol::random::{self, Stream};
 use statistics::CensoredTime;
 use system_tests::root;
@@ -35,6 +35,7 @@ impl Population {
             experiment,
             set: Vec::new(),
             robots: Robots::InProcess,
+            own: None,
         });
         let plan = plan.unwrap();
 
@@ -47,14 +48,13 @@ impl Population {
         };
         let mut store = Store::open(folder.path()).unwrap();
         let mut queue = Queue::of(&plan, &store, &options);
-        let no_launcher = || unreachable!("robots are in this process");
         engine::play(
             &plan,
             folder.path(),
             &mut store,
             &mut queue,
             &options,
-            &no_launcher,
+            &Launches::none(),
             &|| {},
         )
         .unwrap();

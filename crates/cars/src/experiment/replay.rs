@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use experiments::{Plan, Robots, Store, write_launch};
+use experiments::{LaunchUse, Launches, Plan, Robots, Store, write_launch};
 use lab::folder::read_summary;
 use lab::scratch::Scratch;
 use launch::RunOptions;
@@ -42,6 +42,7 @@ pub(super) struct ReplayUnitArgs {
 /// Plays a unit with everything recorded, and compares its digest with that of the unit as it was played before.
 pub(super) fn replay(args: ReplayUnitArgs) -> Result<ExitCode> {
     let plan = Plan::load(&args.folder)?;
+    plan.check_own_robots()?;
     if args.unit >= plan.units() {
         return Err(refusal!(
             "there is no unit {}: the experiment in {} has the units 0 to {}",
@@ -52,7 +53,9 @@ pub(super) fn replay(args: ReplayUnitArgs) -> Result<ExitCode> {
     }
 
     let unit = plan.unit(args.unit);
-    let mut scenario = plan.scenario_of(&unit, &launcher)?;
+    let launches = Launches::new(Box::new(launcher), LaunchUse::default());
+    let mut scenario = plan.scenario_of(&unit, &launches)?;
+    drop(launches);
     scenario.record.frames = true;
     let run = match args.run {
         Some(run) => run,

@@ -3,18 +3,23 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use config::{Changes, Source};
+use observe::Observation;
 use protocol::messages::{End, Verdict};
 use protocol::{Event, RobotName, RunName, Tick};
-use robot::Robot;
 use scenario::Scenario;
-use simulator::TickRecord;
+use simulator::Simulation;
 use timeline::{CommandSpan, Counts, Span, StateKind, Timeline};
 
 use super::case::FaultCase;
 use super::coverage::{CommandFate, Feature};
 use super::fault::Link;
+use crate::follow::Follow;
+use crate::launches::Launches;
+use crate::own::{ByClass, RobotSource, RunRobots};
+use crate::plan::LaunchText;
 use lab::LabError;
 use lab::run::{Local, check_faults, make_robots_with};
 
@@ -71,9 +76,6 @@ pub trait Trial: Sync {
     fn play(&self, case: &FaultCase, wanted: &BTreeSet<String>) -> Result<TrialResult, LabError>;
 }
 
-/// Makes a robot of a class; `None` if it makes no robots of that class.
-pub type Maker = fn(&str) -> Option<Box<dyn Robot>>;
-
 /// A scenario in whose robots a hunt looks for defects.
 #[derive(Debug)]
 pub struct Subject {
@@ -85,7 +87,16 @@ pub struct Subject {
     pub folder: PathBuf,
     /// The scenario.
     pub scenario: Scenario,
-    maker: Maker,
+    robots: HuntRobots,
+}
+
+/// How the robots of a hunt are played.
+#[derive(Debug, Clone)]
+pub enum HuntRobots {
+    /// In this process, by what makes them.
+    InProcess(Arc<dyn RobotSource>),
+    /// As processes of their own: the programs of the project, or those of a launch file.
+    Processes(Arc<Launches>, Option<LaunchText>),
 }
 
 impl Subject {
@@ -94,33 +105,35 @@ impl Subject {
     /// # Errors
     /// If the scenario cannot be used, or cannot be played in one process.
     pub fn load(file: &Path, changes: &Changes) -> Result<Self, LabError> {
-        Self::load_by(file, changes, robots::make)
+        Self::load_with(file, changes, HuntRobots::InProcess(ByClass::of_project()))
     }
 
-    /// Reads a scenario whose robots `maker` makes by their classes.
+    /// Reads a scenario with these robots.
     ///
     /// # Errors
     /// As [`Self::load`].
-    pub fn load_by(file: &Path, changes: &Changes, maker: Maker) -> Result<Self, LabError> {
+    pub fn load_with(file: &Path, changes: &Changes, robots: HuntRobots) -> Result<Self, LabError> {
         // Errors show the lines of the file.
         Scenario::load(file, changes)?;
 
-        let source = changes.apply(&Source::read(file)?)?;
+        let text = changes.apply(&Source::read(file)?)?;
         let folder = file.parent().unwrap_or(Path::new(".")).to_owned();
-        let scenario = Scenario::parse(&source, &folder)?;
+        let scenario = Scenario::parse(&text, &folder)?;
 
-        check_faults(&scenario, 0)?;
-        make_robots_with(&scenario, file, &|_, class| maker(class))?;
+        if let HuntRobots::InProcess(source) = &robots {
+            check_faults(&scenario, 0)?;
+            check_made(&scenario, file, source.begin().as_ref())?;
+        }
 
         // The file of a finding depends on no run.
-        let mut content = source.parse()?;
+        let mut content = text.parse()?;
         scenario::carry_moods_over(&mut content)?;
         Ok(Self {
             file: file.to_owned(),
             content,
             folder,
             scenario,
-            maker,
+            robots,
         })
     }
 
@@ -129,7 +142,7 @@ impl Subject {
     /// # Errors
     /// As [`Self::load`].
     pub fn of_file(&self, file: &Path) -> Result<Self, LabError> {
-        Self::load_by(file, &Changes::default(), self.maker)
+        Self::load_with(file, &Changes::default(), self.robots.clone())
     }
 
     /// The content of the scenario file of a case.
@@ -157,34 +170,105 @@ impl Subject {
         Ok(Scenario::parse(&source, &self.folder)?)
     }
 
-    fn go(
+    /// Plays a scenario in this process. Returns why it has not come to its end, if it has not.
+    fn play_here(
         &self,
-        local: &mut Local,
-        run: &RunName,
+        scenario: Scenario,
+        robots: &dyn RunRobots,
         wanted: &BTreeSet<String>,
         notes: &mut TrialNotes,
-    ) -> Result<(), LabError> {
-        let record = local.simulation.init(&mut local.robots)?;
-        notes.note(&record);
-        while local.simulation.tick() < local.simulation.scenario().ticks {
-            if notes.has_failed(wanted) {
-                return Ok(());
-            }
-            local.carry_out_faults_with(run, &|_, class| (self.maker)(class))?;
-            let record = local.simulation.step(&mut local.robots)?;
-            notes.note(&record);
-        }
+    ) -> Result<Option<String>, LabError> {
+        let run = RunName::unknown();
+        let make = |name: &_, class: &_| robots.make(name, class);
+        let made = make_robots_with(&scenario, &self.file, &make)?;
+        let mut local = Local::with_robots(scenario, 1, &run, made)?;
+        let gone = catch_unwind(AssertUnwindSafe(|| {
+            go(&mut local, &run, robots, wanted, notes)
+        }));
+        Ok(match gone {
+            Ok(Ok(())) => None,
+            Ok(Err(error)) => Some(error.to_string()),
+            Err(_) => Some("a robot panicked".to_owned()),
+        })
+    }
+}
 
-        notes.note(&local.simulation.end(End::Finished));
-        Ok(())
+/// Plays a run in this process until a wanted expectation fails, or to its end.
+fn go(
+    local: &mut Local,
+    run: &RunName,
+    robots: &dyn RunRobots,
+    wanted: &BTreeSet<String>,
+    notes: &mut TrialNotes,
+) -> Result<(), LabError> {
+    let record = local.simulation.init(&mut local.robots)?;
+    notes.note(record.tick, &record.events);
+    while local.simulation.tick() < local.simulation.scenario().ticks {
+        if notes.has_failed(wanted) {
+            return Ok(());
+        }
+        local.carry_out_faults_with(run, &|name, class| robots.make(name, class))?;
+        let record = local.simulation.step(&mut local.robots)?;
+        notes.note(record.tick, &record.events);
+    }
+
+    let end = local.simulation.end(End::Finished);
+    notes.note(end.tick, &end.events);
+    Ok(())
+}
+
+/// Plays a scenario by processes. Returns why it has not come to its end, if it has not.
+fn play_by_processes(
+    scenario: Scenario,
+    launches: &Launches,
+    launch: Option<&LaunchText>,
+    wanted: &BTreeSet<String>,
+    notes: &mut TrialNotes,
+) -> Result<Option<String>, LabError> {
+    // What cannot be set up says nothing against the robots.
+    Simulation::new(scenario.clone(), 1).map_err(LabError::refused)?;
+    let mut notes = NotesUntilFailure { notes, wanted };
+    let played = launches.follow(scenario, launch, &mut notes);
+    let is_over = notes.notes.has_failed(wanted);
+    Ok(played.err().filter(|_| !is_over).map(|error| {
+        let text = error.to_string();
+        let mut lines = text.lines().rev().map(str::trim);
+        let last = lines.find(|line| !line.is_empty());
+        last.unwrap_or("the launch failed").to_owned()
+    }))
+}
+
+/// Notes on a recorded run, as far as it is played in this process.
+struct NotesUntilFailure<'a> {
+    notes: &'a mut TrialNotes,
+    wanted: &'a BTreeSet<String>,
+}
+
+impl Follow for NotesUntilFailure<'_> {
+    fn observe(&mut self, observation: &Observation<'_>) {
+        let is_aborted = observation
+            .events
+            .iter()
+            .any(|event| matches!(event, Event::End { reason, .. } if *reason != End::Finished));
+        if !is_aborted && !self.notes.has_failed(self.wanted) {
+            self.notes.note(observation.tick, observation.events);
+        }
+    }
+}
+
+/// Checks that robots can be made in this process.
+fn check_made(scenario: &Scenario, file: &Path, robots: &dyn RunRobots) -> Result<(), LabError> {
+    let made = make_robots_with(scenario, file, &|name, class| robots.make(name, class));
+    match (made, robots.failure()) {
+        (Ok(_), _) => Ok(()),
+        (Err(_), Some(reason)) => Err(LabError::refused(reason)),
+        (Err(error), None) => Err(error),
     }
 }
 
 impl Trial for Subject {
     fn play(&self, case: &FaultCase, wanted: &BTreeSet<String>) -> Result<TrialResult, LabError> {
         let scenario = self.scenario_of(case)?;
-        let run = RunName::unknown();
-        let robots = make_robots_with(&scenario, &self.file, &|_, class| (self.maker)(class))?;
         let mut notes = TrialNotes::default();
         notes.played.expectations.insert(RUNS.to_owned());
         for expectation in &scenario.expectations {
@@ -197,14 +281,16 @@ impl Trial for Subject {
         }
 
         // A robot that panics or ends the run is what a hunt looks for.
-        let mut local = Local::with_robots(scenario, 1, &run, robots)?;
-        let gone = catch_unwind(AssertUnwindSafe(|| {
-            self.go(&mut local, &run, wanted, &mut notes)
-        }));
-        let because = match gone {
-            Ok(Ok(())) => return Ok(notes.finish()),
-            Ok(Err(error)) => error.to_string(),
-            Err(_) => "a robot panicked".to_owned(),
+        let played = match &self.robots {
+            HuntRobots::InProcess(source) => {
+                self.play_here(scenario, source.begin().as_ref(), wanted, &mut notes)?
+            }
+            HuntRobots::Processes(launches, launch) => {
+                play_by_processes(scenario, launches, launch.as_ref(), wanted, &mut notes)?
+            }
+        };
+        let Some(because) = played else {
+            return Ok(notes.finish());
         };
         let failure = FailedExpectation {
             tick: notes.played.ticks + 1,
@@ -231,9 +317,9 @@ impl TrialNotes {
         failed.any(|name| wanted.contains(name))
     }
 
-    fn note(&mut self, record: &TickRecord) {
-        self.played.ticks = record.tick;
-        for event in record.events.iter() {
+    fn note(&mut self, tick: Tick, events: &[Event]) {
+        self.played.ticks = tick;
+        for event in events {
             self.counts.add(event);
             if let Event::Judged {
                 expectation,
@@ -241,10 +327,10 @@ impl TrialNotes {
                 because,
             } = event
             {
-                self.note_verdict(record.tick, expectation, *verdict, because);
+                self.note_verdict(tick, expectation, *verdict, because);
             }
         }
-        for span in self.timeline.tick(record.tick, &record.events) {
+        for span in self.timeline.tick(tick, events) {
             self.note_span(span);
         }
     }

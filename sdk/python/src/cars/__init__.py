@@ -37,6 +37,7 @@ from ._errors import (
 )
 from ._experiment import Experiment, Verdict, experiment
 from ._frames import Frames
+from ._hunt import Finding, Hunt, hunt
 from ._pictures import Page, Picture
 from ._robot import Action, CarsRobotInterface, Robot
 from ._run import Run, load, run
@@ -53,8 +54,10 @@ __all__ = [
     "Error",
     "Experiment",
     "FileError",
+    "Finding",
     "Frames",
     "HostError",
+    "Hunt",
     "Interrupted",
     "Page",
     "Panel",
@@ -78,6 +81,7 @@ __all__ = [
     "Welcome",
     "__version__",
     "experiment",
+    "hunt",
     "load",
     "main",
     "panel",

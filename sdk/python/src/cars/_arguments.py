@@ -90,12 +90,25 @@ def mapping(name: str, value: Any, accepted: str) -> Mapping[Any, Any]:
 
 def makers(name: str, value: Any) -> dict[str, Callable[[], Any]]:
     """What makes robots, by their names."""
-    accepted = "a mapping from names of robots to classes derived from cars.Robot, or to functions that make one"
+    accepted = "a mapping from names or patterns of robots to classes derived from cars.Robot, or to functions that make one"
     given = dict(mapping(name, value, accepted))
     for robot, make in given.items():
         if not callable(make):
             raise wrong_type(f"{name}[{robot!r}]", "a class derived from cars.Robot, or a function that makes one", make)
     return given
+
+
+def processes(
+    value: Any, robots: Mapping[str, Any], fresh: Any, tick_patience: Any
+) -> Optional[tuple[Optional[Path], bool, Optional[float]]]:
+    """How robots are played as processes: by a launch file, whether each run gets fresh ones, and how long a tick may take."""
+    if value is None or value is False:
+        return None
+    if robots:
+        raise BadArgument("robots are classes of this process: without processes, or without robots and with a launch file")
+    file = None if value is True else path("processes", value)
+    patience_s = None if tick_patience is None else number("tick_patience", tick_patience, "a number of seconds")
+    return file, flag("fresh_processes", fresh), patience_s
 
 
 def seeds(name: str, value: Any) -> Optional[list[int]]:

@@ -77,7 +77,26 @@ def experiment(
     set: Sequence[str],
     jobs: int | None,
     retry_failed: bool,
-) -> Path: ...
+    robots: Mapping[str, Callable[[], Robot]],
+    digests: Mapping[str, str],
+    processes: tuple[Path | None, bool, float | None] | None,
+) -> tuple[Path, list[str]]: ...
+def hunt(
+    file: Path,
+    *,
+    plans: int | None,
+    time: str,
+    seed: int,
+    jobs: int | None,
+    kinds: Sequence[str],
+    longest: str,
+    expect: frozenset[str],
+    shrink_runs: int,
+    set: Sequence[str],
+    out: Path,
+    robots: Mapping[str, Callable[[], Robot]],
+    processes: tuple[Path | None, bool, float | None] | None,
+) -> tuple[str, list[str]]: ...
 def verdicts(folder: Path) -> list[tuple[str, str, list[int], list[int], list[int]]]: ...
 def report(folders: Sequence[Path]) -> str: ...
 def figures(folders: Sequence[Path]) -> list[str]: ...

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, Optional, Union
 
-from . import _arguments, _cars, _settings
+from . import _arguments, _cars, _programs, _settings
 from ._frames import Frame, of_rows, read_runs
 from ._pictures import Page
+from ._robot import Robot, maker
 from ._run import Name
 
 
@@ -109,6 +110,10 @@ def experiment(
     set: Optional[Mapping[str, Any]] = None,  # noqa: A002
     jobs: Optional[int] = None,
     retry_failed: bool = False,
+    robots: Optional[Mapping[str, Callable[[], Robot]]] = None,
+    processes: Union[bool, Name] = False,
+    fresh_processes: bool = False,
+    tick_patience: Optional[float] = None,
 ) -> Experiment:
     """Plays an experiment, or goes on with it where it was interrupted, as ``cars experiment run`` does.
 
@@ -120,10 +125,19 @@ def experiment(
     :param set: changes of the scenario in every arm: see :func:`cars.run`.
     :param jobs: number of runs at the same time; without it the number of processors. The results do not depend on it.
     :param retry_failed: play units that failed once more.
+    :param robots: classes of robots of Python by the names or patterns of the scenario's robots: see :func:`cars.run`. A unit whose
+        robot raises something fails with the traceback: see :attr:`Experiment.failures`. Units are played again when the class has
+        another name, or its module or the module of a base class has another text; what the module imports or reads is not
+        noticed.
+    :param processes: launch every run as processes, as ``--processes`` does: ``True``, or a launch file whose processes run the
+        robots of the experiment's scenario. The results are the same.
+    :param fresh_processes: start fresh processes for every run, instead of having the same play one run after another.
+    :param tick_patience: how long a tick of processes may take, seconds of wall clock, before the unit fails; without it 120.
     :raises Error: with the text of the command line, if a file cannot be used.
     :raises TypeError, BadArgument: which argument has a type or a value that is not accepted.
     """
-    folder = _cars.experiment(
+    makers = _arguments.makers("robots", robots)
+    folder, remarks = _cars.experiment(
         _arguments.path("file", file),
         out=None if out is None else _arguments.path("out", out),
         scenario=None if scenario is None else _arguments.path("scenario", scenario),
@@ -132,7 +146,12 @@ def experiment(
         set=_settings.changes(set),
         jobs=None if jobs is None else _arguments.whole("jobs", jobs, 1, MAX_JOBS),
         retry_failed=_arguments.flag("retry_failed", retry_failed),
+        robots={of: maker(of, make) for of, make in makers.items()},
+        digests=_programs.digests(makers),
+        processes=_arguments.processes(processes, makers, fresh_processes, tick_patience),
     )
+    for remark in remarks:
+        warnings.warn(remark, stacklevel=2)
     played = Experiment(folder)
     if played.failures:
         first = played.failures[0]

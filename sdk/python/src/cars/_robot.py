@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -182,3 +183,8 @@ def checked(robot: object, what: str = "a robot is") -> Robot:
     if isinstance(robot, Robot):
         return robot
     raise TypeError(f"{what} an object of a class derived from cars.Robot, not {robot!r}")
+
+
+def maker(of: str, make: Callable[[], Robot]) -> Callable[[], Robot]:
+    """What makes the robots called ``of``, and checks that it does."""
+    return lambda: checked(make(), f"robots[{of!r}] must make")

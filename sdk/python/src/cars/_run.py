@@ -14,7 +14,7 @@ from . import _arguments, _cars, _settings
 from ._errors import Error
 from ._frames import Frame, Frames, read, with_value
 from ._pictures import Page, Picture
-from ._robot import Robot, checked
+from ._robot import Robot, maker
 
 Name = Union[str, os.PathLike[str]]
 
@@ -155,15 +155,12 @@ def run(
         such as ``hall-2``: see :attr:`Run.folder`.
     :param replace: replace the run with this name, if it is over.
     :param out: where its folder is made, such as ``"runs"``. Without it in a temporary folder, which goes with the returned object.
-    :param robots: classes of robots of Python, or functions that make one, by the names of the scenario's robots. All others are
-        made by their classes in the scenario. A robot of Python computes under Python's lock; with those of Rust
+    :param robots: classes of robots of Python, or functions that make one, by the names of the scenario's robots, or by patterns
+        such as ``"S*"``; a name goes before a pattern. All others are made by their classes in the scenario. A robot of Python computes under Python's lock; with those of Rust
         alone other threads of Python go on meanwhile.
     :raises Error: with the text of the command line, if a file cannot be used, or a robot cannot run in this process.
     :raises TypeError, BadArgument: which argument has a type or a value that is not accepted.
     """
-
-    def maker(of: str, make: Callable[[], Robot]) -> Callable[[], Robot]:
-        return lambda: checked(make(), f"robots[{of!r}] must make")
 
     file = _arguments.path("scenario", scenario)
     seed = None if seed is None else _arguments.whole("seed", seed, 0, _arguments.MAX_SEED)
