@@ -63,6 +63,9 @@ fn heading(summary: &Summary) -> String {
         text += &format!(" in {elapsed_s:.1} s, {ratio:.0} times real time");
     }
 
+    if let Some(because) = &summary.end_because {
+        text += &format!("\nended because {}", protocol::plain::escape_line(because));
+    }
     text += &format!(
         "\nseed {}  guests {}  digest {}\n",
         summary.seed, summary.guests, summary.digest

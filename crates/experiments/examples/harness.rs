@@ -99,7 +99,7 @@ fn play_bare(scenario: &std::path::Path) -> Result<f64, Box<dyn Error>> {
         };
         let mut local = Local::new(Scenario::load(scenario, &changes)?, &run)?;
         local.simulation.init(&mut local.robots)?;
-        while local.simulation.tick() < local.simulation.scenario().ticks {
+        while !local.simulation.is_over() {
             local.simulation.step(&mut local.robots)?;
         }
     }

@@ -413,11 +413,13 @@ fn event_cells(event: &Event) -> Vec<Column<'_>> {
         Event::Tick { digest, seal: _ } => vec![("digest", digest.as_str().into())],
         Event::End {
             reason,
+            because,
             waited_for: _,
             digest,
             seal: _,
         } => vec![
             ("reason", json_name(reason)),
+            ("because", because.as_deref().into()),
             ("digest", digest.as_str().into()),
         ],
     }

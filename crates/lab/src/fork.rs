@@ -16,7 +16,7 @@ use crate::reexecution::{Reexecution, cannot_go_on};
 use crate::run::{check_faults, check_parameters, go_on, observe};
 
 /// Tables of a scenario that hold for the whole run and can be other ones in a fork.
-const OF_THE_RUN: [&str; 2] = ["duration", "record"];
+const OF_THE_RUN: [&str; 3] = ["duration", "end_when", "record"];
 
 /// What a fork is of, and what it changes.
 #[derive(Debug)]
@@ -27,7 +27,7 @@ pub struct Fork<'a> {
     pub files: &'a EpochFiles,
     /// The last tick that both have.
     pub tick: Tick,
-    /// What is changed from the next tick on; `duration` and what is below `record` hold for the whole fork.
+    /// What is changed from the next tick on; `duration`, `end_when` and what is below `record` hold for the whole fork.
     pub set: Vec<Override>,
     /// Another duration, simulated seconds.
     pub duration_s: Option<f64>,
@@ -136,6 +136,12 @@ impl Fork<'_> {
         }
 
         let mut local = again.end().map_err(|robot| cannot_go_on(&robot))?;
+        if local.simulation.is_over() {
+            let tick = self.tick;
+            let reason = format!("the run ends at tick {tick} by its `end_when`");
+            return Err(LabError::refused(reason)
+                .with_help("fork it earlier, or give another condition: --set 'end_when=…'"));
+        }
         go_on(&mut local, run, |local, record, opened| {
             observe(&mut recorder, local, opened);
             recorder.write(&local.simulation, record)?;

@@ -37,8 +37,7 @@ pub fn judge(
 ) -> Result<Verdicts, LabError> {
     let mut record = Record::of_events(&files.events)?;
     let mut recorded = ReportsByTick::open(files, expectations)?;
-    let roster = scenario.roster();
-    let mut watches = Monitors::new(expectations, scenario.tick_s, scenario.body_m, &roster);
+    let mut watches = Monitors::new(expectations, &scenario.setting());
     let mut verdicts = Verdicts::default();
 
     while let Some(entry) = record.next_entry()? {

@@ -161,7 +161,7 @@ fn go_on_with(
     make: Make<'_>,
     mut each: impl FnMut(&Local, &TickRecord, Instant) -> Result<(), LabError>,
 ) -> Result<(), LabError> {
-    while local.simulation.tick() < local.simulation.scenario().ticks {
+    while !local.simulation.is_over() {
         let opened = Instant::now();
         local.carry_out_faults_with(run, make)?;
         let record = local.simulation.step(&mut local.robots)?;

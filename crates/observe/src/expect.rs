@@ -1,10 +1,8 @@
 //! `[[expect]]`: what a run is expected to do, and the verdict on whether it has done it.
 
-mod condition;
 mod rule;
 mod watch;
 
-pub use condition::{TickCondition, TickConditionError};
 pub use rule::{
     ExpectError, Expectation, MAX_EXPECTATIONS, MAX_NAME_CHARS, Rule, WrongEntry, check_all,
 };

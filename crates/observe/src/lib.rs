@@ -1,5 +1,6 @@
 //! What is asked of a run, tick by tick, while it is played or when it is read again. Pure: no simulator, no file, no clock.
 
+mod condition;
 pub mod expect;
 pub mod measure;
 mod pattern;
@@ -9,11 +10,27 @@ pub mod words;
 use protocol::messages::{Point, StateVariables};
 use protocol::{Event, RobotName, Tick};
 
+pub use condition::{Evaluation, TickCondition, TickConditionError};
 pub use expect::{Expectation, Judgment, Monitor, Monitors};
 pub use measure::{Measure, MeasureError, MeasureSource, Measured};
 pub use pattern::{Pattern, PatternError};
 pub use probe::Probe;
 pub use words::Words;
+
+/// What conditions and measures depend on beside the ticks of a run.
+#[derive(Debug, Clone)]
+pub struct Setting {
+    /// Length of a tick, seconds.
+    pub tick_s: f64,
+    /// The last tick that is planned.
+    pub ticks: Tick,
+    /// Width and height of the field, meters.
+    pub field_m: [f64; 2],
+    /// Side of every body, meters.
+    pub body_m: f64,
+    /// The robots, in the order of their names.
+    pub roster: Vec<RobotName>,
+}
 
 /// A complete tick of a run, or its end.
 pub struct Observation<'a> {

@@ -8,7 +8,7 @@
 use std::collections::BTreeMap;
 
 use observe::expect::{MAX_EXPECTATIONS, check_all};
-use observe::{Expectation, Judgment, Monitor, Monitors, Observation, RobotState};
+use observe::{Expectation, Judgment, Monitor, Monitors, Observation, RobotState, Setting};
 use protocol::messages::{End, Point, StateVariables, Verdict};
 use protocol::{Event, RobotName, Tick};
 use serde::{Deserialize, Serialize};
@@ -40,6 +40,16 @@ fn roster() -> Vec<RobotName> {
     vec![name("A"), name("B")]
 }
 
+fn setting() -> Setting {
+    Setting {
+        tick_s: TICK_S,
+        ticks: 1000,
+        field_m: [10.0, 10.0],
+        body_m: BODY_M,
+        roster: roster(),
+    }
+}
+
 /// What a robot reports, for [`Run`].
 #[derive(Clone)]
 struct Stated {
@@ -60,7 +70,7 @@ impl Run {
         let expectation = read(entry).unwrap();
         expectation.check(&roster()).unwrap();
         Self {
-            watch: Monitor::new(&expectation, TICK_S, BODY_M, &roster()),
+            watch: Monitor::new(&expectation, &setting()),
             tick: 0,
             robots: BTreeMap::new(),
         }
@@ -475,7 +485,7 @@ fn each_expectation_is_judged_once() {
             ..read("eventually = { event = 'lost' }\nwithin = '60 s'").unwrap()
         },
     ];
-    let mut watches = Monitors::new(&expectations, TICK_S, BODY_M, &roster());
+    let mut watches = Monitors::new(&expectations, &setting());
     let mut judged = Vec::new();
     for tick in 0..3 {
         let events = [say("")];

@@ -236,6 +236,9 @@ pub enum Event {
     End {
         /// How.
         reason: End,
+        /// If it has finished before its last tick: what of the scenario's `end_when` held, in words.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        because: Option<String>,
         /// If it was aborted, the robots for which the clock waited then.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         waited_for: Vec<WaitedFor>,
@@ -561,6 +564,7 @@ impl Event {
             ),
             Self::End {
                 reason,
+                because,
                 waited_for,
                 digest,
                 ..
@@ -570,7 +574,10 @@ impl Event {
                     End::Stopped => "stopped",
                     End::Aborted => "aborted",
                 };
-                let why = in_words(waited_for);
+                let why = match because {
+                    Some(because) => format!(", because {because}"),
+                    None => in_words(waited_for),
+                };
                 simulator(LogKind::Run, format!("{how}{why}, digest {digest}"))
             }
             // A blocked robot tries again every tick; the log would be nothing else. So with a lossy network.

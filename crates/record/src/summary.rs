@@ -28,6 +28,9 @@ pub struct Summary {
     pub version: String,
     /// How it ended; absent during the run.
     pub end: Option<End>,
+    /// If it has finished before its last tick: what of the scenario's `end_when` held, in words.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub end_because: Option<String>,
     /// If it was aborted, the robots for which the clock waited then.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub waited_for: Vec<WaitedFor>,
@@ -194,6 +197,7 @@ impl Summary {
             seed: scenario.seed,
             version: env!("CARGO_PKG_VERSION").to_owned(),
             end: None,
+            end_because: None,
             waited_for: Vec::new(),
             ticks: 0,
             time_s: 0.0,
@@ -239,11 +243,13 @@ impl Summary {
             }
             Event::End {
                 reason,
+                because,
                 waited_for,
                 digest,
                 ..
             } => {
                 self.end = Some(*reason);
+                self.end_because.clone_from(because);
                 self.waited_for.clone_from(waited_for);
                 self.digest.clone_from(digest);
             }

@@ -154,6 +154,7 @@ fn tick(tick: Tick) -> RecordedTick {
 fn end() -> Event {
     Event::End {
         reason: End::Finished,
+            because: None,
         waited_for: Vec::new(),
         digest: "0".repeat(32),
         seal: None,

@@ -37,6 +37,8 @@ pub(super) struct RunFacts {
     pub(super) last_tick: Tick,
     /// How the run ended; `None` if it has no end.
     pub(super) end: Option<End>,
+    /// What of the scenario's `end_when` held, if that ended the run.
+    pub(super) end_because: Option<String>,
     /// Digest up to the last complete tick.
     pub(super) digest: String,
     /// The robots.
@@ -151,7 +153,12 @@ impl RunFacts {
                 self.tick_s = *tick_s;
             }
             Event::Tick { digest, .. } => self.digest.clone_from(digest),
-            Event::End { reason, .. } => self.end = Some(*reason),
+            Event::End {
+                reason, because, ..
+            } => {
+                self.end = Some(*reason);
+                self.end_because.clone_from(because);
+            }
             Event::Judged {
                 expectation,
                 verdict,

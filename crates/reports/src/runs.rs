@@ -129,12 +129,15 @@ impl ReportedRun {
 fn write_lead(page: &mut Page, runs: &[ReportedRun]) {
     if let [run] = runs {
         let facts = &run.facts;
+        let because = facts.end_because.as_ref();
+        let because = because.map_or(String::new(), |because| format!(", because {because}"));
         page.lead(format!(
-            "The run {} after {} s of simulated time ({} ticks of {} s), with seed {} and {}.",
+            "The run {} after {} s of simulated time ({} ticks of {} s){}, with seed {} and {}.",
             ending(facts.end).0,
             tick_seconds(facts.last_tick, facts.tick_s),
             facts.last_tick,
             facts.tick_s,
+            because,
             facts.seed,
             counted(facts.robots.len(), "robot"),
         ));

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use observe::Expectation;
+use observe::{Expectation, Setting, TickCondition};
 use protocol::messages::{DisplayUnit, Parameters, Point};
 use protocol::{RobotName, Tick};
 use serde::{Deserialize, Serialize};
@@ -69,6 +69,8 @@ pub struct Scenario {
     pub changes: Vec<Change>,
     /// What the run is expected to do.
     pub expectations: Vec<Expectation>,
+    /// The run ends after the first tick in which this holds; without it, after its last tick only.
+    pub end_when: Option<TickCondition>,
     /// Contents of the record.
     pub record: RecordContents,
     /// The run from which this one was forked.
@@ -142,6 +144,18 @@ impl Scenario {
     #[must_use]
     pub fn duration_s(&self) -> f64 {
         self.ticks as f64 * self.tick_s
+    }
+
+    /// What conditions and measures depend on beside the ticks of the run.
+    #[must_use]
+    pub fn setting(&self) -> Setting {
+        Setting {
+            tick_s: self.tick_s,
+            ticks: self.ticks,
+            field_m: self.field_m,
+            body_m: self.body_m,
+            roster: self.roster(),
+        }
     }
 
     /// The robots' names, in order.

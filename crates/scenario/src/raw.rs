@@ -20,7 +20,7 @@ use config::bulk::member;
 use config::overrides::merge;
 use config::units::{Length, Speed, Time, quantity};
 use config::{FileError, FixedList, Source, seed, shipped};
-use observe::Expectation;
+use observe::{Expectation, TickCondition};
 use protocol::messages::{DisplayUnit, OnLate, Parameters, Point};
 use protocol::{RobotName, Tick};
 use serde::{Deserialize, Serialize};
@@ -69,6 +69,7 @@ pub(super) struct ScenarioFile {
     changes: Vec<Spanned<ChangeTable>>,
     #[serde(default, rename = "expect", skip_serializing_if = "Vec::is_empty")]
     expectations: Vec<Spanned<Expectation>>,
+    end_when: Option<Spanned<TickCondition>>,
     parent: Option<ParentTable>,
     #[serde(default, rename = "obstacle", skip_serializing_if = "Vec::is_empty")]
     obstacles: Vec<Obstacle>,
@@ -217,6 +218,7 @@ impl ScenarioFile {
         let faults = fault::check(self.faults, &robots, &lateness, tick_s, settled, source)?;
         let roster: Vec<RobotName> = robots.keys().cloned().collect();
         let expectations = expect::check(self.expectations, &roster, source)?;
+        let end_when = expect::check_end(self.end_when, &roster, source)?;
         let mut scenario = checked::Scenario {
             seed,
             tick_s,
@@ -235,6 +237,7 @@ impl ScenarioFile {
             faults,
             changes: Vec::new(),
             expectations,
+            end_when,
             record,
             parent: self.parent.map(Parent::from),
         };
@@ -555,6 +558,7 @@ impl From<&checked::Scenario> for ScenarioFile {
             faults: faults.collect(),
             changes: changes.collect(),
             expectations: expectations.collect(),
+            end_when: scenario.end_when.clone().map(unplaced),
             parent: scenario.parent.as_ref().map(ParentTable::from),
             obstacles: obstacles.collect(),
             robots: robots.collect(),

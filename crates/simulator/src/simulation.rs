@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use lockstep::{Bulletin, Exchange, IncarnationNotice, Membership, Sent, TickOutcome};
-use observe::{Monitors, Observation, RobotState};
+use observe::{Evaluation, Monitors, Observation, RobotState};
 use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::event::{Blocker, Cause, WaitedFor};
 use protocol::messages::{
@@ -113,6 +113,10 @@ pub struct Simulation {
     digest: Digest,
     /// What the scenario expects of the run.
     watches: Monitors,
+    /// What ends the run before its last tick, if the scenario says so.
+    end_when: Option<Evaluation>,
+    /// What of it holds in the last complete tick, in words.
+    goal: Option<String>,
 }
 
 impl Simulation {
@@ -135,6 +139,7 @@ impl Simulation {
             medium.count_for(&change.network);
         }
 
+        let setting = scenario.setting();
         Ok(Self {
             epoch,
             blocked: vec![false; names.len()],
@@ -161,12 +166,12 @@ impl Simulation {
             between: Vec::new(),
             planned: None,
             digest: Digest::default(),
-            watches: Monitors::new(
-                &scenario.expectations,
-                scenario.tick_s,
-                scenario.body_m,
-                &scenario.roster(),
-            ),
+            watches: Monitors::new(&scenario.expectations, &setting),
+            end_when: scenario
+                .end_when
+                .as_ref()
+                .map(|condition| Evaluation::new(condition, &setting)),
+            goal: None,
             scenario,
         })
     }
@@ -411,6 +416,7 @@ impl Simulation {
         self.digest.close(&digest);
         // After the digest: verdicts are about the run and no part of what it is compared by.
         self.judge();
+        self.check_end();
         self.events.push(Event::Tick {
             digest: self.digest.to_string(),
             seal: None,
@@ -436,6 +442,26 @@ impl Simulation {
         });
         self.watches = watches;
         self.events.extend(judged);
+    }
+
+    /// Notes whether the run ends with this tick before its last one. Verdicts of the tick are known then.
+    fn check_end(&mut self) {
+        let Some(mut end_when) = self.end_when.take() else {
+            return;
+        };
+        self.goal = end_when.holds(&Observation {
+            tick: self.tick,
+            tick_s: self.scenario.tick_s,
+            events: &self.events,
+            state: &|name| self.robot_state(name),
+        });
+        self.end_when = Some(end_when);
+    }
+
+    /// Whether the run has no further tick.
+    #[must_use]
+    pub fn is_over(&self) -> bool {
+        self.tick >= self.scenario.ticks || self.goal.is_some()
     }
 
     /// What a robot reported last, and where it stands; `None` before its first report.
@@ -927,6 +953,7 @@ impl Simulation {
         self.count_too_fast(&mut events);
         events.push(Event::End {
             reason,
+            because: self.goal.clone().filter(|_| reason == End::Finished),
             waited_for,
             digest: self.digest.to_string(),
             seal: None,

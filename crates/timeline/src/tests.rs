@@ -322,6 +322,7 @@ fn counts_are_by_robot_and_by_link() {
         },
         Event::End {
             reason: End::Finished,
+            because: None,
             waited_for: Vec::new(),
             digest: String::new(),
             seal: None,

@@ -138,7 +138,7 @@ impl World {
             let Stage::Grant(due) = self.simulator.stage else {
                 return;
             };
-            if self.simulator.simulation.tick() >= self.simulator.simulation.scenario().ticks {
+            if self.simulator.simulation.is_over() {
                 return self.end(End::Finished);
             }
             if self.now < due {

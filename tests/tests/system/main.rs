@@ -23,6 +23,7 @@ mod determinism;
 mod diagram;
 mod emotionml;
 mod emotions;
+mod end_when;
 mod ended;
 mod exec;
 mod expect;

@@ -203,7 +203,7 @@ fn go(
 ) -> Result<(), LabError> {
     let record = local.simulation.init(&mut local.robots)?;
     notes.note(record.tick, &record.events);
-    while local.simulation.tick() < local.simulation.scenario().ticks {
+    while !local.simulation.is_over() {
         if notes.has_failed(wanted) {
             return Ok(());
         }

@@ -4,7 +4,7 @@ use config::units::Time;
 use protocol::RobotName;
 use serde::{Deserialize, Serialize};
 
-use super::condition::{self, TickCondition};
+use crate::condition::{self, TickCondition};
 use crate::pattern::Pattern;
 use crate::words::Word;
 
@@ -331,8 +331,7 @@ impl Expectation {
     /// [`ExpectError::UnknownRobot`].
     pub fn check(&self, roster: &[RobotName]) -> Result<(), ExpectError> {
         for name in self.robots() {
-            let is_operator = name == RobotName::operator().as_str();
-            if !is_operator && !roster.iter().any(|robot| robot.as_str() == name) {
+            if !condition::is_known(name, roster) {
                 return Err(ExpectError::UnknownRobot(name.to_owned()));
             }
         }

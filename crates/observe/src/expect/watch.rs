@@ -3,11 +3,11 @@
 use config::units::Time;
 use protocol::messages::{End, Standing, Verdict};
 use protocol::time::tick_seconds;
-use protocol::{Event, RobotName, Tick};
+use protocol::{Event, Tick};
 
-use super::condition::{Evaluation, first_event, place, shortened};
 use super::rule::{Expectation, Rule};
-use crate::Observation;
+use crate::condition::{Evaluation, first_event, place, shortened};
+use crate::{Observation, Setting};
 
 /// A verdict and its reason.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -66,9 +66,9 @@ struct OpenCheck {
 }
 
 impl Monitor {
-    /// Begins to watch a run with ticks of `tick_s` seconds, bodies with sides of `body_m` meters, and these robots.
+    /// Begins to watch a run.
     #[must_use]
-    pub fn new(expectation: &Expectation, tick_s: f64, body_m: f64, roster: &[RobotName]) -> Self {
+    pub fn new(expectation: &Expectation, setting: &Setting) -> Self {
         let rule = expectation.rule.clone();
         let condition = match &rule {
             Rule::Never(condition) | Rule::Always(condition) => condition,
@@ -76,10 +76,10 @@ impl Monitor {
             | Rule::After { condition, .. }
             | Rule::NeverUntil { condition, .. } => condition,
         };
-        let condition = Evaluation::new(condition, tick_s, body_m, roster);
+        let condition = Evaluation::new(condition, setting);
         let until = match &rule {
             Rule::NeverUntil { until, .. } => {
-                let until = Evaluation::new(until, tick_s, body_m, roster);
+                let until = Evaluation::new(until, setting);
                 Some(Until {
                     fresh: (condition.clone(), until.clone()),
                     condition: until,
@@ -92,7 +92,7 @@ impl Monitor {
             condition,
             until,
             rule,
-            tick_s,
+            tick_s: setting.tick_s,
             now: 0,
             pending: None,
             asked: 0,
@@ -327,19 +327,14 @@ struct Monitored {
 }
 
 impl Monitors {
-    /// Begins to watch a run with ticks of `tick_s` seconds, bodies with sides of `body_m` meters, and these robots.
+    /// Begins to watch a run.
     #[must_use]
-    pub fn new(
-        expectations: &[Expectation],
-        tick_s: f64,
-        body_m: f64,
-        roster: &[RobotName],
-    ) -> Self {
+    pub fn new(expectations: &[Expectation], setting: &Setting) -> Self {
         let mut watches = Vec::new();
         for expectation in expectations {
             watches.push(Monitored {
                 name: expectation.name.clone(),
-                watch: Monitor::new(expectation, tick_s, body_m, roster),
+                watch: Monitor::new(expectation, setting),
                 judgment: None,
             });
         }

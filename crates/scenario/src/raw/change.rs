@@ -21,6 +21,8 @@ use super::unplaced::unplaced;
 pub(crate) const MAX_CHANGES: usize = 1000;
 /// Tables that a change cannot set.
 const NOT_CHANGED: [&str; 2] = ["change", "parent"];
+/// The key that ends a run early, which holds for all of it.
+const END_WHEN: &str = "end_when";
 
 #[derive(Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
@@ -100,6 +102,10 @@ fn parse(text: &Spanned<String>, source: &Source) -> Result<Override, FileError>
         .map_err(|reason: String| FileError::at(source, Some(text.span()), &reason))?;
     if NOT_CHANGED.contains(&change.top()) {
         let reason = "a change of a change is a further [[change]]";
+        return Err(FileError::at(source, Some(text.span()), reason));
+    }
+    if change.top() == END_WHEN {
+        let reason = "`end_when` holds for the whole run: set it in the scenario";
         return Err(FileError::at(source, Some(text.span()), reason));
     }
     if change.sets(&mood::FROM) {

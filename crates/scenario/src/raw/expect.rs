@@ -1,7 +1,7 @@
-//! The table `[[expect]]` as written in the file.
+//! The table `[[expect]]` and the key `end_when` as written in the file.
 
 use config::{FileError, Source};
-use observe::Expectation;
+use observe::{Expectation, TickCondition};
 use observe::expect::check_all;
 use protocol::RobotName;
 use serde::Deserialize;
@@ -25,6 +25,21 @@ pub(super) fn check(
         FileError::at(source, span, &error.error.to_string())
     })?;
     Ok(expectations)
+}
+
+/// Checks when the run of a scenario with these robots ends.
+pub(super) fn check_end(
+    raw: Option<Spanned<TickCondition>>,
+    roster: &[RobotName],
+    source: &Source,
+) -> Result<Option<TickCondition>, FileError> {
+    let Some(raw) = raw else {
+        return Ok(None);
+    };
+    raw.get_ref()
+        .check_end(roster)
+        .map_err(|error| FileError::at(source, Some(raw.span()), &error.to_string()))?;
+    Ok(Some(raw.into_inner()))
 }
 
 /// The expectations of any file.

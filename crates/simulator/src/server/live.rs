@@ -253,7 +253,7 @@ impl TickSource for LiveRun {
         let simulation = &self.epoch.simulation;
         let is_waiting_for_robots = matches!(self.epoch.waits_for, WaitsFor::Robots);
         // Complete, not only granted: while robots are awaited, the last tick is open.
-        if simulation.tick() >= simulation.scenario().ticks && !is_waiting_for_robots {
+        if simulation.is_over() && !is_waiting_for_robots {
             return Err(StopReason::End(End::Finished).into());
         }
 

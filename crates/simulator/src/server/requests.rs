@@ -239,7 +239,7 @@ impl LiveRun {
                     .to_owned(),
             );
         }
-        if simulation.tick() >= simulation.scenario().ticks {
+        if simulation.is_over() {
             return Err("the run has no further tick".to_owned());
         }
         Ok(())

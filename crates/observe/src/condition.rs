@@ -9,8 +9,10 @@ use serde_json::Value;
 
 use crate::pattern::{Pattern, PatternError};
 use crate::words::{self, Word};
-use crate::{Observation, RobotState};
+use crate::{Observation, RobotState, Setting};
 
+/// Kinds of events that a tick gets after its conditions are evaluated.
+const AFTER_THE_TICK: [&str; 2] = ["tick", "end"];
 /// Most alternatives of a condition.
 const MAX_ALTERNATIVES: usize = 64;
 /// How far two bodies may overlap and still count as touching, as in the environment.
@@ -56,6 +58,12 @@ pub enum TickConditionError {
     /// Fewer than two robots that could overlap.
     #[error("`overlap` is \"any\", or a list of at least two robots")]
     Overlap,
+    /// A robot that the run does not have.
+    #[error("no robot of this scenario is called {0}")]
+    UnknownRobot(String),
+    /// Events of this kind come after the end of a tick is decided.
+    #[error("`end_when` cannot name the event \"{0}\": the end of the run is decided before it")]
+    TooLate(String),
     /// No variable of progress, or one without its robot.
     #[error("`progress` is a list of state variables, each with its robot: \"Butler.served\"")]
     Progress,
@@ -170,7 +178,7 @@ impl From<&Vec<String>> for Names {
 }
 
 /// A list with one element is written as that element.
-pub(super) fn one_or_list(mut values: Vec<Value>) -> Value {
+pub(crate) fn one_or_list(mut values: Vec<Value>) -> Value {
     if values.len() == 1 {
         return values.remove(0);
     }
@@ -382,8 +390,31 @@ impl std::fmt::Display for VariableOfRobot {
 }
 
 impl TickCondition {
+    /// Checks that a run of these robots can end when it holds.
+    ///
+    /// # Errors
+    /// [`TickConditionError::UnknownRobot`], and [`TickConditionError::TooLate`] for events that a tick gets after its end is
+    /// decided.
+    pub fn check_end(&self, roster: &[RobotName]) -> Result<(), TickConditionError> {
+        let mut kinds = self.patterns().map(Pattern::kind);
+        if let Some(kind) = kinds.find(|kind| AFTER_THE_TICK.contains(kind)) {
+            return Err(TickConditionError::TooLate(kind.to_owned()));
+        }
+        match self.unknown_robot(roster) {
+            Some(name) => Err(TickConditionError::UnknownRobot(name)),
+            None => Ok(()),
+        }
+    }
+
+    /// The first robot that it names and a run of these robots does not have.
+    pub(crate) fn unknown_robot(&self, roster: &[RobotName]) -> Option<String> {
+        let mut named = self.robots().into_iter();
+        let unknown = named.find(|name| !is_known(name, roster))?;
+        Some(unknown.to_owned())
+    }
+
     /// The patterns of its events.
-    pub(super) fn patterns(&self) -> impl Iterator<Item = &Pattern> {
+    pub(crate) fn patterns(&self) -> impl Iterator<Item = &Pattern> {
         self.0.iter().filter_map(|alternative| match alternative {
             Alternative::Event(pattern) => Some(pattern),
             _ => None,
@@ -391,7 +422,7 @@ impl TickCondition {
     }
 
     /// The words that robots choose and that it names.
-    pub(super) fn words(&self) -> Vec<Word> {
+    pub(crate) fn words(&self) -> Vec<Word> {
         let mut named = Vec::new();
         for alternative in &self.0 {
             match alternative {
@@ -404,13 +435,13 @@ impl TickCondition {
     }
 
     /// Whether it depends on anything but events.
-    pub(super) fn needs_states(&self) -> bool {
+    pub(crate) fn needs_states(&self) -> bool {
         let mut alternatives = self.0.iter();
         alternatives.any(|alternative| !matches!(alternative, Alternative::Event(_)))
     }
 
     /// The robots that it names.
-    pub(super) fn robots(&self) -> Vec<&str> {
+    pub(crate) fn robots(&self) -> Vec<&str> {
         let mut robots = Vec::new();
         for alternative in &self.0 {
             match alternative {
@@ -434,6 +465,12 @@ impl TickCondition {
     }
 }
 
+/// Whether a run of these robots has the robot, or the operator is meant.
+pub(crate) fn is_known(name: &str, roster: &[RobotName]) -> bool {
+    let is_operator = name == RobotName::operator().as_str();
+    is_operator || roster.iter().any(|robot| robot.as_str() == name)
+}
+
 impl LastingState {
     fn words(&self) -> Vec<Word> {
         let (kind, states) = match &self.is {
@@ -454,9 +491,9 @@ impl LastingState {
     }
 }
 
-/// What a condition is evaluated with.
+/// A condition while a run is observed.
 #[derive(Debug, Clone)]
-pub(super) struct Evaluation {
+pub struct Evaluation {
     alternatives: Vec<Tracked>,
     tick_s: f64,
     body_m: f64,
@@ -476,12 +513,9 @@ struct Tracked {
 }
 
 impl Evaluation {
-    pub(super) fn new(
-        condition: &TickCondition,
-        tick_s: f64,
-        body_m: f64,
-        roster: &[RobotName],
-    ) -> Self {
+    /// Begins to evaluate a condition in a run.
+    #[must_use]
+    pub fn new(condition: &TickCondition, setting: &Setting) -> Self {
         let mut alternatives = Vec::new();
         for alternative in &condition.0 {
             alternatives.push(Tracked {
@@ -494,14 +528,14 @@ impl Evaluation {
 
         Self {
             alternatives,
-            tick_s,
-            body_m,
-            roster: roster.to_vec(),
+            tick_s: setting.tick_s,
+            body_m: setting.body_m,
+            roster: setting.roster.clone(),
         }
     }
 
     /// Evaluates the condition for a tick, each once and in their order. Returns why it holds, in words; `None` if it does not.
-    pub(super) fn holds(&mut self, seen: &Observation<'_>) -> Option<String> {
+    pub fn holds(&mut self, seen: &Observation<'_>) -> Option<String> {
         let mut reason = None;
         for tracked in &mut self.alternatives {
             // All of them, because some depend on the ticks before.
@@ -520,8 +554,9 @@ impl Evaluation {
         reason
     }
 
-    /// Whether all that it needs is known in this tick: whether it does not hold is known.
-    pub(super) fn unknown(&self) -> Option<&str> {
+    /// What is not known of the last tick, so that the condition cannot be said not to hold.
+    #[must_use]
+    pub fn unknown(&self) -> Option<&str> {
         self.alternatives
             .iter()
             .find_map(|tracked| tracked.unknown.as_deref())
@@ -529,7 +564,7 @@ impl Evaluation {
 }
 
 /// The first event of a tick that one of the patterns matches, in words.
-pub(super) fn first_event(patterns: &[Pattern], seen: &Observation<'_>) -> Option<String> {
+pub(crate) fn first_event(patterns: &[Pattern], seen: &Observation<'_>) -> Option<String> {
     let mut events = seen.events.iter();
     let event = events.find(|event| patterns.iter().any(|pattern| pattern.matches(event)))?;
     Some(in_words(event))
@@ -546,7 +581,7 @@ fn in_words(event: &Event) -> String {
 }
 
 /// The beginning of a text that is longer than `max` characters.
-pub(super) fn shortened(text: String, max: usize) -> String {
+pub(crate) fn shortened(text: String, max: usize) -> String {
     if text.chars().count() <= max {
         return text;
     }
@@ -555,7 +590,7 @@ pub(super) fn shortened(text: String, max: usize) -> String {
 }
 
 /// The number of ticks in which a time has passed.
-pub(super) fn ticks_in(time: Time, tick_s: f64) -> Tick {
+pub(crate) fn ticks_in(time: Time, tick_s: f64) -> Tick {
     // Times and lengths of ticks are read from decimal fractions: 0.3 s are three ticks of 0.1 s.
     (time.0 / tick_s - 1e-6).ceil().max(0.0) as Tick
 }
@@ -678,7 +713,7 @@ fn unpublished(robot: &RobotName, variable: &str) -> String {
 }
 
 /// A tick and its time, in words.
-pub(super) fn place(tick: Tick, tick_s: f64) -> String {
+pub(crate) fn place(tick: Tick, tick_s: f64) -> String {
     format!("tick {tick} ({} s)", tick_seconds(tick, tick_s))
 }
 
