@@ -215,7 +215,7 @@ store.on("epoch", async () => {
   if (answer.answer === "setup") panels.classes = classesIn(answer.scenario);
   markStale("panels");
 });
-const log = new LogView(box("panel-log"), store, ({ epoch, tick }) => player.seekIn(epoch, tick));
+const log = new LogView(box("panel-log"), store, units, ({ epoch, tick }) => player.seekIn(epoch, tick));
 const shownTime = new TimeWindow(() => player.range_s());
 const crosshair = new Crosshair(player);
 const seekTime = (/** @type {number} */ time_s) => player.seekTime(time_s);

@@ -201,17 +201,17 @@ function isolated(values) {
 }
 
 /**
- * The variable that changes most often, which is shown first.
+ * The variable that changes most often, which is shown first; times, which change in every tick, only if there is nothing else.
  * @param {import("./history.js").History} history
  */
 function liveliest(history) {
-  let most = -1;
+  let most = -Infinity;
   let found;
 
   for (const [name, robots] of history.variables) {
     for (const values of robots.values()) {
       const changes = values.reduce((/** @type {number} */ sum, value, i) => sum + (i > 0 && value !== values[i - 1] ? 1 : 0), 0);
-      const rank = changes + robots.size / 10;
+      const rank = changes + robots.size / 10 - (name.endsWith("_s") ? values.length : 0);
       if (rank > most) {
         most = rank;
         found = name;

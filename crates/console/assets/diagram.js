@@ -128,6 +128,9 @@ export class DiagramView {
           @click=${() => this.zoom(2)}>−</button>
         <label class="check"><input type="checkbox" data-testid="diagram-queries" .checked=${this.hasQueries} @change=${toggle} /><span>Lost queries</span></label>
         <button type="button" data-testid="diagram-save" title="what is shown, in light colors: a drawing of at most 180 mm" @click=${() => this.save()}>SVG</button>
+        ${this.player.tick > this.last
+          ? html`<span class="muted" data-testid="diagram-lag">Drawn up to tick ${this.last}, the last one that is recorded so far.</span>`
+          : nothing}
         ${this.reason ? html`<span class="muted" role="status">${this.reason}</span>` : nothing}`,
       this.bar,
     );

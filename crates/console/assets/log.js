@@ -17,16 +17,21 @@ const NEAR_END_PX = 12;
 const ALL_KINDS = { run: true, membership: true, emotion: true, behavior: true, command: true, network: true, say: true, verdict: true, late: true };
 /** What the medium did to a command: of the kind `command`, and of the network, too. */
 const FATE = /^command \d+ of .+ (was lost on the way|is held back until|comes twice)/;
+/** Where a robot joined. */
+const PLACE = /at (-?[\d.]+) m, (-?[\d.]+) m$/;
 const KINDS = Object.keys(ALL_KINDS);
 
 export class LogView {
   /**
    * @param {HTMLElement} place
    * @param {Store} store
+   * @param {import("./units.js").Units} units
    * @param {(line: LogRecord) => void} seek
    */
-  constructor(place, store, seek) {
+  constructor(place, store, units, seek) {
     this.store = store;
+    this.units = units;
+    units.listeners.push(() => this.rebuild());
     this.seek = seek;
     this.robot = "";
     this.kind = "";
@@ -216,7 +221,7 @@ export class LogView {
   withEpoch(line) {
     const isNext = this.epoch !== null && line.epoch !== this.epoch;
     this.epoch = line.epoch;
-    const element = row(line);
+    const element = row(line, this.units);
     this.lines.set(element, line);
     return isNext ? [division(line.epoch), element] : [element];
   }
@@ -283,10 +288,11 @@ function division(epoch) {
 }
 
 /**
- * A line as it is in the log file.
+ * A line as it is in the log file, but for the unit of places.
  * @param {LogRecord} line
+ * @param {import("./units.js").Units} units
  */
-function row(line) {
+function row(line, units) {
   const element = document.createElement("div");
   element.className = `line kind-${KINDS.includes(line.kind) ? line.kind : "run"}`;
   element.dataset.kind = line.kind;
@@ -300,7 +306,7 @@ function row(line) {
   element.append(
     part("time", `${seconds(line.time_s, line.tick_s).padStart(11)}  `),
     part("source", `${line.source.padEnd(12)} `),
-    part("text", line.text),
+    part("text", line.kind === "membership" ? line.text.replace(PLACE, (_, x, y) => `at ${units.length(+x, 2)}, ${units.length(+y, 2)}`) : line.text),
   );
 
   return element;

@@ -6,6 +6,7 @@ import { componentsOf, generic, heldUp, intensityOf, lastCommands, placeOf } fro
 import { presence } from "./presence.js";
 import { RobotList } from "./robot-list.js";
 import { initials } from "./roster.js";
+import { seconds } from "./units.js";
 import { html, nothing, render } from "./vendor/lit-html.js";
 import { drawWidget } from "./widgets.js";
 
@@ -112,9 +113,9 @@ export class Panels {
     const all = (Array.isArray(own) ? own : []).slice(0, MOST_WIDGETS);
     const buttons = all.filter((widget) => widget?.widget === "button");
     const others = all.filter((widget) => widget?.widget !== "button");
-    if (others.length) return { ...split(others), buttons };
-
     const { frame, log } = this.store;
+    if (others.length) return { ...split(others.map((widget) => readable(widget, robot, frame))), buttons };
+
     const { epoch = 0, tick = 0 } = frame ?? {};
     const known = { className: this.classes.get(robot.name) ?? "", commands: lastCommands(log, robot.name, epoch, tick), isBegun: tick > 0 };
     return { ...generic(robot, known), buttons };
@@ -191,6 +192,24 @@ export class Panels {
           : nothing}
       </section>`;
   }
+}
+
+/**
+ * A widget as people read it: the reason for an emotion is of the tick in which its episode began, and has the numbers of then.
+ * @param {Widget} widget
+ * @param {RobotFrame} robot
+ * @param {import("./types/messages.js").WorldFrame | null} frame
+ * @returns {Widget}
+ */
+function readable(widget, robot, frame) {
+  if (widget?.widget !== "text" || !widget.text) return widget;
+  // The name of the action tendency in the paper, which is no infinitive.
+  if (widget.label === "inclined to" && widget.text === "free activate") return { ...widget, text: "free activation" };
+
+  const { duration_s } = robot.state_variables;
+  if (widget.label !== "why" || typeof duration_s !== "number" || !frame) return widget;
+  const began_s = Math.max(0, frame.time_s - duration_s);
+  return { ...widget, text: `At ${seconds(began_s, frame.tick_s)}, when this began: ${widget.text}` };
 }
 
 /**
