@@ -39,8 +39,15 @@ def test_the_run_waits_for_its_browser_and_begins_there(launched, open_page, fak
     expect(guide).to_contain_text("press Start")
     expect(page.get_by_test_id("guide-verify")).to_have_text(f"cars verify {run.RUN}")
     page.screenshot(path=screenshots / f"guide-{speed}.png")
+    # It covers nothing of the plan, and is one line when the run goes on.
+    plan, steps = page.get_by_test_id("plan").bounding_box(), guide.bounding_box()
+    assert steps["y"] >= plan["y"] + plan["height"] - 1
     page.get_by_test_id("btn-start").click()
+    expect(guide.get_by_role("listitem")).to_have_count(0)
+    assert guide.bounding_box()["height"] < 50
     expect(page.get_by_test_id("phase")).to_have_text("ended", ignore_case=True)
+    page.get_by_test_id("guide-fold").click()
+    expect(guide.get_by_role("listitem")).to_have_count(5)
     expect(page.get_by_test_id("tick")).to_have_text("60")
     page.context.close()
     ended(run)
@@ -62,6 +69,8 @@ def test_the_guide_is_put_away_for_good(launched, open_page, fake_browser, scree
     for width, height, scheme in ((390, 844, "light"), (1280, 720, "dark")):
         other = open_page(run.address, width=width, height=height, scheme=scheme)
         expect(other.get_by_test_id("guide")).to_be_visible()
+        plan, steps = other.get_by_test_id("plan").bounding_box(), other.get_by_test_id("guide").bounding_box()
+        assert steps["y"] >= plan["y"] + plan["height"] - 1
         other.screenshot(path=screenshots / f"guide-{width}-{scheme}.png")
 
 

@@ -166,7 +166,7 @@ function drawDraft() {
 const guidePlace = document.createElement("section");
 Object.assign(guidePlace, { id: "guide", className: "guide", hidden: true, ariaLabel: "First steps" });
 guidePlace.dataset.testid = "guide";
-box("notice").before(guidePlace);
+box("plan-pane").querySelector("footer")?.before(guidePlace);
 
 const interventions = new Interventions({ menu: box("panel-experiment"), effects: box("effects") }, store, {
   act: (control, note) => act(control, note),

@@ -6,8 +6,11 @@ import { html, nothing, render } from "./vendor/lit-html.js";
 
 const KEY = "cars-guide";
 let isOpen = kept(KEY) === null;
+/** Whether the steps are shown; until a person has chosen, before the run has begun. @type {boolean | null} */
+let isUnfolded = null;
 
 /**
+ * Below the plan; when the run has begun, one line until it is unfolded.
  * @param {HTMLElement} place
  * @param {import("./store.js").Store} store
  */
@@ -27,15 +30,29 @@ function guide(place, store) {
     renderGuide(place, store);
   };
   const hasNotBegun = store.phase === "ready" || store.phase === "gathering";
+  const isLong = isUnfolded ?? hasNotBegun;
+  const fold = () => {
+    isUnfolded = !isLong;
+    renderGuide(place, store);
+  };
 
   return html`<header><h2>First steps</h2>
+      <button type="button" data-testid="guide-fold" aria-expanded=${isLong} @click=${fold}>${isLong ? "Hide" : "Show"}</button>
+      <button type="button" data-testid="guide-dismiss" @click=${() => close(true)}>Do not show this again</button>
       <button type="button" class="close" aria-label="Close" data-testid="guide-close" @click=${() => close(false)}>×</button></header>
-    <ol>
+    ${isLong ? steps(hasNotBegun, store.run) : nothing}`;
+}
+
+/**
+ * @param {boolean} hasNotBegun
+ * @param {string} run
+ */
+function steps(hasNotBegun, run) {
+  return html`<ol>
       <li><b>Look.</b> ${hasNotBegun ? html`The run waits: press <i>Start</i> at the top. ` : nothing}The ring around a robot is its emotion, an envelope is a command.</li>
       <li><b>Cut a link.</b> The tab <i>Experiment</i>, one robot <i>from</i>, the other one <i>to</i>, <i>Cut</i>.</li>
       <li><b>Why?</b> The panel beside the plan says <i>why</i> a robot feels so; the log has each change.</li>
       <li><b>Go back.</b> Drag the time line to any moment; <i>Back to now</i> goes on with the run.</li>
-      <li><b>Verify.</b> After the end, in a terminal: <code data-testid="guide-verify">cars verify ${store.run}</code> executes it again, and compares.</li>
-    </ol>
-    <button type="button" data-testid="guide-dismiss" @click=${() => close(true)}>Do not show this again</button>`;
+      <li><b>Verify.</b> After the end, in a terminal: <code data-testid="guide-verify">cars verify ${run}</code> executes it again, and compares.</li>
+    </ol>`;
 }
