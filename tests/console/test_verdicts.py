@@ -43,3 +43,37 @@ def test_a_verdict_shows_with_the_tick_that_decides_it(launch, open_page, screen
     expect(verdicts).to_have_text(["… open nobody overlaps", "… open Butler does not serve"])
     chip.click()
     expect(verdicts.first).to_be_hidden()
+
+
+MANY = "expect=[" + ", ".join(f'{{ name = "expectation {n}, of which the name is long", never = {{ overlap = "any" }} }}' for n in range(12)) + "]"
+
+
+@pytest.mark.parametrize("size", [(1440, 900), (1024, 700), (390, 844)])
+def test_a_list_that_is_cut_off_says_how_many_follow(launch, open_page, size):
+    page = open_page(launch(options=("--set", MANY)).address, *size)
+    expect(page.get_by_test_id("verdicts-chip")).to_have_accessible_name("12 of 12 open")
+    page.get_by_test_id("verdicts-chip").click()
+    page.get_by_test_id("verdicts").evaluate("(list) => list.scrollTo(0, 0)")
+    below = """() => {
+        const list = document.querySelector('[data-testid=verdicts]'), {bottom} = list.getBoundingClientRect();
+        return [...list.querySelectorAll('[data-testid=verdict]')].filter((one) => one.getBoundingClientRect().bottom > bottom + 1).length;
+    }"""
+    hidden = page.evaluate(below)
+    assert hidden > 0
+    more = page.get_by_test_id("verdicts-more")
+    expect(more).to_have_text(f"↓ {hidden} more")
+    expect(more).to_be_in_viewport()
+    page.get_by_test_id("verdicts").evaluate("(list) => list.scrollTo(0, list.scrollHeight)")
+    expect(more).to_be_hidden()
+    assert page.evaluate(below) == 0
+
+
+def test_six_expectations_are_seen_at_once(launch, open_page):
+    page = open_page(launch().address, 1440, 900)
+    chip = page.get_by_test_id("verdicts-chip")
+    expect(chip).to_contain_text("6")
+    chip.click()
+    expect(page.get_by_test_id("verdict")).to_have_count(6)
+    for entry in page.get_by_test_id("verdict").all():
+        expect(entry).to_be_in_viewport(ratio=1)
+    expect(page.get_by_test_id("verdicts-more")).to_be_hidden()

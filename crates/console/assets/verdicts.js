@@ -47,5 +47,16 @@ export function renderVerdicts({ chip, list }, store) {
     all.map(({ expectation }) => html`<li class="verdict ${standing}" data-testid="verdict">
       <span class="mark" aria-hidden="true">${words.mark}</span> <span class="word">${standing.replace("_", " ")}</span> <span>${expectation}</span></li>`),
   );
-  render(html`${entries}`, list);
+  render(html`${entries}<li class="more" aria-hidden="true" data-testid="verdicts-more"></li>`, list);
+  list.onscroll = () => countHidden(list);
+  requestAnimationFrame(() => countHidden(list));
+}
+
+/** Says how many entries are below those that are seen. @param {HTMLElement} list */
+function countHidden(list) {
+  const more = list.querySelector(".more");
+  if (!more || list.hidden) return;
+  const { bottom } = list.getBoundingClientRect();
+  const hidden = [...list.querySelectorAll(".verdict")].filter((entry) => entry.getBoundingClientRect().bottom > bottom + 1);
+  more.textContent = hidden.length ? `↓ ${hidden.length} more` : "";
 }
