@@ -3,7 +3,7 @@
 import pytest
 from playwright.sync_api import expect
 
-from lab import download, eventually
+from lab import download, eventually, scrub
 
 pytestmark = pytest.mark.thorough
 
@@ -218,3 +218,37 @@ def test_a_run_by_hand_is_saved_as_a_scenario(launch, open_page, tmp_path):
     download(page, "experiment-save", saved)
     assert "[[change]]" in saved.read_text()
     assert "network.lose" in saved.read_text()
+
+
+def test_the_past_lists_its_own_cuts_and_changes_nothing(launch, open_page):
+    run = launch(options=("--set", "guests.count=0"))
+    page = open_page(run.address)
+    open_menu(page)
+    for tick in (1, 2, 3):
+        step(page, tick)
+    page.get_by_test_id("from-Butler").click()
+    page.get_by_test_id("to-Leguin").click()
+    page.get_by_test_id("do-cut").click()
+    step(page, 4)
+    effects = page.get_by_test_id("effects")
+    expect(effects).to_contain_text("Butler – Leguin is cut")
+    step(page, 5)
+
+    # Before the cut.
+    scrub(page, 2)
+    expect(page.get_by_test_id("tick")).to_have_text("2")
+    expect(effects).to_be_hidden()
+    expect(page.get_by_test_id("experiment-past")).to_contain_text("This is the past, at 1.0 s. Only the present can be changed.")
+    for control in ("do-cut", "do-heal", "do-hang", "do-set", "from-Butler"):
+        expect(page.get_by_test_id(control)).to_be_disabled()
+
+    # After it, where it is listed with its time.
+    scrub(page, 4)
+    expect(page.get_by_test_id("effects-time")).to_have_text("at 2.0 s:")
+    expect(effects).to_contain_text("Butler – Leguin is cut")
+    expect(effects.get_by_test_id("undo-effect")).to_be_disabled()
+
+    page.get_by_test_id("experiment-past").get_by_role("button", name="Back to now").click()
+    expect(page.get_by_test_id("experiment-past")).to_have_count(0)
+    expect(effects.get_by_test_id("undo-effect")).to_be_enabled()
+    expect(page.get_by_test_id("do-cut")).to_be_enabled()

@@ -145,17 +145,17 @@ def test_words_of_commands_and_cuts_are_within_the_plan(launch, open_page):
             const envelopes = [];
             const calls = {fillText: written, rect: envelopes};
             const context = new Proxy({}, {get: (_, name) => (...all) => void calls[name]?.push(all), set: () => true});
-            const flight = {text: 'bring the pencils to the hall', fate: 'sent', progress: 0, fallen: 0, landed: 0};
+            const flight = {text: 'bring the pencils to the hall', fate: 'sent', progress: 0, faded: 0};
             const taken = {words: [], robots: []}, pen = {context, camera, theme: readTheme()};
             draw.cut(pen, {x: 0, y: 5}, {x: 1, y: 5}, 'Butler → Leguin', taken.words);
-            for (const x of [0, 10]) draw.flight(pen, flight, {x, y: 5}, {x: 5, y: 5}, taken, true);
+            for (const x of [0, 10]) draw.flight(pen, flight, {x, y: 5}, {x: 5, y: 5}, taken);
             const {words} = structuredClone(taken);
-            draw.flight(pen, {...flight, progress: 0.85}, {x: 0, y: 5}, {x: 9, y: 5}, taken, true);
+            draw.flight(pen, {...flight, progress: 1}, {x: 0, y: 5}, {x: 9, y: 5}, taken);
             return [written.slice(0, 3), words, envelopes];
         }"""
     )
     written, taken, envelopes = words
-    # A command that waits at its target does not cover its letters.
+    # A command that is at its target does not cover its letters.
     assert envelopes[-1][0] + 9 == pytest.approx(26 + 248 * 0.9 - 30, abs=0.01)
     half = len("bring the pencils to the hall") * 7 / 2
     assert [x for _, x, _ in written[1:]] == [half + 4, 300 - half - 4]

@@ -60,7 +60,6 @@ const connection = new Connection(
 );
 const player = new Player(store, {
   failed: (reason) => notices.refusal(reason),
-  sought: () => plan.flights.clear(),
 });
 
 /** What moves the clock of the run is seen. @type {Control["do"][]} */
@@ -172,6 +171,7 @@ const interventions = new Interventions({ menu: box("panel-experiment"), effects
   act: (control, note) => act(control, note),
   save: () => setup.save(),
   close: () => closeExperiment(),
+  live: () => player.live(),
 });
 
 /** @param {string | null} robot that it is about */
@@ -480,6 +480,7 @@ Object.assign(window, {
     toClient: (/** @type {number} */ x_m, /** @type {number} */ y_m) => plan.toClient(x_m, y_m),
     fps: () => plan.fps(),
     frame: () => store.frame,
+    flights: () => (store.frame ? store.flights.at(store.frame.tick, store.frame.tick_s) : []),
     history: () => store.history,
     lines: () => store.log.length,
     log: () => store.log,

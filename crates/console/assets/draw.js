@@ -3,7 +3,7 @@
 
 import { robotColor, stateColors, stateLook } from "./palette.js";
 import { initials } from "./roster.js";
-import { barrier, cross, disk, envelope, line, nose, ring, text } from "./shapes.js";
+import { arrow, barrier, cross, disk, envelope, line, nose, ring, text } from "./shapes.js";
 
 /** @typedef {import("./camera.js").Camera} Camera */
 /** @typedef {import("./theme.js").Theme} Theme */
@@ -370,43 +370,42 @@ export function freeLine(taken, words, x, y, robots = []) {
 }
 
 /**
- * A command on its way.
+ * A command under way: an envelope on a dotted line. One that has arrived: an arrow that fades. One that was lost: crossed out.
  * @param {Pen} pen
- * @param {import("./flights.js").Airborne} flight
+ * @param {import("./flights.js").Shown} flight
  * @param {Place} from
  * @param {Place} to
  * @param {{words: Area[], robots: Area[]}} taken where words and robots are
- * @param {boolean} isCalm whether it neither falls nor spreads when it arrives
  */
-export function flight({ context, camera, theme }, flight, from, to, taken, isCalm) {
+export function flight({ context, camera, theme }, { text: words, fate, progress, faded }, from, to, taken) {
   const x1 = camera.x(from.x);
   const y1 = camera.y(from.y);
   const x2 = camera.x(to.x);
   const y2 = camera.y(to.y);
-  const isLost = flight.fate === "dropped";
-  // It waits beside its target, whose letters can be read.
-  const most = flight.fate === "sent" ? Math.max(0.5, 1 - BESIDE_PX / Math.hypot(x2 - x1, y2 - y1)) : 1;
-  const eased = Math.min(most, flight.progress * flight.progress * (3 - 2 * flight.progress));
-  const x = x1 + (x2 - x1) * eased;
-  const y = y1 + (y2 - y1) * eased + (isCalm ? 0 : 60 * flight.fallen * flight.fallen);
-  const color = isLost && flight.fallen > 0 ? theme.bad : theme.accent;
-  context.globalAlpha = Math.max(0, 1 - Math.max(flight.fallen, flight.landed));
+  const length = Math.max(1, Math.hypot(x2 - x1, y2 - y1));
+  // Between the two robots, whose letters can be read.
+  const beside = Math.min(0.35, BESIDE_PX / length);
+  const part = beside + (1 - 2 * beside) * progress;
+  const x = x1 + (x2 - x1) * part;
+  const y = y1 + (y2 - y1) * part;
+  const color = fate === "dropped" ? theme.bad : theme.accent;
+  context.globalAlpha = 1 - 0.7 * faded;
   context.strokeStyle = color;
   context.lineWidth = 1.5;
-  context.setLineDash([1, 5]);
   context.lineCap = "round";
+  if (fate !== "delivered") context.setLineDash([1, 5]);
   context.beginPath();
-  line(context, x1, y1, x2, y2);
+  if (fate !== "delivered") line(context, x1, y1, x2, y2);
+  else arrow(context, x1 + (x2 - x1) * beside, y1 + (y2 - y1) * beside, x, y);
   context.stroke();
   context.setLineDash([]);
-  if (flight.landed > 0) ring(context, x2, y2, 14 + (isCalm ? 6 : 18 * flight.landed), color, 2);
-  else envelope(context, x, y, color, theme.field);
-  if (isLost && flight.fallen > 0) cross(context, x, y, 9, color);
+  if (fate !== "delivered") envelope(context, x, y, color, theme.field);
+  if (fate === "dropped") cross(context, x, y, 9, color);
   // Not beyond the edges.
-  const half = widthOf(flight.text) / 2 + 4;
+  const half = widthOf(words) / 2 + 4;
   const middle_px = Math.max(half, Math.min(camera.width_px - half, x));
-  const line_px = flight.text ? freeLine(taken.words, flight.text, middle_px, y, taken.robots) : null;
-  if (line_px !== null) text(context, theme, flight.text, middle_px, line_px, color);
+  const line_px = words ? freeLine(taken.words, words, middle_px, y, taken.robots) : null;
+  if (line_px !== null) text(context, theme, words, middle_px, line_px, color);
   context.globalAlpha = 1;
 }
 

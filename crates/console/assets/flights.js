@@ -1,90 +1,71 @@
 // @ts-check
-// Animates commands. A frame may state the sending and the fate of a command at once; the animation takes longer.
+// Where commands are: a function of the tick that is shown, so that the plan agrees with the log at every tick.
 
 /** @typedef {import("./types/messages.js").Flight} Flight */
 /** @typedef {import("./types/messages.js").Fate} Fate */
 
 /**
  * A command as it is drawn.
- * @typedef {object} Airborne
+ * @typedef {object} Shown
  * @property {string} from
  * @property {string} to
- * @property {string} text of the command, empty if the frame with its sending was skipped
- * @property {Fate} fate the latest one that a frame stated
- * @property {number} progress 0 at the sender, 1 at the target
- * @property {number} fallen 0 while it flies, 1 when a lost one is no longer visible
- * @property {number} landed 0 while it flies, 1 when the mark at the target is no longer visible
+ * @property {string} text of the command, empty if its sending is not known
+ * @property {Fate} fate up to the tick that is shown
+ * @property {number} progress part of the way that it has gone
+ * @property {number} faded 0 in the tick that decided its fate, 1 when that is no longer shown
  */
+/** When it was sent, and what became of its copies. @typedef {{tick: number, fate: Fate}} End */
+/** @typedef {{from: string, to: string, text: string, sent: number, ends: End[]}} Command */
 
-const FLIGHT_MS = 900;
-const FALL_MS = 900;
-const LANDING_MS = 500;
-/** Progress at which a lost command falls. */
-const HALF_WAY = 0.5;
-/** Progress at which a command stays while its fate is not decided. */
-const BEFORE_TARGET = 0.85;
-const MOST_AIRBORNE = 64;
-/** A command whose fate no frame states is removed after this time. */
-const FORGOTTEN_MS = 60000;
+/** How long it is shown what became of a command, in simulated time. The server tells of as long a time before a range of ticks. */
+export const TOLD_S = 2;
+/** After this time a command is half way to its target: how long it will take is not known. */
+const HALF_WAY_S = 2;
+/** Where a lost one is shown. */
+const LOST_AT = 0.5;
+/** Most commands that are known. */
+const MOST_COMMANDS = 4096;
 
 export class Flights {
   constructor() {
-    /** @type {Map<string, Airborne & {age_ms: number}>} */
-    this.airborne = new Map();
+    /** By sender, target and number, the newest last. @type {Map<string, Command>} */
+    this.commands = new Map();
   }
 
-  clear() {
-    this.airborne.clear();
-  }
-
-  /** @param {Flight[]} flights in order of time */
+  /** Takes in what happened to commands, in any order and as often as it is told. @param {Flight[]} flights */
   push(flights) {
-    for (const { from, to, seq, command, fate } of flights) {
+    for (const { tick, from, to, seq, command, fate } of flights) {
       const key = JSON.stringify([from, to, seq]);
-      const known = this.airborne.get(key);
-      if (known) {
-        known.fate = fate;
-        known.text ||= command ?? "";
-        continue;
-      }
-      const text = command ?? "";
-      this.airborne.set(key, { from, to, text, fate, progress: 0, fallen: 0, landed: 0, age_ms: 0 });
+      const known = this.commands.get(key) ?? { from, to, text: "", sent: -Infinity, ends: [] };
+      this.commands.set(key, known);
+      known.text ||= command ?? "";
+      if (fate === "sent") known.sent = tick;
+      else if (!known.ends.some((end) => end.tick === tick && end.fate === fate)) known.ends.push({ tick, fate });
     }
 
-    for (const key of this.airborne.keys()) {
-      if (this.airborne.size <= MOST_AIRBORNE) break;
-      this.airborne.delete(key);
+    for (const key of this.commands.keys()) {
+      if (this.commands.size <= MOST_COMMANDS) break;
+      this.commands.delete(key);
     }
   }
 
   /**
-   * @param {number} passed_ms wall clock since the last call
-   * @param {boolean} isCalm whether a command is where it ends at once
+   * The commands under way in a tick, and those whose fate it or a tick shortly before has decided.
+   * @param {number} tick
+   * @param {number} tick_s length of a tick
+   * @returns {Shown[]}
    */
-  advance(passed_ms, isCalm) {
-    for (const [key, flight] of this.airborne) {
-      flight.age_ms += passed_ms;
-      step(flight, passed_ms, isCalm);
-      if (flight.fallen >= 1 || flight.landed >= 1 || flight.age_ms > FORGOTTEN_MS) this.airborne.delete(key);
+  at(tick, tick_s) {
+    const shown = [];
+    for (const { from, to, text, sent, ends } of this.commands.values()) {
+      const past = ends.filter((end) => end.tick <= tick);
+      const last = past.reduce((/** @type {End | null} */ newest, end) => (newest && newest.tick > end.tick ? newest : end), null);
+      const age_s = (tick - (last?.tick ?? sent)) * tick_s;
+      if (sent > tick || age_s === Infinity || (last && age_s >= TOLD_S)) continue;
+
+      const progress = !last ? age_s / (age_s + HALF_WAY_S) : last.fate === "dropped" ? LOST_AT : 1;
+      shown.push({ from, to, text, fate: last?.fate ?? "sent", progress, faded: last ? age_s / TOLD_S : 0 });
     }
+    return shown;
   }
-
-  /** Whether any command has to be drawn again. */
-  get isMoving() {
-    return [...this.airborne.values()].some((flight) => flight.fate !== "sent" || flight.progress < BEFORE_TARGET);
-  }
-}
-
-/**
- * @param {Airborne} flight
- * @param {number} passed_ms
- * @param {boolean} isCalm
- */
-function step(flight, passed_ms, isCalm) {
-  const isLost = flight.fate === "dropped";
-  const end = isLost ? Math.max(HALF_WAY, flight.progress) : flight.fate === "delivered" ? 1 : BEFORE_TARGET;
-  if (isCalm) flight.progress = end;
-  if (flight.progress < end) flight.progress = Math.min(end, flight.progress + passed_ms / FLIGHT_MS);
-  else if (isLost) flight.fallen += passed_ms / FALL_MS;
-  else if (flight.fate === "delivered") flight.landed += passed_ms / LANDING_MS;
 }

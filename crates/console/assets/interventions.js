@@ -1,6 +1,7 @@
 // @ts-check
 // Experiments by hand, in a tab: links are cut, robots stopped, parameters changed. What is in effect is listed, and can be undone.
 
+import { seconds } from "./units.js";
 import { html, nothing, render } from "./vendor/lit-html.js";
 
 /** @typedef {import("./store.js").Store} Store */
@@ -18,6 +19,7 @@ const KINDS = {
 };
 
 const HEAL = "Heal";
+const OF_NOW = "Only the present can be changed.";
 /** Most effects that are listed one by one. */
 const MOST_EFFECTS = 12;
 
@@ -25,7 +27,7 @@ export class Interventions {
   /**
    * @param {{menu: HTMLElement, effects: HTMLElement}} places
    * @param {Store} store
-   * @param {{act: (control: Control, note: string) => Promise<boolean>, save: () => void, close: () => void}} client
+   * @param {{act: (control: Control, note: string) => Promise<boolean>, save: () => void, close: () => void, live: () => void}} client
    */
   constructor(places, store, client) {
     this.places = places;
@@ -74,10 +76,9 @@ export class Interventions {
     render(listed.length ? this.list(listed) : nothing, effects);
   }
 
-  /** What is in effect now. @returns {Effect[]} */
+  /** What is in effect in the tick that is shown. @returns {Effect[]} */
   inEffect() {
-    // Also while a past tick is shown.
-    const { now: frame, status } = this.store;
+    const { frame, status, isBack } = this.store;
     /** @type {Effect[]} */
     const effects = [];
 
@@ -96,7 +97,8 @@ export class Interventions {
       const { state, undo } = KINDS[kind];
       effects.push({ text: `${robot} ${state}`, undo, act: () => this.do({ intervention: "recover", robot }) });
     }
-    for (const { name, on_late } of status?.robots ?? []) {
+    // How late robots are treated is known of now only.
+    for (const { name, on_late } of isBack ? [] : (status?.robots ?? [])) {
       if (on_late === status?.on_late || on_late !== "continue") continue;
       effects.push({
         text: `the clock goes on without ${name} when it is late`,
@@ -112,32 +114,47 @@ export class Interventions {
     const shown = effects.slice(0, MOST_EFFECTS);
     const rest = effects.length - shown.length;
     const hasCuts = effects.filter(({ undo }) => undo === HEAL).length > 1;
+    const { isBack } = this.store;
 
     return html`
+      ${isBack ? html`<b data-testid="effects-time">at ${this.time}:</b>` : nothing}
       <ul>${shown.map(
         ({ text, undo, act }) => html`<li><span>${text}</span>
-          <button type="button" data-testid="undo-effect" aria-label="${undo}: ${text}" @click=${act}>${undo}</button></li>`,
+          <button type="button" data-testid="undo-effect" aria-label="${undo}: ${text}" ?disabled=${isBack}
+            title=${isBack ? OF_NOW : nothing} @click=${act}>${undo}</button></li>`,
       )}
       ${rest > 0 ? html`<li>and ${rest} more</li>` : nothing}</ul>
-      ${hasCuts ? html`<button type="button" data-testid="heal-all" @click=${() => this.do({ intervention: "heal" })}>Heal all links</button>` : nothing}`;
+      ${hasCuts ? html`<button type="button" data-testid="heal-all" ?disabled=${isBack} @click=${() => this.do({ intervention: "heal" })}>Heal all links</button>` : nothing}`;
+  }
+
+  /** The time that is shown. */
+  get time() {
+    const { frame } = this.store;
+    return frame ? seconds(frame.time_s, frame.tick_s) : "";
   }
 
   menu() {
     const { names } = this;
+    const { isBack } = this.store;
     if (!names.includes(this.robot)) this.robot = names[0] ?? "";
     const choose = (/** @type {Event} */ event) => {
       this.robot = /** @type {HTMLSelectElement} */ (event.target).value;
       this.render();
     };
 
-    return html`<div class="experiment">
-      <fieldset><legend>A robot</legend>
+    return html`
+      ${isBack
+        ? html`<p class="of-past" role="status" data-testid="experiment-past">This is the past, at ${this.time}. ${OF_NOW}
+            <button type="button" @click=${() => this.client.live()}>Back to now</button></p>`
+        : nothing}
+      <div class="experiment">
+      <fieldset ?disabled=${isBack}><legend>A robot</legend>
         <select aria-label="Robot" data-testid="experiment-robot" .value=${this.robot} @change=${choose}>
           ${names.map((name) => html`<option value=${name} ?selected=${name === this.robot}>${name}</option>`)}</select>
         <div class="row">${this.faults()}</div>
       </fieldset>
-      <fieldset><legend>Its parameters</legend>${this.parameter()}</fieldset>
-      <fieldset><legend>Links</legend>${this.links()}</fieldset>
+      <fieldset ?disabled=${isBack}><legend>Its parameters</legend>${this.parameter()}</fieldset>
+      <fieldset ?disabled=${isBack}><legend>Links</legend>${this.links()}</fieldset>
       <button type="button" data-testid="experiment-save" title="the scenario, with what was done by hand as changes of it"
         @click=${() => this.client.save()}>Save as a scenario</button></div>`;
   }

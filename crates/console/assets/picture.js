@@ -6,7 +6,7 @@ import { Camera } from "./camera.js";
 import * as draw from "./draw.js";
 import { faceShapes } from "./face.js";
 import { intensityOf } from "./known.js";
-import { barrier, cross, disk, envelope, line, ring } from "./shapes.js";
+import { arrow, barrier, cross, disk, envelope, line, ring } from "./shapes.js";
 import { readTheme } from "./theme.js";
 import { seconds } from "./units.js";
 import { Vector } from "./vector.js";
@@ -231,7 +231,14 @@ function legend(paper, words, theme, frame, hasTrails, y) {
     paper.strokeRect(x - 5.5, at - 5.5, 11, 11);
   }, "obstacle");
   row((at) => barrier(paper, x - 8, at, 6, 0, theme.warning), "blocked");
-  row((at) => envelope(paper, x, at, theme.accent, theme.field), "command");
+  row((at) => envelope(paper, x, at, theme.accent, theme.field), "command under way");
+  row((at) => {
+    paper.strokeStyle = theme.accent;
+    paper.lineWidth = 1.5;
+    paper.beginPath();
+    arrow(paper, x - 12, at, x + 12, at);
+    paper.stroke();
+  }, "received");
   row((at) => {
     envelope(paper, x, at, theme.bad, theme.field);
     cross(paper, x, at, 6, theme.bad);

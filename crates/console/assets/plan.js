@@ -4,7 +4,6 @@
 import { Camera } from "./camera.js";
 import { Crowd } from "./crowd.js";
 import * as draw from "./draw.js";
-import { Flights } from "./flights.js";
 import { Gestures } from "./gestures.js";
 import { Motion } from "./motion.js";
 import { Ground, Sprites } from "./sprites.js";
@@ -51,7 +50,6 @@ export class Plan {
     this.editor = editor;
     this.camera = new Camera();
     this.motion = new Motion();
-    this.flights = new Flights();
     /** @type {draw.Pen} */
     this.pen = { context, camera: this.camera, theme: readTheme() };
     this.hasTrails = false;
@@ -68,7 +66,6 @@ export class Plan {
     });
 
     store.on("frame", () => this.push());
-    store.on("epoch", () => this.flights.clear());
     onThemeChange(() => {
       this.pen.theme = readTheme();
       this.sprites.clear();
@@ -90,7 +87,6 @@ export class Plan {
     const { frame } = this.store;
     if (!frame) return;
     this.motion.push(frame, performance.now(), CALM.matches);
-    this.flights.push(frame.flights ?? []);
     this.touch();
   }
 
@@ -127,7 +123,7 @@ export class Plan {
   /** Whether anybody would see a difference. @param {number} now_ms */
   isDue(now_ms) {
     const travel_px = this.motion.travel_m(this.lastDraw_ms, now_ms) * this.camera.scale;
-    return this.isStale || this.flights.isMoving || travel_px >= LEAST_TRAVEL_PX;
+    return this.isStale || travel_px >= LEAST_TRAVEL_PX;
   }
 
   /** Animation frames in the last second, including those that needed no painting. */
@@ -154,7 +150,6 @@ export class Plan {
    * @param {number} now_ms
    */
   paintRun(frame, now_ms) {
-    this.flights.advance(Math.min(100, now_ms - this.lastDraw_ms), CALM.matches);
     this.lastDraw_ms = now_ms;
     this.paintGround(frame.obstacles, frame.body_m, true);
     this.paintMoving(this.pen, frame, this.drawRobot);
@@ -211,11 +206,11 @@ export class Plan {
     }
 
     // The newest first: where there is no place for all words, they are those that stay.
-    for (const flight of [...this.flights.airborne.values()].reverse()) {
+    for (const flight of this.store.flights.at(frame.tick, frame.tick_s).reverse()) {
       // A sender that is not on the field, such as the operator, is drawn above it.
       const outside = { x: frame.field_m[0] / 2, y: frame.field_m[1] };
       const to = motion.robotsNow.get(flight.to);
-      if (to) draw.flight(pen, flight, motion.robotsNow.get(flight.from) ?? outside, to, taken, CALM.matches);
+      if (to) draw.flight(pen, flight, motion.robotsNow.get(flight.from) ?? outside, to, taken);
     }
 
     this.paintScale(pen);

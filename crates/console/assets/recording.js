@@ -2,6 +2,7 @@
 // The time line of a run: what is recorded of it, and what was seen of it while it goes on. A tick of either is shown through
 // the same store as the newest one.
 
+import { Flights } from "./flights.js";
 import { History } from "./history.js";
 import { hasGuessedNames, orderNames } from "./palette.js";
 
@@ -9,6 +10,7 @@ import { hasGuessedNames, orderNames } from "./palette.js";
 /** @typedef {import("./types/messages.js").Awaited} Awaited */
 /** @typedef {import("./types/messages.js").Cut} Cut */
 /** @typedef {import("./types/messages.js").Flight} Flight */
+/** @typedef {import("./types/messages.js").HeldProcess} HeldProcess */
 /** @typedef {import("./types/messages.js").LogRecord} LogRecord */
 /** @typedef {import("./widgets.js").Panel} Panel */
 /** @typedef {import("./types/messages.js").RobotFrame} RobotFrame */
@@ -21,11 +23,12 @@ import { hasGuessedNames, orderNames } from "./palette.js";
  *   body_m: number, display_unit: "m" | "ft", obstacles: [number, number][], ticks: number, is_finished: boolean, number: number, epochs: number[]}} Recorded
  */
 /**
- * @typedef {{tick: number, robots: RobotFrame[], guests_mm: number[], guest_moods: WorldFrame["guest_moods"], cuts: Cut[], awaiting: Awaited[],
- *   expectations: Standing[]}} RecordedTick
+ * @typedef {{tick: number, robots: RobotFrame[], guests_mm: number[], guest_moods: WorldFrame["guest_moods"], cuts: Cut[], faults: HeldProcess[],
+ *   awaiting: Awaited[], expectations: Standing[]}} RecordedTick
  */
 /** A panel and its tick. @typedef {{tick: number, robot: string, panel: Panel}} RecordedPanel */
-/** Ticks before `end`. @typedef {{end: number, ticks: RecordedTick[], panels: RecordedPanel[], flights: Flight[], log: LogRecord[]}} Chunk */
+/** Ticks before `end`; `earlier_flights` are of commands that the first ones show, too. @typedef {{end: number, ticks: RecordedTick[], panels: RecordedPanel[], earlier_flights: Flight[], flights: Flight[],
+ *   log: LogRecord[]}} Chunk */
 
 /** Ticks in a chunk: few, because a seek waits for a whole one. */
 const CHUNK = 32;
@@ -53,7 +56,7 @@ const FASTEST = 200;
 export class Player {
   /**
    * @param {Store} store
-   * @param {{failed: (reason: string) => void, sought: () => void}} client
+   * @param {{failed: (reason: string) => void}} client
    */
   constructor(store, client) {
     this.store = store;
@@ -70,6 +73,8 @@ export class Player {
     this.missingAt_ms = 0;
     /** The last tick of the newest epoch that charts and log have from its recording. */
     this.readTo = -1;
+    /** The newest tick when the page was connected; negative once the commands that were sent before are known. */
+    this.connectedAt = -1;
     /** The recording of which the log has the epochs before. */
     this.earlierOf = 0;
     /** The epoch whose names are in order. */
@@ -239,6 +244,7 @@ export class Player {
   /** The page is connected to a run in progress, perhaps again: everything that is recorded is read. */
   connected() {
     this.readTo = -1;
+    this.connectedAt = Infinity;
     this.earlierOf = 0;
     if (!this.isFollowing) this.follow();
   }
@@ -268,7 +274,7 @@ export class Player {
 
     // What was asked for may have been between what was recorded and what the page saw.
     const wanted = Math.floor(this.position);
-    if (store.isBack && !this.isPlaying && this.chosen !== wanted && wanted <= this.recorded) await this.show(wanted, false);
+    if (store.isBack && !this.isPlaying && this.chosen !== wanted && wanted <= this.recorded) await this.show(wanted);
     if (!newest || newest.epoch !== store.live?.epoch) return;
 
     if (before && before.number !== newest.number && before.epoch >= newest.epoch) {
@@ -286,6 +292,7 @@ export class Player {
 
   /** @param {Recorded} epoch in progress */
   async refill(epoch) {
+    if (this.connectedAt >= 0) await this.learnFlights(epoch);
     while (this.readTo < epoch.ticks) {
       const from = this.readTo + 1;
       const range = await samples(epoch, from);
@@ -300,6 +307,19 @@ export class Player {
       this.store.memory.forget(this.readTo);
       this.store.emit("live");
     }
+  }
+
+  /** Learns of commands that were sent before the page was connected. @param {Recorded} epoch in progress */
+  async learnFlights(epoch) {
+    const query = { from: epoch.ticks, count: 1, epoch: epoch.epoch };
+    /** @type {Chunk} */
+    const chunk = await ticks(query);
+    const { live } = this.store;
+    if (live?.epoch !== epoch.epoch) return;
+    this.store.learnFlights([...chunk.earlier_flights, ...chunk.flights]);
+    // Until then, some were sent between what is recorded and what the page saw.
+    this.connectedAt = Math.min(this.connectedAt, live.tick);
+    if (epoch.ticks >= this.connectedAt) this.connectedAt = -1;
   }
 
   /**
@@ -360,7 +380,6 @@ export class Player {
     if (this.header !== newest) this.forgetChunks();
     this.header = newest?.epoch === store.live?.epoch ? newest : null;
     store.showLive();
-    this.client.sought();
   }
 
   forgetChunks() {
@@ -381,9 +400,8 @@ export class Player {
     }
 
     if (!this.store.isConnected) return Promise.reject(new Error("The console of this recording is not reachable."));
-    const query = new URLSearchParams({ from: String(number * CHUNK), count: String(CHUNK), epoch: String(this.header?.epoch ?? 0) });
     /** @type {Promise<Chunk>} */
-    const fetched = get("recording/ticks", query).then((/** @type {Chunk} */ chunk) => {
+    const fetched = ticks({ from: number * CHUNK, count: CHUNK, epoch: this.header?.epoch ?? 0 }).then((chunk) => {
       if (this.chunks.get(number) !== fetched) return chunk;
       this.numbers += numbersIn(chunk);
       this.makeRoom(number);
@@ -423,8 +441,7 @@ export class Player {
     if (this.isOfLive && tick >= this.last) return this.live();
     this.position = tick;
     try {
-      await this.show(tick, false);
-      this.client.sought();
+      await this.show(tick);
     } catch (error) {
       this.client.failed(reasonOf(error));
     }
@@ -443,11 +460,8 @@ export class Player {
     if (epoch === this.epoch) await this.seek(tick);
   }
 
-  /**
-   * @param {number} tick
-   * @param {boolean} isPlayed whether the commands since the tick before are shown
-   */
-  async show(tick, isPlayed) {
+  /** @param {number} tick */
+  async show(tick) {
     const seek = ++this.seeks;
     if (this.isOfLive && (!this.header || tick > this.recorded)) return this.showSeen(tick);
 
@@ -463,10 +477,9 @@ export class Player {
     const record = chunk.ticks.find((one) => one.tick === tick) ?? chunk.ticks.at(-1);
     if (seek !== this.seeks || !record) return;
 
-    const flights = isPlayed ? chunk.flights.filter((flight) => flight.tick > this.chosen && flight.tick <= tick) : [];
     this.chosen = record.tick;
     const panels = chunk.panels.filter((one) => one.tick === record.tick);
-    this.store.showPast(this.frame(header, record, flights), new Map(panels.map(({ robot, panel }) => [robot, panel])));
+    this.store.showPast(this.frame(header, record), new Map(panels.map(({ robot, panel }) => [robot, panel])), flightsOf(chunk));
   }
 
   /** Shows what the page saw of a tick, or of one before. @param {number} tick */
@@ -475,16 +488,15 @@ export class Player {
     const seen = memory.at(tick);
     if (!live || !seen) return;
     this.chosen = seen.frame.tick;
-    this.store.showPast({ ...seen.frame, phase: live.phase, speed: live.speed, awaiting: [], flights: [] }, seen.panels);
+    this.store.showPast({ ...seen.frame, phase: live.phase, speed: live.speed, awaiting: [], flights: [] }, seen.panels, this.store.liveFlights);
   }
 
   /**
    * @param {Recorded} header
    * @param {RecordedTick} record
-   * @param {Flight[]} flights
    * @returns {WorldFrame}
    */
-  frame(header, record, flights) {
+  frame(header, record) {
     const { guests_mm } = record;
     const { live } = this.store;
     /** @type {[number, number][]} */
@@ -504,8 +516,9 @@ export class Player {
       awaiting: record.awaiting,
       guests,
       guest_moods: record.guest_moods,
-      flights,
+      flights: [],
       cuts: record.cuts,
+      faults: record.faults,
       expectations: record.expectations,
       robots: record.robots,
     };
@@ -558,7 +571,7 @@ export class Player {
       if (tick >= this.last) this.isPlaying = false;
       if (!this.isPlaying && this.isOfLive) return this.live();
       try {
-        if (tick !== this.tick || !this.isPlaying) await this.show(tick, true);
+        if (tick !== this.tick || !this.isPlaying) await this.show(tick);
       } catch (error) {
         this.isPlaying = false;
         this.client.failed(reasonOf(error));
@@ -576,8 +589,22 @@ export class Player {
  * @returns {Promise<Chunk>}
  */
 function samples(epoch, from, every = Math.ceil((epoch.ticks + 1) / SAMPLES)) {
-  const query = { from, count: READ_AT_ONCE, every, epoch: epoch.epoch };
+  return ticks({ from, count: READ_AT_ONCE, every, epoch: epoch.epoch });
+}
+
+/**
+ * @param {Record<string, number>} query
+ * @returns {Promise<Chunk>}
+ */
+function ticks(query) {
   return get("recording/ticks", new URLSearchParams(Object.entries(query).map(([name, value]) => [name, String(value)])));
+}
+
+/** What a chunk knows of commands. @param {Chunk} chunk */
+function flightsOf({ earlier_flights, flights }) {
+  const known = new Flights();
+  known.push([...earlier_flights, ...flights]);
+  return known;
 }
 
 /** @param {Chunk} chunk */

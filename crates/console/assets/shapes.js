@@ -35,6 +35,15 @@ export function line(context, x1, y1, x2, y2) {
   context.lineTo(x2, y2);
 }
 
+/** A line with a head at its end. @type {(context: Paper, x1: number, y1: number, x2: number, y2: number) => void} */
+export function arrow(context, x1, y1, x2, y2) {
+  const angle_rad = Math.atan2(y2 - y1, x2 - x1);
+  const side = (/** @type {number} */ turn) => /** @type {const} */ ([x2 - 9 * Math.cos(angle_rad + turn), y2 - 9 * Math.sin(angle_rad + turn)]);
+  line(context, x1, y1, x2, y2);
+  line(context, ...side(0.5), x2, y2);
+  context.lineTo(...side(-0.5));
+}
+
 /** @type {(context: Paper, x: number, y: number, radius: number, color: string) => void} */
 export function disk(context, x, y, radius, color) {
   context.beginPath();

@@ -1,6 +1,7 @@
 // @ts-check
 // The state of the page. Only this module changes it; views subscribe to topics and read.
 
+import { Flights } from "./flights.js";
 import { History } from "./history.js";
 import { Marks } from "./marks.js";
 import { Memory } from "./memory.js";
@@ -53,6 +54,10 @@ export class Store {
     this.panels = new Map();
     /** Those of the newest frame of a run in progress. @type {Map<string, Panel>} */
     this.livePanels = this.panels;
+    /** What is known of commands, for the tick that is shown. */
+    this.flights = new Flights();
+    /** Of the run in progress. */
+    this.liveFlights = this.flights;
     /** Panels whose frame comes next. @type {Map<string, TickPanel>} */
     this.earlyPanels = new Map();
     /** Robots that have shown a panel. @type {Set<string>} */
@@ -174,6 +179,8 @@ export class Store {
 
     this.livePanels = new Map([...this.earlyPanels].filter(([, panel]) => isOfTick(panel, frame)));
     if (!this.isBack) this.panels = this.livePanels;
+    this.liveFlights.push(frame.flights ?? []);
+    if (!this.isBack) this.flights = this.liveFlights;
     this.liveHistory.see(frame.time_s, frame.tick_s, frame.robots);
     this.memory.add(frame, this.livePanels);
     if (!this.isBack) this.emit("panel");
@@ -203,6 +210,7 @@ export class Store {
     const isShown = this.history === this.liveHistory && !this.isBack;
     this.liveHistory = new History();
     if (isShown) this.history = this.liveHistory;
+    this.liveFlights = new Flights();
     this.memory.clear();
   }
 
@@ -219,10 +227,12 @@ export class Store {
    * Shows an earlier tick of a run in progress, or a tick of a recording.
    * @param {WorldFrame} frame
    * @param {Map<string, Panel>} panels
+   * @param {Flights} flights
    */
-  showPast(frame, panels) {
+  showPast(frame, panels, flights) {
     this.isBack = this.mode === "live";
     this.panels = panels;
+    this.flights = flights;
     for (const robot of panels.keys()) this.displaying.add(robot);
     this.emit("panel");
     this.show(frame);
@@ -233,8 +243,15 @@ export class Store {
     this.isBack = false;
     this.history = this.liveHistory;
     this.panels = this.livePanels;
+    this.flights = this.liveFlights;
     this.emit("panel");
     if (this.live) this.show(this.live);
+  }
+
+  /** Takes in what a recording has of commands of the run in progress. @param {import("./types/messages.js").Flight[]} flights */
+  learnFlights(flights) {
+    this.liveFlights.push(flights);
+    if (!this.isBack) this.emit("frame");
   }
 
   /**

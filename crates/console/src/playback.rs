@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::{PoisonError, RwLock, RwLockReadGuard};
 
-use protocol::messages::{Flight, LogRecord, Point, Presence};
+use protocol::messages::{Fate, Flight, HeldProcess, LogRecord, Point, Presence};
 use protocol::{Epoch, Event, RobotName, Tick};
 use recording::{Header, Json, PlacedRobot, RawTick, RecordingError};
 use serde::Serialize;
-use timeline::{StateKind, Timeline};
+use timeline::{CommandSpan, StateKind, Timeline};
 
 use crate::diagrams::{DiagramError, Diagrams, WindowQuery};
 
@@ -18,6 +18,11 @@ pub(crate) const MAX_TICKS: u64 = 512;
 pub(crate) const MAX_SAMPLED_TICKS: u64 = 4096;
 /// Most bytes in one answer, as they are recorded; an answer has at least one tick.
 const MAX_BYTES: u64 = 32 << 20;
+
+/// How long before a range commands are told of: the page shows for 2 s what became of a command (`assets/flights.js`).
+const TOLD_S: f64 = 2.0;
+/// Most ticks of it.
+const MOST_TOLD_TICKS: u64 = 4096;
 
 /// Why a recording cannot be shown.
 #[derive(Debug, thiserror::Error)]
@@ -85,6 +90,8 @@ struct EncodedRange {
     ticks: List,
     /// Panels of these ticks.
     panels: List,
+    /// Commands under way before the range, and what became of those of the last [`TOLD_S`] before it.
+    earlier_flights: Vec<Flight>,
     flights: Vec<Flight>,
     log: Vec<LogRecord>,
 }
@@ -212,7 +219,19 @@ impl RecordedEpoch {
             ..EncodedRange::default()
         };
         // Whether a robot is lost in the first tick depends on ticks before the range.
-        let mut timeline = self.diagrams.before(&file, from)?;
+        let told_from = from.saturating_sub(self.told_ticks());
+        let mut timeline = self.diagrams.before(&file, told_from)?;
+        if every.is_none() {
+            range.earlier_flights = timeline.commands().map(sent).collect();
+        }
+        file.for_events(told_from, from, |recorded| {
+            timeline.tick(recorded.tick, &recorded.events);
+            if every.is_none() {
+                let told = recorded.events.iter();
+                let flights = told.filter_map(|event| event.flight(recorded.tick));
+                range.earlier_flights.extend(flights);
+            }
+        })?;
         let mut last_reports = BTreeMap::new();
         for mut recorded in file.read_raw(from, to)? {
             let tick = recorded.tick();
@@ -237,6 +256,17 @@ impl RecordedEpoch {
         Ok(range.into_json())
     }
 
+    /// The ticks in [`TOLD_S`].
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a float becomes the nearest tick, at most MOST_TOLD_TICKS"
+    )]
+    fn told_ticks(&self) -> Tick {
+        let ticks = (TOLD_S / self.header.tick_s).ceil();
+        (ticks as Tick).min(MOST_TOLD_TICKS)
+    }
+
     /// The emotions and behaviors so far, as JSON, in the order in which they first occurred: by it they have their colors.
     ///
     /// # Errors
@@ -257,6 +287,18 @@ impl RecordedEpoch {
     /// [`DiagramError`] if the file is damaged or the window has too much.
     pub(crate) fn diagram(&self, window: WindowQuery) -> Result<String, DiagramError> {
         self.diagrams.draw(&self.file(), window)
+    }
+}
+
+/// A command under way, as the tick in which it was sent shows it.
+fn sent(command: &CommandSpan) -> Flight {
+    Flight {
+        tick: command.sent,
+        from: command.from.clone(),
+        to: command.to.clone(),
+        seq: command.seq,
+        command: command.text.clone(),
+        fate: Fate::Sent,
     }
 }
 
@@ -294,12 +336,21 @@ fn add_tick(
         }
     }
 
+    let faults: Vec<HeldProcess> = timeline
+        .faults()
+        .map(|(robot, kind)| HeldProcess {
+            robot: robot.clone(),
+            kind,
+        })
+        .collect();
+
     range.ticks.add_object(&[
         ("tick", &to_json(&tick)),
         ("robots", &robots.into_json()),
         ("guests_mm", &to_json(&recorded.frame.guests_mm)),
         ("guest_moods", &to_json(&recorded.frame.guest_moods)),
         ("cuts", &to_json(&recorded.frame.cuts)),
+        ("faults", &to_json(&faults)),
         (
             "expectations",
             &to_json(&recorded.frame.standings(&recorded.events)),
@@ -326,6 +377,7 @@ impl EncodedRange {
             ("end", &to_json(&self.end)),
             ("ticks", &self.ticks.into_json()),
             ("panels", &self.panels.into_json()),
+            ("earlier_flights", &to_json(&self.earlier_flights)),
             ("flights", &to_json(&self.flights)),
             ("log", &to_json(&self.log)),
         ]);

@@ -223,6 +223,17 @@ impl Timeline {
         self.commands.get(&(from.clone(), seq))
     }
 
+    /// The commands of which a copy is under way, by sender and number.
+    pub fn commands(&self) -> impl Iterator<Item = &CommandSpan> {
+        self.commands.values()
+    }
+
+    /// The faults that hold processes of robots, by robot.
+    pub fn faults(&self) -> impl Iterator<Item = (&RobotName, FaultKind)> {
+        let robots = self.robots.iter();
+        robots.flat_map(|(name, robot)| robot.faults.iter().map(move |(kind, _)| (name, *kind)))
+    }
+
     fn robot(&mut self, name: &RobotName) -> &mut RobotProgress {
         self.robots.entry(name.clone()).or_default()
     }

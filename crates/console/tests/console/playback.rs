@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use protocol::messages::{
-    Awaited, Cut, DisplayUnit, Panel, Performative, Point, Reason, Report, Widget,
+    Awaited, Cut, DisplayUnit, FaultKind, Panel, Performative, Point, Reason, Report, Widget,
 };
 use protocol::{Event, RobotName, RunName};
 use recording::content::Missed;
@@ -175,6 +175,45 @@ fn a_range_has_its_ticks_and_their_events() {
         assert_eq!(log.len(), expected_ticks.len() + commands);
         assert_eq!(ticks(&range["flights"]).len(), commands);
     }
+}
+
+#[test]
+fn a_range_has_the_commands_and_faults_of_before_that_its_ticks_show() {
+    let folder = tempfile::tempdir().unwrap();
+    let recorded = (0..60).map(|tick| {
+        let mut recorded = recorded_tick(tick);
+        if tick == 12 || tick == 24 {
+            recorded.events.push(Event::CommandDelivered {
+                from: robot("Butler"),
+                to: robot("Leguin"),
+                seq: tick / 10,
+            });
+        }
+        if tick == 15 || tick == 30 {
+            recorded.events.push(Event::Fault {
+                robot: robot("Leguin"),
+                kind: FaultKind::Hang,
+                begins: tick == 15,
+            });
+        }
+        recorded
+    });
+    write(&file(folder.path()), recorded);
+    let console = open(folder.path());
+
+    // That of tick 10 arrived long ago; that of tick 20 within two seconds, four ticks.
+    let range = get_range(&console, 27, 1);
+    let earlier = &range["earlier_flights"];
+    assert_eq!(ticks(earlier), [0, 20, 24]);
+    assert_eq!(earlier[1]["command"], "refill");
+    assert_eq!(earlier[2]["fate"], "delivered");
+    let held = json!([{"robot": "Leguin", "kind": "hang"}]);
+    assert_eq!(range["ticks"][0]["faults"], held);
+
+    let range = get_range(&console, 40, 1);
+    assert_eq!(ticks(&range["earlier_flights"]), [0, 30]);
+    assert_eq!(ticks(&range["flights"]), [40]);
+    assert_eq!(range["ticks"][0]["faults"], json!([]));
 }
 
 #[test]

@@ -1,0 +1,129 @@
+"""Commands on the plan are a function of the tick that is shown: the plan never contradicts the log."""
+
+import random
+
+import pytest
+
+from lab import eventually, newest, scrub, start_console, until
+
+# How long the plan shows what became of a command, simulated time.
+TOLD_S = 2
+
+# Notes the envelopes that the plan draws, which are of this size.
+WATCH = """() => {
+    const {rect, save} = CanvasRenderingContext2D.prototype;
+    window.envelopes = [];
+    // Each painting begins so.
+    CanvasRenderingContext2D.prototype.save = function () {
+        if (this.canvas.id === "plan") window.envelopes = [];
+        return save.call(this);
+    };
+    CanvasRenderingContext2D.prototype.rect = function (x, y, width, height) {
+        if (width === 18 && height === 12) window.envelopes.push([x + 9, y + 6]);
+        return rect.call(this, x, y, width, height);
+    };
+}"""
+# Paints the plan anew, and returns the envelopes in it, the commands that it shows, and the tick.
+PAINTED = """async () => {
+    const frames = (n) => new Promise((done) => requestAnimationFrame(() => (n ? frames(n - 1).then(done) : done())));
+    await frames(2);
+    document.getElementById("trails").click();
+    await frames(1);
+    const {flights, frame} = window.carsConsole;
+    return {tick: frame().tick, envelopes: window.envelopes.length,
+        shown: flights().map(({from, to, fate}) => `${from} ${to} ${fate}`).sort()};
+}"""
+SAMPLE = """(() => {
+    const {flights, frame} = window.carsConsole;
+    return {tick: frame().tick, shown: flights().map(({from, to, fate}) => `${from} ${to} ${fate}`).sort()};
+})()"""
+
+
+def shown_by(events, tick, tick_s):
+    """What the plan is to show of a tick, by the record: commands under way, and what became of others in the last two seconds."""
+    commands = {}
+    for event in events:
+        if event["tick"] > tick or event["event"] not in ("command_sent", "command_delivered", "command_dropped"):
+            continue
+        commands[event["from"], event["to"], event["seq"]] = (event["event"].removeprefix("command_"), event["tick"])
+    told = (
+        f"{sender} {target} {fate}"
+        for (sender, target, _), (fate, at) in commands.items()
+        if fate == "sent" or (tick - at) * tick_s < TOLD_S
+    )
+    return sorted(told)
+
+
+def agree(page, run, tick, tick_s):
+    expected = shown_by(run.events(), tick, tick_s)
+
+    def look():
+        nonlocal painted
+        painted = page.evaluate(PAINTED)
+        return painted["tick"] == tick and painted["shown"] == expected
+
+    painted = None
+    try:
+        eventually("agreement", look, patience_s=6.0)
+    except AssertionError:
+        pytest.fail(f"tick {tick}: the plan shows {painted}, by the record {expected}")
+    # What has been received is under way nowhere.
+    assert painted["envelopes"] == sum(not one.endswith("delivered") for one in expected), (tick, painted)
+
+
+@pytest.mark.parametrize("speed", [1, 5, "max"])
+@pytest.mark.parametrize("network", ["", 'network.commands={ delay="3 s" }', "network.commands={ loss=0.5 }"])
+def test_envelopes_are_where_the_log_says(launch, open_page, processes, speed, network):
+    chance = random.Random(f"{speed} {network}")
+    options = ["--set", "seed=7", "--set", 'duration="100 s"', "--speed", str(speed), "--stay"]
+    run = launch(options=[*options, *(["--set", network] if network else [])])
+    page = open_page(run.address)
+    until(page, "window.carsConsole.frame() !== null")
+    page.evaluate(WATCH)
+    tick_s = page.evaluate("window.carsConsole.frame().tick_s")
+
+    if speed == 1:
+        # As slow as that nothing happens in a test's time: from a moment with commands on.
+        run.control("step", "55")
+        eventually("the step", lambda: (run.settled() or {}).get("tick") == 55)
+    samples = []
+    for _ in range(4):
+        page.get_by_test_id("btn-start").click()
+        for _ in range(chance.randint(5, 25)):
+            samples.append(page.evaluate(SAMPLE))
+            page.wait_for_timeout(30)
+        if page.get_by_test_id("phase").inner_text().lower() == "ended":
+            break
+        page.get_by_test_id("btn-pause").click()
+        tick = eventually("a stop", lambda: is_still(run))["tick"]
+        agree(page, run, tick, tick_s)
+
+    if is_still(run)["phase"] != "ended":
+        run.control("speed", "max")
+        run.control("start")
+        eventually("the end", lambda: (is_still(run) or {}).get("phase") == "ended")
+    events = run.events()
+    for sample in samples:
+        assert sample["shown"] == shown_by(events, sample["tick"], tick_s), sample
+
+    # In the past, in a page that comes later, and in the recording, of ticks in which something happened to commands.
+    eventful = [event["tick"] for event in events if event["event"].startswith("command_")]
+    assert eventful
+    later = open_page(run.address)
+    recorded = open_page(start_console(processes, "--recording", run.run_folder))
+    until(later, "window.carsConsole.frame() !== null")
+    until(recorded, "window.carsConsole.frame() !== null")
+    for one in (later, recorded):
+        one.evaluate(WATCH)
+    agree(later, run, is_still(run)["tick"], tick_s)
+    for one in (page, later, recorded):
+        for tick in chance.sample(eventful, min(4, len(eventful))):
+            tick = min(tick + chance.randint(0, 5), newest(one))
+            scrub(one, tick)
+            agree(one, run, tick, tick_s)
+
+
+def is_still(run):
+    """The status of a run whose clock has stopped; `None` while it goes on."""
+    status = run.settled()
+    return status if status and status["phase"] in ("ready", "paused", "ended") else None
