@@ -131,7 +131,7 @@ def test_the_plan_is_saved_as_a_drawing(launch, open_page, tmp_path, screenshots
 
     document = ElementTree.parse(kept).getroot()
     words = [text.text for text in document.iter(f"{SVG}text")]
-    for word in ("Butler", "Leguin", "Bu", "Le", "SERVE", "guest", "obstacle", "blocked", "command", "lost command", "cut off"):
+    for word in ("Butler", "Leguin", "Bu", "Le", "SERVE", "guest", "obstacle", "blocked", "command under way", "received", "lost command", "cut off"):
         assert word in words, words
     frame = page.evaluate("window.carsConsole.frame()")
     for word in ("console-test", "1.5 s of 600.0 s, tick 3", f"seed {frame['seed']}", "5 ft", *(robot["emotion_state"] for robot in frame["robots"])):

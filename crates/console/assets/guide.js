@@ -38,7 +38,7 @@ function guide(place, store) {
 
   return html`<header><h2>First steps</h2>
       <button type="button" data-testid="guide-fold" aria-expanded=${isLong} @click=${fold}>${isLong ? "Hide" : "Show"}</button>
-      <button type="button" data-testid="guide-dismiss" @click=${() => close(true)}>Do not show this again</button>
+      <button type="button" data-testid="guide-dismiss" @click=${() => close(true)}>Do not show again</button>
       <button type="button" class="close" aria-label="Close" data-testid="guide-close" @click=${() => close(false)}>×</button></header>
     ${isLong ? steps(hasNotBegun, store.run) : nothing}`;
 }
@@ -49,7 +49,7 @@ function guide(place, store) {
  */
 function steps(hasNotBegun, run) {
   return html`<ol>
-      <li><b>Look.</b> ${hasNotBegun ? html`The run waits: press <i>Start</i> at the top. ` : nothing}The ring around a robot is its emotion, an envelope is a command.</li>
+      <li><b>Look.</b> ${hasNotBegun ? html`The run waits: press <i>Start</i> at the top. ` : nothing}The ring around a robot is its emotion, an envelope is a command under way, an arrow one that was received.</li>
       <li><b>Cut a link.</b> The tab <i>Experiment</i>, one robot <i>from</i>, the other one <i>to</i>, <i>Cut</i>.</li>
       <li><b>Why?</b> The panel beside the plan says <i>why</i> a robot feels so; the log has each change.</li>
       <li><b>Go back.</b> Drag the time line to any moment; <i>Back to now</i> goes on with the run.</li>
