@@ -1,6 +1,5 @@
 """Words and numbers on the page are true of the tick that is shown."""
 
-
 import re
 
 import pytest
