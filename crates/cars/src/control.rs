@@ -8,7 +8,8 @@ use lab::folder::find;
 use protocol::event::log_line;
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{
-    Command, Control, ControlAnswer, FaultKind, Intervention, LogRecord, OnLate, Presence, Status,
+    Command, Control, ControlAnswer, FaultKind, Intervention, LogRecord, OnLate, Payload, Presence,
+    Status,
 };
 use protocol::time::seconds;
 use protocol::{Message, RobotName, RunName, Tick, decode, encode};
@@ -140,6 +141,9 @@ enum ControlRequest {
         robot: RobotName,
         /// Text of the command, for example `refill`.
         command: String,
+        /// A payload beside it: JSON, of at most 64 KiB.
+        #[arg(long, value_name = "JSON", value_parser = read_payload)]
+        payload: Option<Payload>,
     },
 }
 
@@ -355,7 +359,11 @@ impl From<ByHand> for Intervention {
 pub(crate) fn ctl(args: CtlArgs) -> Result<ExitCode> {
     match args.request {
         ControlRequest::Query { robot, what } => query(&args.run, &robot, what.as_deref()),
-        ControlRequest::Command { robot, command } => send_command(&args.run, &robot, command),
+        ControlRequest::Command {
+            robot,
+            command,
+            payload,
+        } => send_command(&args.run, &robot, command, payload),
         ControlRequest::Control(request) => {
             let control = request.control()?;
             print_answer(&args.run, &control, args.json)
@@ -401,14 +409,14 @@ fn ask(bus: &Bus, keys: &Keys, run: &RunRef, control: &Control) -> Result<Contro
     let run = run.run()?;
     let reply = reply.ok_or_else(|| refusal!("no simulator of run {run} answers"))?;
 
-    Ok(decode(&key, "simulator", &payload(reply)?)?)
+    Ok(decode(&key, "simulator", &body(reply)?)?)
 }
 
-/// The payload of a reply.
+/// The body of a reply.
 ///
 /// # Errors
 /// The reason of an error reply.
-fn payload(reply: Reply) -> Result<Vec<u8>> {
+fn body(reply: Reply) -> Result<Vec<u8>> {
     reply.result.map_err(|reason| refusal!("refused: {reason}"))
 }
 
@@ -475,7 +483,7 @@ fn query(run: &RunRef, robot: &RobotName, what: Option<&str>) -> Result<ExitCode
 
     let run = run.run()?;
     let reply = reply.ok_or_else(|| refusal!("no robot called {robot} answers in run {run}"))?;
-    let answer: serde_json::Value = serde_json::from_slice(&payload(reply)?)?;
+    let answer: serde_json::Value = serde_json::from_slice(&body(reply)?)?;
 
     // Epoch and tick around the value are for programs.
     let value = answer.get("value").unwrap_or(&answer);
@@ -490,10 +498,23 @@ fn query(run: &RunRef, robot: &RobotName, what: Option<&str>) -> Result<ExitCode
     Ok(ExitCode::SUCCESS)
 }
 
+/// Reads the payload of a command.
+fn read_payload(json: &str) -> Result<Payload, String> {
+    let payload: Payload = serde_json::from_str(json).map_err(|error| error.to_string())?;
+    payload.check("payload").map_err(|error| error.reason)?;
+    Ok(payload)
+}
+
 /// Sends a command from the operator. It takes effect at the next tick boundary and is part of the record.
-fn send_command(run: &RunRef, robot: &RobotName, text: String) -> Result<ExitCode> {
+fn send_command(
+    run: &RunRef,
+    robot: &RobotName,
+    text: String,
+    payload: Option<Payload>,
+) -> Result<ExitCode> {
     let command = Command {
         command: text,
+        payload,
         ..Command::default()
     };
     command

@@ -31,7 +31,7 @@ const fn rule(name: &'static str, section: &'static str) -> ProtocolRule {
 }
 
 /// All rules, in the order of the page.
-pub const RULES: [ProtocolRule; 34] = [
+pub const RULES: [ProtocolRule; 35] = [
     rule("join.request", "joining"),
     rule("join.ready-last", "joining"),
     rule("join.refused", "joining"),
@@ -42,6 +42,7 @@ pub const RULES: [ProtocolRule; 34] = [
     rule("command.order", "commands"),
     rule("command.twice", "commands"),
     rule("command.sent", "commands"),
+    rule("command.payload", "commands"),
     rule("operator.commands", "commands"),
     rule("news.wait", "a-tick"),
     rule("query.tick", "queries"),

@@ -1,7 +1,7 @@
 //! The ticks that a robot is taken through: what happens to it is a function of the tick and of what it proposed, so that
 //! the same robot meets the same again.
 
-use protocol::messages::{Correction, Delivery, Performative, TickUpdate};
+use protocol::messages::{Correction, Delivery, Payload, Performative, TickUpdate};
 use protocol::{RobotName, Tick};
 
 use crate::body::{ROUND, RobotBody};
@@ -19,6 +19,7 @@ const CUT_OFF: Tick = 14;
 pub(crate) struct ArrivingCommand {
     pub(crate) from: RobotName,
     pub(crate) text: String,
+    pub(crate) payload: Option<Payload>,
     /// The tick in whose news it is.
     pub(crate) tick: Tick,
 }
@@ -29,6 +30,7 @@ impl ArrivingCommand {
         Self {
             from: from.clone(),
             text: text.to_owned(),
+            payload: None,
             tick,
         }
     }
@@ -105,6 +107,7 @@ impl PlayScript {
                     from: arrival.from.clone(),
                     performative: Performative::Achieve,
                     command: arrival.text.clone(),
+                    payload: arrival.payload.clone(),
                 });
             }
         }

@@ -125,8 +125,9 @@ impl Seen {
         bytes: Vec<u8>,
         order: usize,
     ) -> ReportedCommand {
-        let from = Keys::last_chunk(key).to_owned();
-        let command = match reading::read_command(key, &from, &bytes) {
+        let robot = Keys::robot_of(key).unwrap_or_default();
+        let sender = Keys::command_sender(key).unwrap_or(robot).to_owned();
+        let command = match reading::read_command(key, &sender, &bytes) {
             Ok((command, not_integers)) => {
                 self.not_integers.extend(not_integers);
                 Ok(command)
@@ -134,9 +135,14 @@ impl Seen {
             Err(error) => Err(error.to_string()),
         };
 
+        let to = match (Keys::command_sender(key), &command) {
+            (Some(_), _) => robot.to_owned(),
+            (None, Ok(Command { to: Some(to), .. })) => to.to_string(),
+            (None, _) => String::new(),
+        };
         let sent = ReportedCommand {
-            to: Keys::robot_of(key).unwrap_or_default().to_owned(),
-            from,
+            to,
+            from: sender,
             command,
             bytes,
             order,

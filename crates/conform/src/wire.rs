@@ -191,14 +191,18 @@ fn listen(
         });
     })?;
 
-    let sender = queue.clone();
-    let commands = bus.subscribe_with_qos(&keys.commands(), move |key, bytes, qos| {
-        let _over = sender.send(WireEvent::Command {
-            key: key.into(),
-            bytes: bytes.into(),
-            qos,
-        });
-    })?;
+    // On the robot's outbox, or on the keys of the targets.
+    let mut commands = Vec::new();
+    for keys in [keys.outboxes(), keys.commands()] {
+        let sender = queue.clone();
+        commands.push(bus.subscribe_with_qos(&keys, move |key, bytes, qos| {
+            let _over = sender.send(WireEvent::Command {
+                key: key.into(),
+                bytes: bytes.into(),
+                qos,
+            });
+        })?);
+    }
 
     let sender = queue.clone();
     let waiting = bus.subscribe_with_qos(&keys.all_waiting(), move |key, bytes, qos| {
@@ -222,5 +226,6 @@ fn listen(
         });
     })?;
 
-    Ok(vec![reports, commands, waiting, joins, tokens])
+    commands.extend([reports, waiting, joins, tokens]);
+    Ok(commands)
 }

@@ -23,7 +23,7 @@ pub const FILES: [&str; 3] = ["events.csv", "states.csv", "variables.csv"];
 const WHEN: &str = "epoch tick time_s";
 /// A row for each event.
 const EVENTS: &str = "event robot generation x_m y_m blocked_by blocked_by_robot state_before state_after from_robot \
-                      to_robot seq performative command because until_tick cuts_commands cuts_queries fault begins guest mood \
+                      to_robot seq performative command payload_bytes because until_tick cuts_commands cuts_queries fault begins guest mood \
                       set by_hand expectation verdict text seed version protocol tick_s reason digest";
 /// A row for each robot in each tick.
 const STATES: &str = "robot generation x_m y_m speed_mps direction_rad emotion behavior blocked missed commands \
@@ -335,10 +335,16 @@ fn event_cells(event: &Event) -> Vec<Column<'_>> {
             seq,
             performative,
             command,
+            payload,
+            payload_of: _,
         } => {
             let mut cells = message_cells(from, to, Some(*seq));
             cells.push(("performative", performative.name().into()));
             cells.push(("command", command.as_str().into()));
+            let bytes = payload
+                .as_ref()
+                .map(|payload| payload.as_json().len() as u64);
+            cells.push(("payload_bytes", bytes.into()));
             cells
         }
         Event::CommandDelivered { from, to, seq } | Event::CommandDuplicated { from, to, seq } => {

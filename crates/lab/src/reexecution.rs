@@ -151,7 +151,7 @@ impl Reexecution {
         simulation.note_faults(&orders, |robot| lateness.of(robot));
 
         for sent in recorded.commands_of(&RobotName::operator()) {
-            simulation.command(&sent.to, &sent.command.command);
+            simulation.command(sent);
         }
         for (robot, ticks) in recorded.done_late() {
             for tick in ticks {

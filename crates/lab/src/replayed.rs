@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use config::FileError;
-use protocol::messages::Report;
+use protocol::messages::{CommandText, Report};
 use protocol::{RobotName, Tick};
 use record::EpochFiles;
 use record::{Entry, Record};
@@ -70,7 +70,10 @@ impl Replayed {
 
         for sent in entry.commands_of(&name) {
             let to = sent.to.as_str();
-            if let Err(error) = cars.set_robot_command(to, sent.command.command) {
+            let CommandText {
+                command, payload, ..
+            } = sent.command;
+            if let Err(error) = cars.send(to, command, payload) {
                 cars.log(format!("cannot repeat a command to {to}: {error}"));
             }
         }

@@ -2,8 +2,7 @@
 
 use std::str::FromStr;
 
-use protocol::RobotName;
-use protocol::messages::{Command, CommandText, Refusal, Report, TickUpdate, Welcome};
+use protocol::messages::{Command, CommandText, Refusal, Report, Target, TickUpdate, Welcome};
 
 use crate::actions::TickAnswer;
 use crate::exchange::{IncarnationNotice, Sent};
@@ -97,13 +96,10 @@ impl From<Refused> for Refusal {
 impl Sent<CommandText> {
     /// The content of a command that was put for `to`.
     #[must_use]
-    pub fn new(to: RobotName, command: Command) -> Self {
+    pub fn new(to: Target, command: Command) -> Self {
         Self {
             to,
-            command: CommandText {
-                performative: command.performative,
-                command: command.command,
-            },
+            command: command.into(),
         }
     }
 }
@@ -111,15 +107,17 @@ impl Sent<CommandText> {
 impl<S, R> TickAnswer<S, CommandText, R> {
     /// The commands as they are put, in their order, each with its target. The first has the number `first`: 1, if no rule is
     /// to be broken.
-    pub fn commands_from(&self, first: u32) -> impl Iterator<Item = (&RobotName, Command)> {
+    pub fn commands_from(&self, first: u32) -> impl Iterator<Item = (&Target, Command)> {
         (first..).zip(&self.commands).map(|(number, sent)| {
             let command = Command {
                 epoch: self.epoch,
                 tick: self.tick,
                 generation: self.generation,
                 number,
+                to: Some(sent.to.clone()),
                 performative: sent.command.performative,
                 command: sent.command.command.clone(),
+                payload: sent.command.payload.clone(),
             };
             (&sent.to, command)
         })

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use protocol::messages::Target;
 use protocol::{Generation, RobotName, Tick};
 
 /// A tick as the simulation sees it: news go out, reports come back.
@@ -71,8 +72,8 @@ impl<R, C> Default for TickOutcome<R, C> {
 /// A command that a robot sent.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Sent<C> {
-    /// The target, as the sender named it.
-    pub to: RobotName,
+    /// The target, as the sender named it. A broadcast is one command here.
+    pub to: Target,
     /// The content.
     pub command: C,
 }

@@ -212,6 +212,8 @@ mod tests {
                 seq: 1,
                 performative: Default::default(),
                 command: "refill".to_owned(),
+                payload: None,
+                payload_of: None,
             },
         ];
         words.observe(&Observation {

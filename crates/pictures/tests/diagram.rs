@@ -40,6 +40,8 @@ fn sent(seq: u64, text: &str) -> Event {
         seq,
         performative: Performative::Achieve,
         command: text.to_owned(),
+        payload: None,
+        payload_of: None,
     }
 }
 
@@ -680,6 +682,8 @@ fn the_operator_has_a_lane_if_it_sends_commands() {
         seq: 1,
         performative: Performative::Achieve,
         command: "refill".to_owned(),
+        payload: None,
+        payload_of: None,
     };
     let lanes = |events: &[(Tick, Event)]| {
         let svg = draw(events, 0, 40);

@@ -3,7 +3,7 @@
 //! What no rule allows is refused. The simulator needs no rule: it holds the door, and what it says itself passes no
 //! door. Everything here is about what others may say to it; it passes on only what it let in.
 
-use crate::keys::{Keys, PARAMETERS, QUERIES, STATE};
+use crate::keys::{Keys, OUTBOX, PARAMETERS, QUERIES, STATE};
 use crate::name::{OPERATOR, RobotName};
 
 /// The simulator, as its certificate names it.
@@ -47,7 +47,7 @@ const PRESENCE: &[&str] = &["declare_liveliness_subscriber", "liveliness_query"]
 #[must_use]
 pub fn of_robot(keys: &Keys, robot: &RobotName) -> Vec<Grant> {
     let name = robot.as_str();
-    let says = ["report", "waiting", "panel", STATE].map(|what| keys.robot(name, what));
+    let says = ["report", "waiting", "panel", STATE, OUTBOX].map(|what| keys.robot(name, what));
     let commands = keys.robot("*", &format!("command/{name}"));
 
     let mut answers = state_keys(keys, name);
@@ -130,6 +130,7 @@ mod tests {
                 "cars/*/robot/Butler/waiting",
                 "cars/*/robot/Butler/panel",
                 "cars/*/robot/Butler/state",
+                "cars/*/robot/Butler/outbox",
                 "cars/*/robot/*/command/Butler"
             ]
         );

@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::messages::is_false;
 use crate::messages::{
-    End, Fate, FaultKind, Flight, GuestMood, LogKind, LogRecord, Performative, Point, Reason,
-    Verdict,
+    End, Fate, FaultKind, Flight, GuestMood, LogKind, LogRecord, Payload, Performative, Point,
+    Reason, Verdict,
 };
 use crate::name::RobotName;
 use crate::plain::escape_line;
@@ -109,6 +109,13 @@ pub enum Event {
         performative: Performative,
         /// What it says.
         command: String,
+        /// Its payload, if it has one that is not recorded with an earlier command.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        payload: Option<Payload>,
+        /// The number of an earlier command of this sender in this tick, with which the same payload is recorded: a payload that a
+        /// robot sends to many others is in the record once.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        payload_of: Option<Seq>,
     },
     /// A command arrives now.
     CommandDelivered {

@@ -31,6 +31,9 @@ pub const QUERIES: [&str; 6] = [
 /// half of what six do.
 pub const STATE: &str = "state";
 
+/// Last chunk of the key on which a robot puts its commands.
+pub(crate) const OUTBOX: &str = "outbox";
+
 /// Last chunk of the key at which a robot checks parameters.
 pub(crate) const PARAMETERS: &str = "parameters";
 
@@ -119,7 +122,19 @@ impl Keys {
         format!("{}/robot/{to}/command/{from}", self.root)
     }
 
-    /// All commands of the run.
+    /// Robot to medium: commands that name their targets themselves. The sender is in the key, so that access control can pin it.
+    #[must_use]
+    pub fn outbox(&self, from: &RobotName) -> String {
+        self.robot(from.as_str(), OUTBOX)
+    }
+
+    /// All outboxes of the run.
+    #[must_use]
+    pub fn outboxes(&self) -> String {
+        self.robot("*", OUTBOX)
+    }
+
+    /// All commands of the run that are put on the keys of their targets.
     #[must_use]
     pub fn commands(&self) -> String {
         format!("{}/robot/*/command/*", self.root)
@@ -226,6 +241,13 @@ impl Keys {
         let mut chunks = key.split('/').skip_while(|chunk| *chunk != "robot");
         chunks.next()?;
         chunks.next()
+    }
+
+    /// The sender that the key of a command to one robot names; `None` for an outbox.
+    #[must_use]
+    pub fn command_sender(key: &str) -> Option<&str> {
+        let (before, from) = key.rsplit_once('/')?;
+        before.ends_with("/command").then_some(from)
     }
 
     /// The last chunk of a key: the sender of a command, or what a query asks for.

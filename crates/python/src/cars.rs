@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::error::{Interrupted, TooEarly, UnknownRobot, Unreachable};
+use crate::payload::read_payload;
 use crate::scoped_borrow::with_cars;
 use crate::stream::Stream;
 use crate::values::{
@@ -72,9 +73,7 @@ impl Cars {
     #[getter]
     fn commands<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         let commands = with_cars(|cars| cars.commands().to_vec())?;
-        tuple(py, &commands, |one| {
-            command(py, one.from.as_str(), &one.text)
-        })
+        tuple(py, &commands, |one| command(py, one))
     }
 
     /// Its own random stream, derived from the seed and its name: the only chance it may use.
@@ -131,6 +130,21 @@ impl Cars {
     /// Sends a command to another robot (``setRobotCommand``). It arrives at a later tick, if the network lets it.
     fn set_robot_command(&self, to: &str, command: String) -> PyResult<()> {
         with_cars(|cars| cars.set_robot_command(to, command))?.map_err(exception)
+    }
+
+    /// Sends a command with a payload to another robot: any JSON value, of at most 64 KiB. It arrives at a later tick, if the network
+    /// lets it.
+    #[pyo3(signature = (to, name, payload=None))]
+    fn send(&self, to: &str, name: String, payload: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        let payload = read_payload(payload)?;
+        with_cars(|cars| cars.send(to, name, payload))?.map_err(exception)
+    }
+
+    /// Sends a command to every other robot of the roster. The network decides for each of them.
+    #[pyo3(signature = (name, payload=None))]
+    fn broadcast(&self, name: String, payload: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        let payload = read_payload(payload)?;
+        with_cars(|cars| cars.broadcast(name, payload))
     }
 
     /// All six answers at once. The first query to a robot in a tick may cost a round trip, further ones are free.

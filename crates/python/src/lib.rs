@@ -9,6 +9,7 @@ mod host;
 mod hunt;
 mod interrupt;
 mod make;
+mod payload;
 mod pictures;
 mod processes;
 mod run;

@@ -4,7 +4,11 @@ use pyo3::exceptions::{PyOverflowError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyBool, PyDict, PyMapping, PyString, PyTuple, PyType};
-use robot::{Action, Point, PublicState, SensedBody, SensedKind, StateVariables, Variable};
+use robot::{
+    Action, Point, PublicState, ReceivedCommand, SensedBody, SensedKind, StateVariables, Variable,
+};
+
+use crate::payload::json_value;
 
 /// Module of the classes.
 const DATA: &str = "cars._data";
@@ -24,11 +28,15 @@ pub(crate) fn read_point(value: &Bound<'_, PyAny>) -> PyResult<Point> {
 /// A command that arrived.
 pub(crate) fn command<'py>(
     py: Python<'py>,
-    sender: &str,
-    text: &str,
+    command: &ReceivedCommand,
 ) -> PyResult<Bound<'py, PyAny>> {
     static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
-    CLASS.import(py, DATA, "Command")?.call1((sender, text))
+    let payload = command.payload.as_ref();
+    let payload = payload
+        .map(|payload| json_value(py, payload.value()))
+        .transpose()?;
+    let fields = (command.from.as_str(), &command.text, payload);
+    CLASS.import(py, DATA, "Command")?.call1(fields)
 }
 
 /// A robot within sensing range.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use config::FileError;
 use lockstep::{Attendance, Sent};
-use protocol::messages::{CommandText, Report};
+use protocol::messages::{CommandText, Payload, Report, Target};
 use protocol::{Event, Line, RobotName, Tick};
 use recording::{Frame, Recording, RecordingError, Ticks};
 
@@ -101,21 +101,29 @@ impl Entry {
     #[must_use]
     pub fn commands_of(&self, name: &RobotName) -> Vec<Sent<CommandText>> {
         let mut commands = Vec::new();
+        let mut payloads = BTreeMap::new();
         for event in &self.events {
             if let Event::CommandSent {
                 from,
                 to,
+                seq,
                 performative,
                 command,
-                ..
+                payload,
+                payload_of,
             } = event
                 && from == name
             {
+                if let Some(payload) = payload {
+                    payloads.insert(*seq, payload);
+                }
+                let payload = payloads.get(&payload_of.unwrap_or(*seq));
                 commands.push(Sent {
-                    to: to.clone(),
+                    to: Target::Robot(to.clone()),
                     command: CommandText {
                         performative: *performative,
                         command: command.clone(),
+                        payload: payload.map(|payload| Payload::clone(payload)),
                     },
                 });
             }

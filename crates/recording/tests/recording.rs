@@ -121,6 +121,8 @@ fn tick(tick: Tick) -> RecordedTick {
                 seq: tick,
                 performative: Performative::Achieve,
                 command: "come".to_owned(),
+                payload: None,
+                payload_of: None,
             },
             Event::Tick {
                 digest: format!("{tick:032x}"),

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use lockstep::Sent;
 use protocol::messages::{
-    CommandText, MAX_ENTRIES, MAX_TEXT_BYTES, Performative, Point, PublicState, SensedBody,
-    SensedRobot, StateVariables, TickUpdate, Welcome,
+    CommandText, MAX_ENTRIES, MAX_TEXT_BYTES, Payload, Performative, Point, PublicState,
+    SensedBody, SensedRobot, StateVariables, Target, TickUpdate, Welcome,
 };
 use protocol::plain::cut;
 use protocol::random::Stream;
@@ -68,8 +68,10 @@ pub enum CallError {
 pub struct ReceivedCommand {
     /// The sender: a robot, or an operator.
     pub from: RobotName,
-    /// Its text.
+    /// Its text: the name of what is to be done.
     pub text: String,
+    /// Its payload, if it has one.
+    pub payload: Option<Payload>,
 }
 
 /// The simulation, as one robot sees it during one tick.
@@ -232,14 +234,46 @@ impl<'a> Cars<'a> {
         to: &str,
         command: impl Into<String>,
     ) -> Result<(), CallError> {
-        let to = self.known(to)?;
+        self.send(to, command, None)
+    }
+
+    /// Sends a command with a payload to another robot: any JSON value, of at most 64 KiB. It arrives at a later tick, unless the
+    /// simulated network loses it.
+    ///
+    /// ```
+    /// # fn tick(cars: &mut robot::Cars<'_>) -> Result<(), robot::CallError> {
+    /// let bid = serde_json::json!({ "task": 3, "bid": 0.1 });
+    /// cars.send("Vonda", "bid", robot::Payload::new(bid))?;
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`CallError::UnknownRobot`] if no robot has this name.
+    pub fn send(
+        &mut self,
+        to: &str,
+        name: impl Into<String>,
+        payload: Option<Payload>,
+    ) -> Result<(), CallError> {
+        let to = Target::Robot(self.known(to)?);
+        self.put(to, name.into(), payload);
+        Ok(())
+    }
+
+    /// Sends a command to every other robot of the roster. The simulated network decides for each of them, as if each were sent one
+    /// command in the order of the roster; the message itself goes to the simulator once.
+    pub fn broadcast(&mut self, name: impl Into<String>, payload: Option<Payload>) {
+        self.put(Target::Others, name.into(), payload);
+    }
+
+    fn put(&mut self, to: Target, command: String, payload: Option<Payload>) {
         let command = CommandText {
             performative: Performative::Achieve,
-            command: command.into(),
+            command,
+            payload,
         };
-
         self.outbox.push(Sent { to, command });
-        Ok(())
     }
 
     /// Where another robot stood at the last tick, meters (`getRobotLocation`).
@@ -318,13 +352,10 @@ impl<'a> Cars<'a> {
     }
 
     fn known(&self, name: &str) -> Result<RobotName, CallError> {
-        let found = self
-            .welcome
-            .roster
-            .iter()
-            .find(|robot| robot.as_str() == name);
-        found
-            .cloned()
-            .ok_or_else(|| CallError::UnknownRobot(name.to_owned()))
+        let roster = &self.welcome.roster;
+        let index = roster.binary_search_by(|robot| robot.as_str().cmp(name));
+        index
+            .map(|index| roster[index].clone())
+            .map_err(|_| CallError::UnknownRobot(name.to_owned()))
     }
 }

@@ -33,10 +33,6 @@ use crate::network::{PeerNetwork, Undelivered};
 use crate::runner::{Runner, TickResult};
 use participants::{Actions, Allowance, Asked, HostAction, HostAnswer, Participants};
 
-/// Most robots for which a publisher of commands is declared. Without one, zenoh compares each command's key with all keys that
-/// anyone has declared in the network; with one, it does so once.
-const MAX_COMMANDED: usize = 64;
-
 /// How to reach a run.
 #[derive(Debug, Clone)]
 pub struct HostOptions {
@@ -148,8 +144,9 @@ struct HostedRobot {
     report: Publisher,
     state: WatchedPublisher,
     panel: WatchedPublisher,
-    /// Publishers of the commands to the robots that it has commanded.
-    commands: BTreeMap<RobotName, Publisher>,
+    /// For all commands, whatever their targets: a key for each pair of robots would cost more than the commands. Declared with the
+    /// first one.
+    outbox: Option<Publisher>,
     token: Option<Declared>,
 }
 
@@ -205,7 +202,7 @@ impl Host {
                 report: bus.publisher(&keys.report(&name))?,
                 state: bus.watched_publisher(&keys.query(&name, STATE))?,
                 panel: bus.observer_publisher(&keys.panel(&name))?,
-                commands: BTreeMap::new(),
+                outbox: None,
                 token: None,
             };
             members.insert(name, member);
@@ -504,17 +501,12 @@ impl Host {
         let Some(member) = self.members.get_mut(name) else {
             return Ok(());
         };
-        for (to, command) in answer.commands_from(1) {
-            let key = self.keys.command(to, name);
-            if !member.commands.contains_key(to) && member.commands.len() < MAX_COMMANDED {
-                let publisher = self.bus.publisher(&key)?;
-                member.commands.insert(to.clone(), publisher);
-            }
-
-            match member.commands.get(to) {
-                Some(publisher) => publisher.put(encode(&command))?,
-                None => self.bus.put(&key, encode(&command))?,
-            }
+        for (_, command) in answer.commands_from(1) {
+            let outbox = match &mut member.outbox {
+                Some(outbox) => outbox,
+                none => none.insert(self.bus.publisher(&self.keys.outbox(name))?),
+            };
+            outbox.put(encode(&command))?;
         }
         // Without a robot that follows it, the state is not even encoded.
         if member.state.has_subscribers() {

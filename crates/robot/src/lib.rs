@@ -55,9 +55,9 @@ pub use host::{Host, HostError, HostOptions, Stopper};
 pub use local::LocalHost;
 pub use network::{PeerNetwork, Undelivered};
 pub use protocol::messages::{
-    Clock, Command, CommandText, Correction, End, Face, Panel, Parameters, Point, PublicState,
-    Report, SensedBody, SensedKind, SensedRobot, StateVariables, TickUpdate, Tone, Variable,
-    Welcome, Widget,
+    Clock, Command, CommandText, Correction, End, Face, Panel, Parameters, Payload, Point,
+    PublicState, Report, SensedBody, SensedKind, SensedRobot, StateVariables, TickUpdate, Tone,
+    Variable, Welcome, Widget,
 };
 pub use protocol::random::Stream;
 pub use protocol::{RobotName, RobotPattern, RunName, Tick};

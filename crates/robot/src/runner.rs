@@ -5,9 +5,7 @@ use std::sync::Arc;
 
 use lockstep::{Begin, Sent, Turn};
 use protocol::codec::MAX_MESSAGE_BYTES;
-use protocol::messages::{
-    Command, CommandText, Panel, Point, PublicState, Report, TickUpdate, Welcome,
-};
+use protocol::messages::{CommandText, Panel, Point, PublicState, Report, TickUpdate, Welcome};
 use protocol::random::{Stream, stream};
 use protocol::{FieldError, Message, Tick, encode};
 
@@ -326,12 +324,7 @@ fn is_small(report: &Report) -> bool {
 
 /// Whether a command stays within the limits of a message.
 fn check_command(sent: &Sent<CommandText>) -> Result<(), FieldError> {
-    let command = Command {
-        command: sent.command.command.clone(),
-        ..Command::default()
-    };
-
-    command.check()
+    sent.command.check()
 }
 
 /// The commands that arrived.
@@ -341,6 +334,7 @@ fn received(news: &TickUpdate) -> Vec<ReceivedCommand> {
         received.push(ReceivedCommand {
             from: delivery.from.clone(),
             text: delivery.command.clone(),
+            payload: delivery.payload.clone(),
         });
     }
 

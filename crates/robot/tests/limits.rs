@@ -6,9 +6,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use lockstep::Exchange;
-use protocol::messages::{Correction, JoinAnswer, TickUpdate, Welcome};
+use protocol::messages::{Correction, JoinAnswer, MAX_PAYLOAD_BYTES, TickUpdate, Welcome};
 use protocol::{Message, RobotName};
-use robot::{Action, BadParameters, Cars, LocalHost, Point, Robot};
+use robot::{Action, BadParameters, Cars, LocalHost, Payload, Point, Robot};
 
 /// Whether it has a variable that is too long.
 struct Chatterbox(bool);
@@ -142,6 +142,43 @@ fn commands_beyond_the_limits_end_the_robot_with_the_reason() {
                 );
             }
             None => assert_eq!(outcome.unwrap().reports["A"].1.len(), count),
+        }
+    }
+}
+
+/// Sends a payload of so many bytes of JSON to all others.
+struct Broadcaster(usize);
+
+impl Robot for Broadcaster {
+    fn init(&mut self, _: &mut Cars<'_>) -> Result<(), BadParameters> {
+        Ok(())
+    }
+
+    fn tick(&mut self, cars: &mut Cars<'_>) -> Action {
+        // With its quotation marks.
+        let text = "p".repeat(self.0 - 2);
+        cars.broadcast("map", Payload::new(text.into()));
+        Action::stay(cars)
+    }
+}
+
+#[test]
+fn a_payload_has_64_kib_at_most_and_a_broadcast_is_one_command() {
+    for (bytes, is_fit) in [(MAX_PAYLOAD_BYTES, true), (MAX_PAYLOAD_BYTES + 1, false)] {
+        let robot = Box::new(Broadcaster(bytes));
+        let mut host = LocalHost::new(vec![(robot, welcome("A"))]);
+        match host.exchange(0, &BTreeMap::new()) {
+            Ok(outcome) => {
+                assert!(is_fit);
+                let (report, commands) = &outcome.reports["A"];
+                assert_eq!((report.commands, commands.len()), (1, 1));
+            }
+            Err(error) => {
+                assert!(!is_fit);
+                let expected =
+                    "A says too much: payload: 65537 bytes of JSON, more than the 65536 allowed";
+                assert_eq!(error.to_string(), expected);
+            }
         }
     }
 }

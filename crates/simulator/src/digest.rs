@@ -1,7 +1,7 @@
 //! Digests: runs are equal if and only if their digests are. They cover typed values in a fixed order, not the encoding in
 //! which a robot sent them.
 
-use protocol::messages::{Point, Report, StateVariables, Variable};
+use protocol::messages::{Payload, Point, Report, StateVariables, Variable};
 use protocol::{RobotName, Tick};
 
 use crate::medium::SentCommand;
@@ -72,6 +72,12 @@ impl TickDigest {
         self.place(point.x, point.y);
     }
 
+    /// A payload, by the digest of its canonical JSON. No text has this length, so a command without one is the same as ever.
+    fn payload(&mut self, digest: u128) {
+        self.integer(u64::MAX);
+        self.bytes.extend_from_slice(&digest.to_le_bytes());
+    }
+
     fn variables(&mut self, variables: &StateVariables) {
         self.integer(variables.len() as u64);
         for (name, value) in variables {
@@ -97,11 +103,21 @@ impl TickDigest {
         self.text(&report.emotion_state);
         self.text(&report.behavior_state);
         self.variables(&report.state_variables);
+        let mut last: Option<(&Payload, u128)> = None;
         for command in commands {
             self.text(command.to.as_str());
             self.integer(command.seq);
             self.text(command.text.performative.name());
             self.text(&command.text.command);
+            if let Some(payload) = &command.text.payload {
+                // One that is sent to many robots is hashed once.
+                let digest = match last {
+                    Some((same, digest)) if same == payload => digest,
+                    _ => xxh3_128(payload.as_json().as_bytes()),
+                };
+                last = Some((payload, digest));
+                self.payload(digest);
+            }
         }
         for line in &report.log {
             self.text(line);

@@ -6,7 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use protocol::event::{Cause, Event};
-use protocol::messages::{CommandText, Cut, Delivery, Point};
+use protocol::messages::{CommandText, Cut, Delivery, Payload, Point};
 use protocol::random::{Stream, stream, unit};
 use protocol::{RobotName, Seq, Tick};
 
@@ -22,21 +22,38 @@ pub struct SentCommand {
     pub from: RobotName,
     /// Number among the sender's commands.
     pub seq: Seq,
-    /// Performative and text.
+    /// Performative, text and payload.
     pub text: CommandText,
 }
 
 impl SentCommand {
-    /// The event `CommandSent`.
+    /// The events `CommandSent` of commands that one sender has sent in a tick. A payload that several in a row have is in the first
+    /// of their events.
     #[must_use]
-    pub fn event(&self) -> Event {
-        Event::CommandSent {
-            from: self.from.clone(),
-            to: self.to.clone(),
-            seq: self.seq,
-            performative: self.text.performative,
-            command: self.text.command.clone(),
+    pub fn events(sent: &[Self]) -> Vec<Event> {
+        let mut events = Vec::with_capacity(sent.len());
+        let mut recorded: Option<(Seq, &Payload)> = None;
+
+        for command in sent {
+            let payload = command.text.payload.as_ref();
+            let payload_of = recorded
+                .filter(|(_, recorded)| Some(*recorded) == payload)
+                .map(|(seq, _)| seq);
+            if payload_of.is_none() {
+                recorded = payload.map(|payload| (command.seq, payload));
+            }
+
+            events.push(Event::CommandSent {
+                from: command.from.clone(),
+                to: command.to.clone(),
+                seq: command.seq,
+                performative: command.text.performative,
+                command: command.text.command.clone(),
+                payload: payload.filter(|_| payload_of.is_none()).cloned(),
+                payload_of,
+            });
         }
+        events
     }
 
     /// The event `CommandDropped`.
@@ -56,6 +73,7 @@ impl SentCommand {
                 from: self.from.clone(),
                 performative: self.text.performative,
                 command: self.text.command.clone(),
+                payload: self.text.payload.clone(),
             },
         }
     }
@@ -63,7 +81,9 @@ impl SentCommand {
     /// Size of its delivery in the news of its target, bytes.
     fn encoded_bytes(&self) -> usize {
         let text_bytes = serde_json::to_string(&self.text.command).map_or(0, |json| json.len());
-        text_bytes + self.from.as_str().len() + DELIVERY_BYTES
+        let payload = self.text.payload.as_ref();
+        let payload_bytes = payload.map_or(0, |payload| payload.as_json().len() + FIELD_BYTES);
+        text_bytes + payload_bytes + self.from.as_str().len() + DELIVERY_BYTES
     }
 }
 
@@ -78,6 +98,8 @@ pub struct Arrival {
 
 /// Size of a delivery without its sender and its text, bytes.
 const DELIVERY_BYTES: usize = 64;
+/// Size of the field of a payload without the payload.
+const FIELD_BYTES: usize = ",\"payload\":".len();
 /// Most bytes of commands that arrive at a robot in a tick, so that its news fit into a message.
 const MAX_DELIVERED_BYTES: usize = 512 * 1024;
 
@@ -158,7 +180,7 @@ impl Scope {
 }
 
 impl Medium {
-    /// The network of a run with this seed, between these robots.
+    /// The network of a run with this seed, between these robots, which are in the order of their names.
     #[must_use]
     pub fn new(seed: u64, tick_s: f64, network: Network, roster: Vec<RobotName>) -> Self {
         let mut medium = Self {
@@ -316,7 +338,7 @@ impl Medium {
 
     /// Decides the fate of a command. Afterwards only a cut while it is under way can change it.
     fn dispatch(&mut self, tick: Tick, command: SentCommand, events: &mut Vec<Event>) {
-        if !self.roster.contains(&command.to) {
+        if self.roster.binary_search(&command.to).is_err() {
             events.push(command.dropped(Cause::Unknown));
             return;
         }

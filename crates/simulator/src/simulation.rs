@@ -9,9 +9,8 @@ use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::event::{Blocker, Cause, WaitedFor};
 use protocol::messages::{
     CommandText, Correction, Cut, Delivery, End, FaultKind, GuestMood, HeldProcess, Intervention,
-    NEWS_FLAGS, OnLate, Parameters, ParametersOffer, Performative, Point, ProcessOrder,
-    PublicState, Report, SensedBody, SensedKind, SensedRobot, Standing, StateVariables, TickUpdate,
-    Welcome,
+    NEWS_FLAGS, OnLate, Parameters, ParametersOffer, Point, ProcessOrder, PublicState, Report,
+    SensedBody, SensedKind, SensedRobot, Standing, StateVariables, Target, TickUpdate, Welcome,
 };
 use protocol::random::{Stream, stream};
 use protocol::{
@@ -812,14 +811,25 @@ impl Simulation {
         let count = self.sent.entry(from.clone()).or_default();
         let mut numbered = Vec::with_capacity(commands.len());
 
-        for Sent { to, command } in commands {
+        let mut number = |to: &RobotName, text: CommandText| {
             *count += 1;
             numbered.push(SentCommand {
-                to,
+                to: to.clone(),
                 from: from.clone(),
                 seq: *count,
-                text: command,
+                text,
             });
+        };
+        for Sent { to, command } in commands {
+            match to {
+                Target::Robot(to) => number(&to, command),
+                // From here on nothing tells a broadcast from one command to each; a payload is shared.
+                Target::Others => {
+                    for to in self.names.iter().filter(|name| *name != from) {
+                        number(to, command.clone());
+                    }
+                }
+            }
         }
 
         numbered
@@ -849,16 +859,20 @@ impl Simulation {
                 to: report.behavior_state.clone(),
             });
         }
-        for command in sent {
-            self.events.push(command.event());
-            // The medium decides about it at the beginning of the next tick.
-            self.medium.accept(command);
-        }
+        self.events.extend(SentCommand::events(&sent));
+        self.send(sent);
         for text in &report.log {
             self.events.push(Event::Say {
                 robot: robot.clone(),
                 text: text.clone(),
             });
+        }
+    }
+
+    /// The medium decides about commands at the beginning of the next tick.
+    fn send(&mut self, sent: Vec<SentCommand>) {
+        for command in sent {
+            self.medium.accept(command);
         }
     }
 
@@ -924,20 +938,10 @@ impl Simulation {
     }
 
     /// Sends a command of the operator, which arrives in the next tick.
-    pub fn command(&mut self, to: &RobotName, command: &str) {
-        let text = CommandText {
-            performative: Performative::Achieve,
-            command: command.to_owned(),
-        };
-        let sent = Sent {
-            to: to.clone(),
-            command: text,
-        };
-
-        for command in self.number_commands(&RobotName::operator(), vec![sent]) {
-            self.between.push(command.event());
-            self.medium.accept(command);
-        }
+    pub fn command(&mut self, command: Sent<CommandText>) {
+        let sent = self.number_commands(&RobotName::operator(), vec![command]);
+        self.between.extend(SentCommand::events(&sent));
+        self.send(sent);
     }
 
     /// The record of the end of the run, in which the expectations that are open are judged.

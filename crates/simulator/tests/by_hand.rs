@@ -10,8 +10,7 @@ use std::sync::Arc;
 use lockstep::{Bulletin, Exchange, Sent, TickOutcome};
 use protocol::event::Cause;
 use protocol::messages::{
-    CommandText, Cut, FaultKind, Intervention, OnLate, Performative, Point, Report, StateVariables,
-    TickUpdate,
+    CommandText, Cut, FaultKind, Intervention, OnLate, Point, Report, StateVariables, TickUpdate,
 };
 use protocol::{RobotName, Tick};
 use scenario::Scenario;
@@ -69,11 +68,8 @@ impl Exchange<TickUpdate, Arc<Report>, CommandText> for Robots {
             let mut commands = Vec::new();
             if robot.as_str() == "A" {
                 commands.push(Sent {
-                    to: name("B"),
-                    command: CommandText {
-                        performative: Performative::Achieve,
-                        command: "refill".to_owned(),
-                    },
+                    to: name("B").into(),
+                    command: CommandText::named("refill"),
                 });
             }
             let report = Report {

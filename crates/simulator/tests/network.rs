@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use protocol::event::Cause;
-use protocol::messages::{CommandText, Performative, Point};
+use protocol::messages::{CommandText, Point};
 use protocol::{Event, RobotName};
 use scenario::Scenario;
 use scenario::diagnostic::{FileError, Source};
@@ -41,10 +41,7 @@ fn command(from: &str, to: &str, seq: u64) -> SentCommand {
         to: name(to),
         from: name(from),
         seq,
-        text: CommandText {
-            performative: Performative::Achieve,
-            command: "refill".into(),
-        },
+        text: CommandText::named("refill"),
     }
 }
 

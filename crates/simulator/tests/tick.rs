@@ -134,11 +134,8 @@ fn name(name: &str) -> RobotName {
 
 fn command(to: &str, text: &str) -> Sent<CommandText> {
     Sent {
-        to: name(to),
-        command: CommandText {
-            performative: Performative::Achieve,
-            command: text.into(),
-        },
+        to: name(to).into(),
+        command: CommandText::named(text),
     }
 }
 
@@ -147,6 +144,7 @@ fn delivery(from: &str, text: &str) -> Delivery {
         from: name(from),
         performative: Performative::Achieve,
         command: text.into(),
+        payload: None,
     }
 }
 
@@ -351,7 +349,7 @@ fn a_command_sent_in_a_tick_is_named_by_the_next_clock_in_the_order_of_senders()
 #[test]
 fn a_command_from_outside_is_delivered_at_the_next_tick_and_recorded() {
     let (mut simulation, ..) = play(TWO, 1, |_, _, _| {});
-    simulation.command(&name("B"), "refill");
+    simulation.command(command("B", "refill"));
     let mut puppets = Puppets::new(&simulation, |_, _, _| {});
     let record = simulation.step(&mut puppets).unwrap();
 

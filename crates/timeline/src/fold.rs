@@ -119,6 +119,8 @@ impl Timeline {
                 seq,
                 performative,
                 command,
+                payload: _,
+                payload_of: _,
             } => {
                 let sent = CommandSpan {
                     from: from.clone(),

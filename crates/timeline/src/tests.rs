@@ -61,6 +61,8 @@ fn sent(seq: Seq, text: &str) -> Event {
         seq,
         performative: Performative::Achieve,
         command: text.to_owned(),
+        payload: None,
+        payload_of: None,
     }
 }
 

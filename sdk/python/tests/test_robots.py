@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import signal
 import subprocess
@@ -94,6 +95,74 @@ def test_a_robot_perceives_and_acts(scenario: Path) -> None:
     ways = run.states[run.states.robot == "A"]
     assert ways.x_m.tolist()[:6] == [10.0, 10.5, 11.0, 11.5, 12.0, 12.0]
     assert ways.speed_mps.tolist()[:6] == [1.0, 1.0, 1.0, 1.0, 0.0, 0.0]
+
+
+VALUES: list[Any] = [
+    {"task": 3, "bid": 0.1 + 0.2, "of": ["A", None, True, -(2**63), 2**64 - 1, 5e-324], "caf\u00e9": "\U0001f916"},
+    [[], {}, ""],
+    "x" * (64 * 1024 - 2),
+    False,
+    0,
+    -0.0,
+]
+BAD_VALUES: list[tuple[Any, type[Exception], str]] = [
+    ("x" * (64 * 1024 - 1), ValueError, "65537 bytes of JSON, more than the 65536 allowed"),
+    (2**64, ValueError, "an integer in a payload must have at most 64 bits"),
+    (math.nan, ValueError, "JSON has no number"),
+    ({1: 2}, TypeError, "keys of a dict in a payload must be texts, not int"),
+    ({1, 2}, TypeError, "not a set"),
+]
+
+
+class Auctioneer(Still):
+    """Sends payloads to B, one after the other, and all of them to all."""
+
+    def tick(self, cars: Cars) -> Action:
+        if cars.tick == 1:
+            for value in VALUES:
+                cars.send("B", "bid", value)
+            cars.send("B", "plain")
+        if cars.tick == 2:
+            cars.broadcast("all", VALUES[:2])
+            cars.broadcast("plain", None)
+            for value, error, reason in BAD_VALUES:
+                with pytest.raises(error, match=reason):
+                    cars.broadcast("bad", value)
+            nested: Any = 1
+            for _ in range(65):
+                nested = [nested]
+            with pytest.raises(ValueError, match="more than 64 lists and objects"):
+                cars.send("B", "deep", nested)
+        return super().tick(cars)
+
+
+def exact(value: Any) -> str:
+    """A value as JSON: every bit of its numbers, and not the order of fields."""
+    return json.dumps(value, sort_keys=True)
+
+
+class Bidder(Still):
+    """Compares what arrives with what was sent."""
+
+    def tick(self, cars: Cars) -> Action:
+        sent = {2: [*VALUES, None], 3: [VALUES[:2], None]} if cars.name == "B" else {3: [VALUES[:2], None]}
+        arrived = [command.payload for command in cars.commands]
+        assert exact(arrived) == exact(sent.get(cars.tick, [])), cars.tick
+        if arrived:
+            cars.log(" ".join(f"{sender}: {text}" for sender, text in cars.commands))
+        return super().tick(cars)
+
+
+def test_payloads_arrive_as_they_were_sent(tmp_path: Path) -> None:
+    file = tmp_path / "auction.toml"
+    file.write_text(hall("A", "B", "C"))
+    run = cars.run(file, robots={"A": Auctioneer, "B": Bidder, "C": Bidder}, duration="3 s", out=tmp_path)
+    said = run.events[run.events.event == "say"].text.tolist()
+    assert said == [" ".join(["A: bid"] * 6 + ["A: plain"]), "A: all A: plain", "A: all A: plain"]
+    sent = run.events[run.events.event == "command_sent"]
+    assert sent.command.tolist() == ["bid"] * 6 + ["plain"] + ["all"] * 2 + ["plain"] * 2
+    # Once for both targets of the broadcast.
+    assert sent.payload_bytes.notna().tolist() == [True] * 6 + [False, True, False, False, False]
 
 
 class Order(CarsRobotInterface):

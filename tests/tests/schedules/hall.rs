@@ -6,7 +6,7 @@ use std::sync::Arc;
 use protocol::messages::StateVariables;
 use protocol::random::unit;
 use protocol::{Epoch, RobotName, RunName, Tick};
-use robot::{Action, BadParameters, Cars, LocalHost, Robot, Variable};
+use robot::{Action, BadParameters, Cars, LocalHost, Payload, Robot, Variable};
 use scenario::Changes;
 use scenario::Scenario;
 use scenario::diagnostic::Source;
@@ -137,6 +137,8 @@ impl Robot for Gossip {
             .collect();
         for command in cars.commands() {
             self.known += command.text.len() as f64;
+            let payload: Option<f64> = command.payload.as_ref().and_then(|sum| sum.read().ok());
+            self.known += payload.unwrap_or_default() % 3.0;
         }
         for other in &others {
             if let Ok(state) = cars.get_robot_state(other.as_str()) {
@@ -152,6 +154,10 @@ impl Robot for Gossip {
                 cars.set_robot_command(other.as_str(), text)
                     .expect("it is of the roster");
             }
+        }
+
+        if unit(cars.random()) < 0.2 {
+            cars.broadcast("sum", Payload::new(self.known.into()));
         }
 
         let mut action = Action::stay(cars)

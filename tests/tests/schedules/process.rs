@@ -411,10 +411,9 @@ impl World {
 
     /// Puts what came of a tick: commands, state, report.
     fn put(&mut self, process: usize, answer: &TickAnswer<Arc<PublicState>, CommandText, Bytes>) {
-        for (to, command) in answer.commands_from(1) {
-            let to = to.clone();
+        for (_, command) in answer.commands_from(1) {
             let bytes = encode(&command).into();
-            self.send(process, Way::Up, Message::Command { to, bytes });
+            self.send(process, Way::Up, Message::Command(bytes));
         }
         if self.dies(process, answer.epoch, answer.tick, Point::AfterCommands) {
             return;

@@ -43,8 +43,8 @@ impl Reference {
     }
 
     /// A command from outside, as the simulator passes it on before a tick.
-    pub(crate) fn command(&mut self, to: &RobotName, command: &str) {
-        self.simulation.command(to, command);
+    pub(crate) fn command(&mut self, command: Sent<CommandText>) {
+        self.simulation.command(command);
     }
 
     /// A tick, in which those join that joined in `outcome`.

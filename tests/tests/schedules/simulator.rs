@@ -8,7 +8,7 @@ use std::time::Duration;
 use lockstep::{Barrier, BarrierOutput, LatePolicy, Membership, Sent, Stamp, Timer, Timing};
 use protocol::messages::{
     Clock, Command, CommandText, End, JoinAnswer, JoinRequest, MAX_ENTRIES, OnLate, PublicState,
-    Report, Waiting,
+    Report, Target, Waiting,
 };
 use protocol::{Epoch, Generation, RobotName, RunName, Tick, encode};
 use record::Entry;
@@ -187,11 +187,15 @@ impl World {
     fn open(&mut self) {
         let simulator = &mut self.simulator;
         for (to, command) in std::mem::take(&mut simulator.operator) {
-            simulator.simulation.command(&to, &command);
+            let command = Sent {
+                to: Target::Robot(to),
+                command: CommandText::named(command),
+            };
+            simulator.simulation.command(command.clone());
             simulator.passed_on += 1;
             simulator.had_commands = true;
             if let Some(reference) = &mut simulator.reference {
-                reference.command(&to, &command);
+                reference.command(command);
             }
         }
         let tick = simulator.simulation.begin_tick();
@@ -560,10 +564,11 @@ impl World {
         }
     }
 
-    pub(crate) fn on_command(&mut self, from: &RobotName, to: RobotName, bytes: &[u8]) {
+    pub(crate) fn on_command(&mut self, from: &RobotName, bytes: &[u8]) {
         let command: Command = self.read(bytes);
         let stamp = Stamp::from(&command);
         let number = command.number;
+        let to = command.to.clone().expect("an outbox names the target");
         let sent = Sent::new(to, command);
 
         let simulator = &mut self.simulator;

@@ -29,10 +29,7 @@ pub(crate) enum Message {
     Unfollow(RobotName),
     Closed,
     Join(GetId, Bytes),
-    Command {
-        to: RobotName,
-        bytes: Bytes,
-    },
+    Command(Bytes),
     Report(Bytes),
     Waiting(Bytes),
     State(RobotName, Bytes),
@@ -61,7 +58,7 @@ impl Message {
     fn size(&self) -> usize {
         let payload = match self {
             Self::Join(_, bytes)
-            | Self::Command { bytes, .. }
+            | Self::Command(bytes)
             | Self::Report(bytes)
             | Self::Waiting(bytes)
             | Self::State(_, bytes)
@@ -315,7 +312,7 @@ impl World {
                     self.send(link, Way::Down, Message::JoinReply(get, answer));
                 }
             }
-            Message::Command { to, bytes } => self.on_command(&robot, to, &bytes),
+            Message::Command(bytes) => self.on_command(&robot, &bytes),
             Message::Report(bytes) => self.on_report(&robot, &bytes),
             Message::Waiting(bytes) => self.on_waiting(&robot, &bytes),
             Message::State(of, bytes) => self.put_state(&of, &bytes),

@@ -105,7 +105,7 @@ fn the_sections_have_the_names_that_others_link_to() {
 /// `cars conform` names these rules: each is one sentence of the page.
 #[test]
 fn the_rules_are_there_once_each() {
-    const RULES: [&str; 34] = [
+    const RULES: [&str; 35] = [
         "wire.qos",
         "join.request",
         "join.ready-last",
@@ -118,6 +118,7 @@ fn the_rules_are_there_once_each() {
         "command.order",
         "command.twice",
         "command.sent",
+        "command.payload",
         "operator.commands",
         "query.asking",
         "query.tick",
@@ -171,6 +172,7 @@ fn the_table_of_keys_is_that_of_the_code() {
         keys.join_as(&robot),
         keys.report(&robot),
         keys.waiting(&robot),
+        keys.outbox(&robot),
         keys.command(&robot, &from),
         keys.query(&robot, STATE),
         keys.news(&robot),

@@ -378,6 +378,9 @@ fn a_participant_puts_nothing_in_anothers_name() {
         (keys.log(), RUBBISH.to_vec()),
         (keys.command(&butler, &vonda), RUBBISH.to_vec()),
         (keys.command(&leguin, &butler), RUBBISH.to_vec()),
+        (keys.outbox(&butler), RUBBISH.to_vec()),
+        (keys.outbox(&vonda), RUBBISH.to_vec()),
+        (keys.outbox(&RobotName::operator()), RUBBISH.to_vec()),
     ] {
         for intruder in [&thief, &operator] {
             intruder.put(&key, message.clone()).unwrap();
@@ -400,6 +403,7 @@ fn a_participant_puts_nothing_in_anothers_name() {
     thief
         .put(&keys.command(&butler, &leguin), RUBBISH.to_vec())
         .unwrap();
+    thief.put(&keys.outbox(&leguin), RUBBISH.to_vec()).unwrap();
     operator
         .put(
             &keys.command(&leguin, &RobotName::operator()),
@@ -407,7 +411,7 @@ fn a_participant_puts_nothing_in_anothers_name() {
         )
         .unwrap();
 
-    let status = castle.ignored("malformed", 4);
+    let status = castle.ignored("malformed", 5);
     assert_eq!(status.ignored.len(), 1, "{:?}", status.ignored);
     let expected = keys.query(&leguin, "panel");
     eventually("what is allowed", || {
@@ -472,6 +476,8 @@ fn a_robot_neither_queries_nor_receives_nor_replies_what_is_not_its_own() {
         keys.all(),
         keys.reports(),
         keys.commands(),
+        keys.outboxes(),
+        keys.outbox(&butler),
         keys.command(&leguin, &butler),
         keys.news(&butler),
         "cars/secure-ask/robot/*/news".to_owned(),

@@ -116,6 +116,47 @@ fn assert_same_as_in_rust(lab: &Lab, launch_file: &str, more: &[&str]) {
 }
 
 #[test]
+fn robots_in_javascript_bid_by_broadcasts_with_payloads() {
+    if lacks_node() {
+        return;
+    }
+
+    let lab = Lab::new();
+    let bidder = root().join("sdk/stdio/node/bidder.mjs").display().to_string();
+    let mut scenario = "duration = \"3 s\"\n".to_owned();
+    let mut launch = "scenario = \"bids.toml\"\nspeed = \"max\"\n[console]\nenabled = false\n".to_owned();
+    for (name, x) in [("Ada", "3.1"), ("Bo", "1.3"), ("Cyd", "5.7")] {
+        scenario += &format!("[[robot]]\nname = \"{name}\"\nat = [\"{x} m\", \"2 m\"]\n");
+        launch += &format!(
+            "[[process]]\nname = \"{name}\"\ncommand = [\"cars\", \"exec\", \"--\", {bidder:?}]\n"
+        );
+    }
+    lab.write("bids.toml", &scenario);
+    let launch = lab.write("launch.toml", &launch);
+    lab.ok(&["launch", launch.to_str().unwrap(), "--run", "bids"]);
+
+    let events = lab.events("bids");
+    let of_kind = |kind: &str| events.iter().filter(move |event| event["event"] == kind);
+    assert_eq!(of_kind("command_delivered").count(), 6);
+    let payloads: Vec<String> = of_kind("command_sent")
+        .filter(|event| !event["payload"].is_null())
+        .map(|event| event["payload"].to_string())
+        .collect();
+    // Once for each broadcast, and to the last bit: the distance of Bo.
+    assert_eq!(payloads.len(), 3);
+    let distance_m = (1.3_f64 * 1.3 + 2.0 * 2.0).sqrt();
+    assert_eq!(payloads[1], format!(r#"{{"distance_m":{distance_m},"task":"clean"}}"#));
+    let gave_up: Vec<&str> = of_kind("behavior")
+        .filter(|event| event["tick"] == 2 && event["to"] == "WAIT")
+        .filter_map(|event| event["robot"].as_str())
+        .collect();
+    assert_eq!(gave_up, ["Ada", "Cyd"], "Bo is the nearest");
+
+    // Played from the record: its payloads are there.
+    lab.ok(&["verify", lab.out().join("bids").to_str().unwrap()]);
+}
+
+#[test]
 #[ignore = "thorough: with `-- --include-ignored`"]
 fn leguin_in_javascript_is_leguin_in_rust_byte_for_byte() {
     if lacks_node() {

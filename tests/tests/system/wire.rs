@@ -7,8 +7,9 @@ use std::time::Duration;
 use bus::{Bus, Declared, Role};
 use protocol::keys::Keys;
 use protocol::messages::{
-    Clock, Command, Control, ControlAnswer, Delivery, JoinAnswer, LogKind, LogRecord, OnLate,
-    Performative, Point, PublicState, Refusal, Report, StateVariables, Status, TickUpdate, Welcome,
+    Clock, Command, Control, ControlAnswer, Delivery, JoinAnswer, LogKind, LogRecord,
+    MAX_PAYLOAD_BYTES, OnLate, Payload, Performative, Point, PublicState, Refusal, Report,
+    StateVariables, Status, Target, TickUpdate, Welcome,
 };
 use protocol::{PROTOCOL_VERSION, RobotName, RunName, decode, encode};
 use serde_json::{Value, json};
@@ -228,8 +229,8 @@ impl Hand {
             tick,
             generation: self.welcome.generation,
             number,
-            performative: Performative::Achieve,
             command: text.into(),
+            ..Command::default()
         }
     }
 
@@ -449,6 +450,55 @@ fn malformed_stale_and_foreign_commands_are_counted_and_change_nothing() {
 }
 
 #[test]
+fn an_outbox_takes_commands_to_one_and_to_all_others_with_payloads() {
+    let (wire, a, b) = ready("wire-outbox");
+    wire.start();
+    a.clock_of(1);
+    b.clock_of(1);
+    b.put(&b.report(1));
+    // With its quotation marks.
+    let text = |bytes: usize| Payload::new("p".repeat(bytes - 2).into());
+    let put = |number: u32, to: Option<Target>, payload: Option<Payload>| {
+        let command = Command {
+            to,
+            payload,
+            ..a.command(1, number, "map")
+        };
+        let outbox = a.keys.outbox(&a.name);
+        a.bus.put(&outbox, encode(&command)).unwrap();
+    };
+    put(1, None, None);
+    put(1, Some(Target::Others), text(MAX_PAYLOAD_BYTES + 1));
+    put(1, Some(Target::Others), text(MAX_PAYLOAD_BYTES));
+    put(
+        2,
+        Some(Target::Robot(b.name.clone())),
+        Payload::new(serde_json::json!({ "bid": 0.1 })),
+    );
+    // Both keys have one series of numbers.
+    a.put_command("B", &a.command(1, 3, "plain"));
+    let status = wire.ignored(2);
+    let ignored = [("malformed".into(), 1), ("unknown robot".into(), 1)];
+    assert_eq!(status.ignored, ignored.into());
+    a.put(&Report {
+        commands: 3,
+        ..a.report(1)
+    });
+
+    let clock = b.clock_of(2);
+    let arrived = b.commands_of(&clock);
+    let payloads: Vec<_> = arrived.iter().map(|one| one.payload.clone()).collect();
+    let expected = [
+        text(MAX_PAYLOAD_BYTES),
+        Payload::new(serde_json::json!({ "bid": 0.1 })),
+        None,
+    ];
+    assert_eq!(payloads, expected);
+    let a_clock = a.clock_of(2);
+    assert_eq!(a.commands_of(&a_clock), []);
+}
+
+#[test]
 fn a_report_counts_when_all_its_commands_are_here_and_they_count_in_the_order_of_their_numbers() {
     let (wire, a, b) = ready("wire-numbers");
     wire.start();
@@ -478,6 +528,7 @@ fn a_report_counts_when_all_its_commands_are_here_and_they_count_in_the_order_of
             from: name("A"),
             performative: Performative::Achieve,
             command: text.into(),
+            payload: None,
         })
     );
     let sent = wire.recorded(1, "command_sent");
@@ -515,6 +566,7 @@ fn an_operators_put_from_any_client_is_executed_and_recorded() {
         from: RobotName::operator(),
         performative: Performative::Achieve,
         command: "refill".into(),
+        payload: None,
     };
     assert_eq!(a.commands_of(&clocks[0]), []);
     assert_eq!(b.commands_of(&clocks[1]), [delivery]);

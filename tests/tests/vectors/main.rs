@@ -174,7 +174,7 @@ fn leguin_in_the_hall_as_processes() {
     });
 
     let run_name = RunName::new(run).unwrap();
-    let witness = Witness::new(endpoint.trim(), &run_name, "Leguin", "Butler");
+    let witness = Witness::new(endpoint.trim(), &run_name, "Leguin");
     witness.step(LEGUIN_TICKS);
     witness.assert_received("leguin.jsonl", 1);
 
@@ -228,7 +228,7 @@ fn echo_over_zenoh() {
         server.run().unwrap();
     });
 
-    let witness = Witness::new(&endpoint, &run, "Echo", "Caller");
+    let witness = Witness::new(&endpoint, &run, "Echo");
     witness.control(&Control::Status);
     let caller = join(&run, &endpoint, "Caller", caller());
     let echo = join(&run, &endpoint, "Echo", echo());

@@ -13,7 +13,7 @@ use lockstep::{
 use protocol::keys::{Keys, STATE};
 use protocol::messages::{
     Clock, Command, CommandText, End, JoinAnswer, JoinRequest, MAX_ENTRIES, PublicState, Report,
-    TickUpdate,
+    Target, TickUpdate,
 };
 use protocol::{Epoch, Message, RobotName, RunName, Tick, decode, encode};
 use robot::Robot;
@@ -124,7 +124,10 @@ impl Stage {
 
     /// Sends a command to the robot as an operator does.
     pub(super) fn command_as_operator(&mut self, command: &str) {
-        self.simulation.command(&self.robot, command);
+        self.simulation.command(Sent {
+            to: Target::Robot(self.robot.clone()),
+            command: CommandText::named(command),
+        });
     }
 
     /// Puts the last clock again.
@@ -370,7 +373,7 @@ impl Stage {
     ) {
         for (to, command) in answer.commands_from(1) {
             let bytes = encode(&command);
-            self.write_put(name, &self.keys.command(to, name), &bytes);
+            self.write_put(name, &self.keys.outbox(name), &bytes);
             let command: Command = read(&bytes);
             let stamp = Stamp::from(&command);
             let number = command.number;

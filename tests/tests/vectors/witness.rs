@@ -17,8 +17,8 @@ pub(super) struct Witness {
 }
 
 impl Witness {
-    /// Subscribes to what `robot` receives and puts. `other` is the robot to which it sends commands.
-    pub(super) fn new(endpoint: &str, run: &RunName, robot: &str, other: &str) -> Self {
+    /// Subscribes to what `robot` receives and puts.
+    pub(super) fn new(endpoint: &str, run: &RunName, robot: &str) -> Self {
         let role = Role::Client {
             connect: endpoint.to_owned(),
             patience: PATIENCE,
@@ -26,7 +26,6 @@ impl Witness {
         let bus = Bus::open(&role, None).unwrap();
         let keys = Keys::new(run);
         let robot = RobotName::new(robot).unwrap();
-        let other = RobotName::new(other).unwrap();
 
         let (sender, received) = channel();
         let mut subscribers = Vec::new();
@@ -34,7 +33,7 @@ impl Witness {
             keys.clock(),
             keys.news(&robot),
             keys.report(&robot),
-            keys.command(&other, &robot),
+            keys.outbox(&robot),
         ] {
             let sender = sender.clone();
             let subscriber = bus.subscribe(&key, move |key, bytes| {

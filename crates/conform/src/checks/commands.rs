@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use protocol::messages::Variable;
+use protocol::messages::{MAX_PAYLOAD_BYTES, Payload, Variable};
 use protocol::{RobotName, Tick};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::comparison::is_same;
 use crate::findings::Findings;
@@ -209,6 +209,26 @@ fn numbers(transcript: &Transcript) -> BTreeMap<String, f64> {
             _ => None,
         })
         .collect()
+}
+
+/// News with a payload are read, also with the largest one: a robot that expects none ignores it.
+pub(super) fn payload(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
+    let [text, _] = kit.texts();
+    // With its quotation marks.
+    let largest = "x".repeat(MAX_PAYLOAD_BYTES - 2);
+    let payloads = [
+        json!({ "task": 3, "bid": 0.1, "of": ["A", null, true] }),
+        json!(largest),
+    ];
+
+    for (payload, tick) in payloads.into_iter().zip([LAST - 1, LAST]) {
+        let arrival = ArrivingCommand {
+            payload: Payload::new(payload),
+            ..ArrivingCommand::new(&kit.sender(), &text, tick)
+        };
+        played(kit, &PlayScript::with(TICKS, vec![arrival]))?;
+    }
+    Ok(())
 }
 
 /// A command from the operator, who is not a robot of the roster, is executed like any other, and not answered.

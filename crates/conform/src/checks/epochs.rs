@@ -161,6 +161,7 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
             from: kit.sender(),
             performative: Performative::Achieve,
             command: text,
+            payload: None,
         }],
         ..TickUpdate::default()
     })?;

@@ -40,7 +40,7 @@ const fn rules(
 }
 
 /// Checks that need nothing but the usual ticks before; those that take longest begin.
-const CHECKS: [Check; 26] = [
+const CHECKS: [Check; 27] = [
     rules(&["join.refused"], joining::refused),
     rules(&["end.gone"], ends::gone),
     rules(&["query.at-once"], queries::at_once),
@@ -65,6 +65,7 @@ const CHECKS: [Check; 26] = [
     rules(&["query.unknown"], queries::unknown),
     rules(&["command.order"], commands::order),
     rules(&["command.twice"], commands::twice),
+    rules(&["command.payload"], commands::payload),
     rules(&["operator.commands"], commands::from_operator),
     rules(&["clock.duplicate"], repeated::duplicate),
     rules(&["clock.late"], repeated::late),

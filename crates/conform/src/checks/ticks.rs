@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use protocol::PROTOCOL_VERSION;
-use protocol::messages::Performative;
+use protocol::messages::{OTHERS, Performative};
 use protocol::name::OPERATOR;
 
 use super::wire;
@@ -209,7 +209,7 @@ fn check_stamps(harness: &Harness<'_>, transcript: &Transcript) -> Result<(), Ru
             .any(|entry| (entry.epoch, entry.tick) == (command.epoch, command.tick));
         let is_own = sent.from == subject.as_str();
         // That the operator is not commanded is a rule of its own.
-        let is_known = sent.to == OPERATOR
+        let is_known = [OPERATOR, OTHERS].contains(&sent.to.as_str())
             || harness
                 .template
                 .roster

@@ -14,7 +14,9 @@ use lockstep::{
     Timing,
 };
 use protocol::keys::Keys;
-use protocol::messages::{Clock, MAX_ENTRIES, OnLate, Report, TickUpdate, Waiting, Welcome};
+use protocol::messages::{
+    Clock, MAX_ENTRIES, OnLate, Report, Target, TickUpdate, Waiting, Welcome,
+};
 use protocol::{Epoch, RobotName, RunName, Tick, decode};
 
 use crate::body::RobotBody;
@@ -250,7 +252,7 @@ impl<'k> Harness<'k> {
     fn on_command(&mut self, key: &str, bytes: Vec<u8>, order: usize) {
         let sent = self.seen.file_command(key, bytes, order);
         let Ok(command) = &sent.command else { return };
-        let Ok(to) = RobotName::new(&sent.to) else {
+        let Some(to) = Target::parse(&sent.to) else {
             return;
         };
         let Ok(from) = RobotName::new(&sent.from) else {

@@ -66,6 +66,8 @@ fn events(tick: u64) -> Vec<Event> {
             seq: tick / 10,
             performative: Performative::Achieve,
             command: "refill".to_owned(),
+            payload: None,
+            payload_of: None,
         });
     }
     events

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use protocol::Message;
 use protocol::messages::{
-    End, MAX_TEXT_BYTES, Panel, Parameters, Performative, Point, PublicState, SensedRobot,
+    End, MAX_TEXT_BYTES, Panel, Parameters, Payload, Performative, Point, PublicState, SensedRobot,
     StateVariables, Variable,
 };
 use protocol::plain::escape_line;
@@ -86,6 +86,8 @@ pub(super) struct Arrived {
     pub(super) from: RobotName,
     pub(super) performative: Performative,
     pub(super) command: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) payload: Option<Payload>,
 }
 
 /// The value of an answer, or an error.
@@ -208,11 +210,13 @@ pub(super) struct QueryLine {
     pub(super) what: String,
 }
 
-/// A command to another robot.
+/// A command to another robot, or to all others.
 #[derive(Debug, Deserialize)]
 pub(super) struct CommandRequest {
     pub(super) to: String,
     pub(super) command: String,
+    #[serde(default)]
+    pub(super) payload: Option<Payload>,
 }
 
 /// A line for the log of the run.
@@ -295,7 +299,7 @@ fn unknown_fields(message: &FromProgram, value: &Value) -> Option<UnknownFields>
         FromProgram::Query(_) => ("query", &["of", "what"]),
         FromProgram::Percept => ("percept", &["type"]),
         FromProgram::Random => ("random", &["type"]),
-        FromProgram::Command(_) => ("command", &["to", "command"]),
+        FromProgram::Command(_) => ("command", &["to", "command", "payload"]),
         FromProgram::Log(_) => ("log", &["text"]),
         FromProgram::Panel(_) => ("panel", &["widgets"]),
         FromProgram::Done(_) => ("done", DONE_FIELDS),
@@ -343,12 +347,19 @@ fn check<M: Message>(message: M) -> Result<M, String> {
 }
 
 fn check_order(order: CommandRequest) -> Result<CommandRequest, String> {
-    match order.command.len() {
-        0..=MAX_TEXT_BYTES => Ok(order),
-        length => Err(format!(
+    let length = order.command.len();
+    if length > MAX_TEXT_BYTES {
+        return Err(format!(
             "field command: {length} bytes, more than the {MAX_TEXT_BYTES} allowed"
-        )),
+        ));
     }
+    if let Some(payload) = &order.payload {
+        payload
+            .check("payload")
+            .map_err(|error| format!("field {}: {}", error.field, error.reason))?;
+    }
+
+    Ok(order)
 }
 
 fn check_done(raw: RawDone) -> Result<DoneLine, String> {
@@ -444,6 +455,7 @@ mod tests {
             from: RobotName::new("B").unwrap(),
             performative: Performative::Achieve,
             command: "say \"x\":\n".to_owned(),
+            payload: Payload::new(serde_json::json!({ "bid": 0.1 })),
         }];
         let sensed = [SensedRobot {
             name: RobotName::new("B").unwrap(),
@@ -459,7 +471,7 @@ mod tests {
         assert_eq!(
             line(&busy),
             "{\"type\":\"tick\",\"tick\":6,\"location\":{\"x\":1.0,\"y\":2.0},\"blocked\":true,\"commands\":[{\"from\":\"B\",\
-             \"performative\":\"achieve\",\"command\":\"say \\\"x\\\":\\n\"}],\"sensed\":[{\"name\":\"B\",\"location\":\
+             \"performative\":\"achieve\",\"command\":\"say \\\"x\\\":\\n\",\"payload\":{\"bid\":0.1}}],\"sensed\":[{\"name\":\"B\",\"location\":\
              {\"x\":1.0,\"y\":2.0}}]}\n"
         );
     }

@@ -5,7 +5,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError};
 use std::time::Duration;
 
 use protocol::codec::MAX_MESSAGE_BYTES;
-use protocol::messages::{Panel, Performative};
+use protocol::messages::{OTHERS, Panel, Performative};
 use protocol::random::unit;
 use robot::{Action, BadParameters, CallError, Cars, ReceivedCommand, Robot};
 use serde_json::Value;
@@ -154,7 +154,9 @@ impl ProgramRobot {
             }
             FromProgram::Random => self.answer(Ok(unit(cars.random()).into()))?,
             FromProgram::Command(order) => {
-                if let Err(error) = cars.set_robot_command(&order.to, order.command) {
+                if order.to == OTHERS {
+                    cars.broadcast(order.command, order.payload);
+                } else if let Err(error) = cars.send(&order.to, order.command, order.payload) {
                     cars.log(format!("error: a command is not sent: {error}"));
                 }
             }
@@ -218,6 +220,7 @@ fn arrived(command: &ReceivedCommand) -> Arrived {
         from: command.from.clone(),
         performative: Performative::Achieve,
         command: command.text.clone(),
+        payload: command.payload.clone(),
     }
 }
 

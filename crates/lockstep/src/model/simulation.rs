@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use protocol::messages::FaultKind;
+use protocol::messages::{FaultKind, Target};
 use protocol::{Epoch, Generation, RobotName, Tick};
 
 use crate::exchange::{Membership, Sent, TickOutcome};
@@ -88,7 +88,12 @@ pub(super) fn commands(
 
     (1..=commands_of(robot, tick))
         .map(|number| Sent {
-            to: super::name(other),
+            // A's second command goes to all others, which B is.
+            to: if number == 2 {
+                Target::Others
+            } else {
+                Target::Robot(super::name(other))
+            },
             command: Order {
                 epoch,
                 tick,
@@ -200,9 +205,15 @@ impl ModelSimulation {
         self.is_full = outcome.reports.len() == self.parts.len();
         self.next = Some(self.tick + 1);
         self.news.clear();
-        for (_, sent) in outcome.reports.into_values() {
+        for (from, (_, sent)) in outcome.reports {
             for Sent { to, command } in sent {
-                self.news.entry(to).or_default().push(command);
+                let is_target = |name: &RobotName| match &to {
+                    Target::Robot(robot) => robot == name,
+                    Target::Others => *name != from,
+                };
+                for name in self.parts.keys().filter(|name| is_target(name)) {
+                    self.news.entry(name.clone()).or_default().push(command);
+                }
             }
         }
         violation

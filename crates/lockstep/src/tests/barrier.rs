@@ -268,7 +268,7 @@ fn a_report_that_states_fewer_commands_than_arrived_counts() {
         generation: 1,
     };
     let stray = Sent {
-        to: name("B"),
+        to: name("B").into(),
         command: "stray",
     };
     barrier.command(&name("A"), stamp, 1, stray, &mut Vec::new());
@@ -390,7 +390,7 @@ fn stamp(tick: u64, generation: u32) -> Stamp {
 
 fn sent() -> Sent<&'static str> {
     Sent {
-        to: name("B"),
+        to: name("B").into(),
         command: "command",
     }
 }

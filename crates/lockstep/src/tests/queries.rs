@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use protocol::messages::{CommandText, Performative, TickUpdate};
+use protocol::messages::{CommandText, TickUpdate};
 
 use super::{joined, name};
 use crate::{Bulletin, IncarnationNotice, NoState, RecentStates, Sent, StateQuery, TickAnswer};
@@ -67,11 +67,8 @@ fn a_query_is_read_from_its_parameters() {
 #[test]
 fn commands_are_numbered_in_their_order() {
     let sent = |to: &str, command: &str| Sent {
-        to: name(to),
-        command: CommandText {
-            performative: Performative::default(),
-            command: command.to_owned(),
-        },
+        to: name(to).into(),
+        command: CommandText::named(command),
     };
     let commands = vec![sent("B", "first"), sent("C", "second")];
     let answer = TickAnswer {

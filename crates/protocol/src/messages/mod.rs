@@ -5,10 +5,12 @@ mod limits;
 mod log;
 mod numbers;
 mod observe;
+mod payload;
 mod performative;
 mod point;
 mod state;
 mod step;
+mod target;
 mod variables;
 
 pub use crate::codec::FieldError;
@@ -24,6 +26,7 @@ pub use observe::{
     Cut, DisplayUnit, Face, Fate, Flight, GuestMood, HeldProcess, MAX_FLIGHTS, MAX_WIDGETS, Panel,
     RobotFrame, Standing, TickPanel, Tone, Verdict, Widget, WorldFrame,
 };
+pub use payload::{MAX_PAYLOAD_BYTES, MAX_PAYLOAD_DEPTH, Payload};
 pub use performative::Performative;
 pub use point::Point;
 pub use state::{Answer, PublicState};
@@ -32,4 +35,5 @@ pub use step::{
     Parameters, ParametersAnswer, ParametersOffer, Refusal, Report, SensedBody, SensedKind,
     SensedRobot, TickUpdate, Waiting, Welcome,
 };
+pub use target::{OTHERS, Target};
 pub use variables::{StateVariables, Variable};

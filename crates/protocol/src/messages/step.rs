@@ -7,9 +7,11 @@ use serde::{Deserialize, Serialize};
 
 use super::limits::{counted, few, finite, is_false, is_zero, short};
 use super::numbers::{Epoch, Generation, Tick};
+use super::payload::Payload;
 use super::performative::Performative;
 use super::point::Point;
 use super::state::PublicState;
+use super::target::Target;
 use super::variables::{StateVariables, check_variables};
 use crate::codec::{FieldError, Message, as_json};
 use crate::name::{RobotName, RunName};
@@ -139,7 +141,7 @@ pub struct Welcome {
     pub sensing_range_m: f64,
     /// Where it stands.
     pub location: Point,
-    /// Names of all robots of the scenario, itself included.
+    /// Names of all robots of the scenario, itself included, in the order of their bytes.
     pub roster: Vec<RobotName>,
     /// Its parameters.
     pub parameters: Parameters,
@@ -283,9 +285,10 @@ impl Message for TickUpdate {
 
     fn check(&self) -> Result<(), FieldError> {
         counted(self.tick, "tick")?;
-        self.commands
-            .iter()
-            .try_for_each(|delivery| short(&delivery.command, "commands.command"))
+        self.commands.iter().try_for_each(|delivery| {
+            short(&delivery.command, "commands.command")?;
+            check_payload(delivery.payload.as_ref(), "commands.payload")
+        })
     }
 }
 
@@ -311,6 +314,9 @@ pub struct Delivery {
     pub performative: Performative,
     /// Its text.
     pub command: String,
+    /// Its payload, if it has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub payload: Option<Payload>,
 }
 
 /// Another robot within sensing range.
@@ -385,8 +391,8 @@ impl Message for Report {
     }
 }
 
-/// A command from one robot to another (`setRobotCommand`): put on the key of its target for the medium, which decides
-/// whether and when it arrives. An operator's command needs nothing but the text.
+/// A command from one robot to another (`setRobotCommand`), or to all others: put on the outbox of its sender for the medium, which
+/// decides whether and when it arrives, or on the key of its target. An operator's command needs nothing but the text.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Hash, Serialize, Deserialize, JsonSchema)]
 pub struct Command {
     /// Epoch in which it was sent.
@@ -401,20 +407,63 @@ pub struct Command {
     /// Its number among the sender's commands of this tick, from 1.
     #[serde(default)]
     pub number: u32,
+    /// For whom it is, on the outbox of its sender: a robot, or `*` for every other robot of the roster, as if each were sent one
+    /// command in the order of the roster. On the key of a target that counts, and not this.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub to: Option<Target>,
     /// What it is meant to do.
     #[serde(default)]
     pub performative: Performative,
-    /// Its text.
+    /// Its text: the name of what is to be done.
     pub command: String,
+    /// Its payload, if it has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub payload: Option<Payload>,
 }
 
 /// What a command says.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct CommandText {
     /// What it is meant to do.
     pub performative: Performative,
     /// Its text.
     pub command: String,
+    /// Its payload, if it has one.
+    pub payload: Option<Payload>,
+}
+
+impl CommandText {
+    /// A command that says this, without a payload.
+    #[must_use]
+    pub fn named(command: impl Into<String>) -> Self {
+        Self {
+            command: command.into(),
+            ..Self::default()
+        }
+    }
+
+    /// Checks its sizes.
+    ///
+    /// # Errors
+    /// The field that is too large.
+    pub fn check(&self) -> Result<(), FieldError> {
+        short(&self.command, "command")?;
+        check_payload(self.payload.as_ref(), "payload")
+    }
+}
+
+impl From<Command> for CommandText {
+    fn from(command: Command) -> Self {
+        Self {
+            performative: command.performative,
+            command: command.command,
+            payload: command.payload,
+        }
+    }
+}
+
+fn check_payload(payload: Option<&Payload>, field: &str) -> Result<(), FieldError> {
+    payload.map_or(Ok(()), |payload| payload.check(field))
 }
 
 impl Message for Command {
@@ -422,7 +471,8 @@ impl Message for Command {
 
     fn check(&self) -> Result<(), FieldError> {
         counted(self.tick, "tick")?;
-        short(&self.command, "command")
+        short(&self.command, "command")?;
+        check_payload(self.payload.as_ref(), "payload")
     }
 }
 

@@ -95,6 +95,13 @@ fn channels() -> Vec<ChannelEntry> {
             &[Send("command")],
         ),
         channel(
+            "outbox",
+            keys.outbox(&robot),
+            "Commands that name their targets themselves, for the medium: to one robot, or to all others.",
+            &["command"],
+            &[Send("command")],
+        ),
+        channel(
             "state",
             keys.query(&robot, STATE),
             "All that a robot lets others know, served by itself and put for those who follow. Parameters tick and epoch.",

@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 
 use protocol::messages::{
     Clock, Command, Control, Correction, Delivery, End, Face, JoinRequest, LogRecord, MAX_ENTRIES,
-    MAX_TEXT_BYTES, NEWS_FLAGS, Panel, Performative, Point, Report, SensedBody, SensedKind,
-    SensedRobot, TickPanel, TickUpdate, Tone, Variable, Widget,
+    MAX_TEXT_BYTES, NEWS_FLAGS, Panel, Payload, Performative, Point, Report, SensedBody,
+    SensedKind, SensedRobot, Target, TickPanel, TickUpdate, Tone, Variable, Widget,
 };
 use protocol::{Message, RobotName, RunName, decode, encode};
 use serde::Serialize;
@@ -56,6 +56,7 @@ fn news() -> TickUpdate {
             from: name("Butler"),
             performative: Performative::Achieve,
             command: "refill".into(),
+            payload: Payload::new(serde_json::json!({ "level": 0.1 })),
         }],
         unreachable: vec![name("Vonda")],
         sensed: vec![SensedRobot {
@@ -95,8 +96,10 @@ fn what_is_written_is_read_back_to_the_last_bit() {
         tick: 2,
         generation: 3,
         number: 4,
+        to: Some(Target::Others),
         performative: Performative::Tell,
         command: "hurry".into(),
+        payload: Payload::new(serde_json::json!([1, 0.1, "a", null, { "b": false }])),
     });
     round_trip(&JoinRequest {
         protocol: 2,

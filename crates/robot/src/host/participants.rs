@@ -71,6 +71,8 @@ impl Allowance {
 fn size_of(answer: &HostAnswer) -> usize {
     let mut bytes = 2 * (answer.report.len() + OVERHEAD);
     for sent in &answer.commands {
+        let payload = sent.command.payload.as_ref();
+        bytes += payload.map_or(0, |payload| payload.as_json().len());
         bytes += sent.command.command.len() + OVERHEAD;
     }
 

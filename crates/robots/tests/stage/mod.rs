@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 use lockstep::Exchange;
 use protocol::PROTOCOL_VERSION;
-use protocol::messages::{CommandText, Delivery, NEWS_FLAGS, Performative};
+use protocol::messages::{CommandText, Delivery, NEWS_FLAGS, Performative, Target};
 use robot::{
     Correction, LocalHost, Parameters, Point, Report, Robot, RobotName, RunName, SensedBody,
     SensedKind, SensedRobot, TickUpdate, Variable, Welcome,
@@ -335,7 +335,10 @@ impl Stage {
             };
             if !(self.drops)(&note) {
                 let delivery = delivery(from.clone(), &note.command);
-                self.underway.entry(sent.to).or_default().push(delivery);
+                let Target::Robot(to) = sent.to else {
+                    unreachable!("the paper's robots send no broadcasts");
+                };
+                self.underway.entry(to).or_default().push(delivery);
             }
             self.sent.push(note);
         }
@@ -347,6 +350,7 @@ fn delivery(from: RobotName, command: &str) -> Delivery {
         from,
         performative: Performative::Achieve,
         command: command.to_owned(),
+        payload: None,
     }
 }
 

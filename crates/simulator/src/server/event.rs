@@ -2,7 +2,7 @@
 
 use bus::{BusError, Query};
 use config::diagnostic::FileError;
-use protocol::messages::{Command, Control, End, Report, TickPanel, Waiting};
+use protocol::messages::{Command, Control, End, Report, Target, TickPanel, Waiting};
 use protocol::{Malformed, RobotName, RunName};
 use record::difference::Difference;
 use recording::RecordingError;
@@ -12,10 +12,10 @@ use scenario::Scenario;
 pub(super) enum ServerEvent {
     /// A robot has done its tick.
     Report(String, Report),
-    /// A robot, or the operator, sent a command.
+    /// A robot, or the operator, sent a command. `None` is a target that no robot can have as its name.
     Command {
         from: String,
-        to: String,
+        to: Option<Target>,
         command: Command,
     },
     /// A robot waits for another robot's answer.

@@ -5,10 +5,10 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bus::{Bus, BusError, Declared, Publisher, Query};
-use lockstep::{Barrier, BarrierOutput, Timing};
+use lockstep::{Barrier, BarrierOutput, Sent, Timing};
 use protocol::keys::Keys;
 use protocol::messages::{
-    Clock, CommandText, Control, End, MAX_ENTRIES, Report, RobotStatus, Status,
+    Clock, Command, CommandText, Control, End, MAX_ENTRIES, Report, RobotStatus, Status, Target,
 };
 use protocol::{Epoch, RobotName, Tick, decode};
 use record::RunFolder;
@@ -77,7 +77,7 @@ pub(super) struct LiveEpoch {
     pub(super) stragglers: Vec<RobotName>,
     pub(super) wall: WallSummary,
     /// Commands of the operator that are sent at the next tick boundary.
-    pub(super) operator: Vec<(RobotName, String)>,
+    pub(super) operator: Vec<Sent<CommandText>>,
     /// Requests that wait until the next tick has begun.
     pub(super) deferred: Vec<Query>,
 }
@@ -275,7 +275,7 @@ impl TickSource for LiveRun {
     fn handle(&mut self, event: ServerEvent, frontend: &mut Frontend) -> Result<(), EpochStop> {
         match event {
             ServerEvent::Report(robot, report) => self.on_report(&robot, report),
-            ServerEvent::Command { from, to, command } => self.on_command(&from, &to, command),
+            ServerEvent::Command { from, to, command } => self.on_command(&from, to, command),
             ServerEvent::Waiting(robot, waiting) => self.on_waiting(&robot, &waiting),
             ServerEvent::Panel(robot, panel) => self.on_panel(&robot, panel),
             ServerEvent::Malformed(error) => self.ignore("malformed", &error.to_string()),
@@ -390,11 +390,17 @@ impl LiveRun {
         let reports = frontend.subscribe(&keys.reports(), ServerEvent::Report)?;
         let waiting = frontend.subscribe(&keys.all_waiting(), ServerEvent::Waiting)?;
 
+        let outboxes = frontend.subscribe(&keys.outboxes(), |from, command: Command| {
+            let to = command.to.clone();
+            ServerEvent::Command { from, to, command }
+        })?;
+
         let inbox = frontend.inbox.clone();
         let commands = frontend
             .bus
             .subscribe(&keys.commands(), move |key, bytes| {
-                let to = Keys::robot_of(key).unwrap_or_default().to_owned();
+                let to = Keys::robot_of(key).unwrap_or_default();
+                let to = RobotName::new(to).ok().map(Target::Robot);
                 let from = Keys::last_chunk(key).to_owned();
                 inbox.send_and_work(match decode(key, &from, bytes) {
                     Ok(command) => ServerEvent::Command { from, to, command },
@@ -410,7 +416,7 @@ impl LiveRun {
                 let robot = Keys::robot_of(key).unwrap_or_default().to_owned();
                 inbox.send(ServerEvent::Token { robot, is_present });
             })?;
-        let mut declared = vec![reports, commands, waiting, tokens];
+        let mut declared = vec![reports, outboxes, commands, waiting, tokens];
 
         if self.stay == KeepAlive::Viewed {
             let inbox = frontend.inbox.clone();

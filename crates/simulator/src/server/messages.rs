@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use lockstep::{Sent, Stamp};
 use protocol::RobotName;
-use protocol::messages::{Command, Panel, Report, TickPanel, Waiting};
+use protocol::messages::{Command, CommandText, Panel, Report, Target, TickPanel, Waiting};
 
 use super::live::{LiveEpoch, LiveRun};
 
@@ -87,13 +87,13 @@ impl LiveRun {
         }
     }
 
-    pub(super) fn on_command(&mut self, from: &str, to: &str, command: Command) {
+    pub(super) fn on_command(&mut self, from: &str, to: Option<Target>, command: Command) {
         // Any name will do as a target: the medium drops what goes to robots that do not exist.
-        let Ok(to) = RobotName::new(to) else {
-            return self.ignore("unknown robot", to);
+        let Some(to) = to else {
+            return self.ignore("unknown robot", "the target of a command");
         };
         if from == RobotName::operator().as_str() {
-            return self.on_operator(to, command.command);
+            return self.on_operator(Sent::new(to, command));
         }
         let Some(from) = self.known(from) else { return };
 
@@ -107,15 +107,17 @@ impl LiveRun {
             .command(&from, stamp, number, sent, &mut self.outputs);
     }
 
-    fn on_operator(&mut self, to: RobotName, command: String) {
-        if !self.barrier.has(&to) {
+    fn on_operator(&mut self, command: Sent<CommandText>) {
+        if let Target::Robot(to) = &command.to
+            && !self.barrier.has(to)
+        {
             return self.ignore("unknown robot", to.as_str());
         }
         if self.epoch.operator.len() >= MAX_OPERATOR_COMMANDS {
             return self.ignore("too many commands", "of the operator for one tick");
         }
 
-        self.epoch.operator.push((to, command));
+        self.epoch.operator.push(command);
     }
 
     pub(super) fn on_waiting(&mut self, robot: &str, waiting: &Waiting) {

@@ -5,7 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use config::FileError;
-use lockstep::Attendance;
+use lockstep::{Attendance, Sent};
+use protocol::messages::CommandText;
 use protocol::{Epoch, RobotName, Tick};
 
 use crate::simulation::TickRecord;
@@ -61,11 +62,11 @@ impl ReplayLog {
     }
 
     /// The operator's commands that were sent before the next tick.
-    pub(super) fn commands(&self) -> Vec<(RobotName, String)> {
+    pub(super) fn commands(&self) -> Vec<Sent<CommandText>> {
         let operator = RobotName::operator();
         let next = self.next.iter();
-        let sent = next.flat_map(|entry| entry.commands_of(&operator));
-        sent.map(|sent| (sent.to, sent.command.command)).collect()
+        next.flat_map(|entry| entry.commands_of(&operator))
+            .collect()
     }
 
     /// What was set by hand before the next tick.

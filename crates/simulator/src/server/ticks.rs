@@ -66,8 +66,8 @@ impl LiveRun {
             Some(replay_log) => replay_log.commands(),
             None => std::mem::take(&mut epoch.operator),
         };
-        for (to, command) in commands {
-            epoch.simulation.command(&to, &command);
+        for command in commands {
+            epoch.simulation.command(command);
         }
         let tick = epoch.simulation.begin_tick();
         self.open_tick(tick, frontend);

@@ -28,11 +28,23 @@ class Point(NamedTuple):
         return math.sqrt(dx * dx + dy * dy)
 
 
-class Command(NamedTuple):
-    """A command that arrived."""
-
+class _SenderAndText(NamedTuple):
     sender: str
     text: str
+
+
+class Command(_SenderAndText):
+    """A command that arrived: a pair of ``sender`` and ``text``, the name of what is to be done.
+
+    ``payload`` is the JSON value beside the text, ``None`` if there is none; it is no part of the pair.
+    """
+
+    payload: Any
+
+    def __new__(cls, sender: str, text: str, payload: Any = None) -> Command:
+        command = super().__new__(cls, sender, text)
+        command.payload = payload
+        return command
 
 
 class SensedRobot(NamedTuple):

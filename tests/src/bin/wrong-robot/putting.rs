@@ -7,7 +7,7 @@ use bus::Qos;
 use lockstep::TickAnswer;
 use protocol::encode;
 use protocol::keys::STATE;
-use protocol::messages::{CommandText, PublicState, Report, TickUpdate};
+use protocol::messages::{CommandText, PublicState, Report, Target, TickUpdate};
 
 use crate::host::{Failure, Host};
 
@@ -77,6 +77,10 @@ impl Host {
             if self.wrong.is("number.integers:command") {
                 bytes = with_fraction(&bytes, "number");
             }
+            // As robots do that do not know of outboxes.
+            let Target::Robot(to) = to else {
+                continue;
+            };
             let key = self.keys.command(to, &self.name);
             self.put_on(&key, bytes, self.wrong.is("wire.qos:command"))?;
 

@@ -5,8 +5,7 @@ use std::time::Duration;
 use lockstep::{Begin, Sent, Turn};
 use protocol::keys::STATE;
 use protocol::messages::{
-    CommandText, Performative, Point, PublicState, Report, StateVariables, TickUpdate, Variable,
-    Welcome,
+    CommandText, Point, PublicState, Report, StateVariables, TickUpdate, Variable, Welcome,
 };
 use protocol::random::unit;
 use protocol::{Epoch, RobotName, Tick};
@@ -93,6 +92,9 @@ impl Host {
         let mut commands = Vec::new();
         let mut log = Vec::new();
         for delivery in deliveries {
+            if delivery.payload.is_some() && wrong.is("command.payload") {
+                return Err("a payload".into());
+            }
             walker.received += 1;
             walker.last.clone_from(&delivery.command);
             log.push(format!(
@@ -103,11 +105,11 @@ impl Host {
             if welcome.roster.contains(&delivery.from) || answers_operator {
                 walker.sent += 1;
                 commands.push(Sent {
-                    to: delivery.from,
-                    command: CommandText {
-                        performative: Performative::Achieve,
-                        command: format!("{} received: {}", walker.sent, delivery.command),
-                    },
+                    to: delivery.from.into(),
+                    command: CommandText::named(format!(
+                        "{} received: {}",
+                        walker.sent, delivery.command
+                    )),
                 });
             }
         }

@@ -12,8 +12,8 @@ use std::time::{Duration, Instant};
 use bus::{Bus, Role};
 use protocol::keys::{Keys, STATE};
 use protocol::messages::{
-    Clock, Command, Control, ControlAnswer, End, JoinAnswer, Performative, Point, Report,
-    StateVariables, TickUpdate, Waiting,
+    Clock, Command, Control, ControlAnswer, End, JoinAnswer, Payload, Performative, Point, Report,
+    StateVariables, Target, TickUpdate, Waiting,
 };
 use protocol::random::{Stream, stream};
 use protocol::{Epoch, Generation, PROTOCOL_VERSION, RobotName, RunName, Tick, decode, encode};
@@ -260,10 +260,17 @@ impl Intruder<'_> {
                     tick,
                     generation: 1,
                     number: below(chance, 1000) as u32,
+                    to: Some(Target::Others),
                     performative: Performative::Achieve,
                     command: "refill".to_owned(),
+                    payload: Payload::new(serde_json::json!({ "rogue": true })),
                 };
-                (keys.command(other, robot), encode(&command))
+                let key = if tick % 2 == 0 {
+                    keys.outbox(robot)
+                } else {
+                    keys.command(other, robot)
+                };
+                (key, encode(&command))
             }
             6 => {
                 let news = TickUpdate {
