@@ -1,5 +1,5 @@
-//! Robots in bulk: one table of a scenario file with a `count` is as many robots, whose names are that of the table and a number
-//! from 1.
+//! Robots and sites in bulk: one table of a scenario file with a `count` is as many of them, whose names are that of the table and a
+//! number from 1.
 
 use protocol::pattern::overlap;
 
@@ -33,13 +33,13 @@ pub(crate) fn matches(element: &toml::Value, pattern: &str) -> bool {
 
 /// Puts a table for each robot in the place of those with a count, so that a change names robots and never tables.
 pub fn separate_all(robots: &mut Vec<toml::Value>) {
-    separate_where(robots, |_, _| true);
+    separate_where(robots, true, |_, _| true);
 }
 
 /// Puts a table for each robot in the place of those with a count of whose robots a name or a pattern stands for some and not for
-/// all, so that they can be given different values. What is called as the table itself stands for all.
-pub(crate) fn separate(robots: &mut Vec<toml::Value>, pattern: &str) {
-    separate_where(robots, |name, count| {
+/// all, so that they can be given different values. What is called as the table itself stands for all. `have_classes`: see [`single`].
+pub(crate) fn separate(robots: &mut Vec<toml::Value>, have_classes: bool, pattern: &str) {
+    separate_where(robots, have_classes, |name, count| {
         if name == pattern {
             return false;
         }
@@ -50,13 +50,19 @@ pub(crate) fn separate(robots: &mut Vec<toml::Value>, pattern: &str) {
 }
 
 /// Separates the robots of the tables of which `is_chosen`, given their name and their count.
-fn separate_where(robots: &mut Vec<toml::Value>, is_chosen: impl Fn(&str, usize) -> bool) {
+fn separate_where(
+    robots: &mut Vec<toml::Value>,
+    have_classes: bool,
+    is_chosen: impl Fn(&str, usize) -> bool,
+) {
     let mut separated = Vec::new();
     for element in std::mem::take(robots) {
         match (name(&element), count(&element)) {
             (Some(name), Some(count)) if count <= MAX_SEPARATED && is_chosen(name, count) => {
                 let table = element.as_table().cloned().unwrap_or_default();
-                separated.extend((1..=count).map(|number| single(table.clone(), name, number)));
+                separated.extend(
+                    (1..=count).map(|number| single(table.clone(), have_classes, name, number)),
+                );
             }
             _ => separated.push(element),
         }
@@ -67,13 +73,14 @@ fn separate_where(robots: &mut Vec<toml::Value>, is_chosen: impl Fn(&str, usize)
 /// Most robots that are separated: a scenario with more is refused.
 const MAX_SEPARATED: usize = 10_000;
 
-/// The table of one robot.
-fn single(mut table: toml::Table, name: &str, number: usize) -> toml::Value {
+/// The table of one robot or site. Robots have a class: without one in the file it is the name of the table.
+fn single(mut table: toml::Table, have_classes: bool, name: &str, number: usize) -> toml::Value {
     table.remove("count");
-    // The class is the name of the table.
-    table
-        .entry("class")
-        .or_insert_with(|| toml::Value::from(name));
+    if have_classes {
+        table
+            .entry("class")
+            .or_insert_with(|| toml::Value::from(name));
+    }
     table.insert("name".to_owned(), member(name, number).into());
     table.into()
 }

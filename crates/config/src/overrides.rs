@@ -7,7 +7,9 @@ use crate::diagnostic::{FileError, Source};
 
 /// The list of the robots in a scenario file.
 const ROBOTS: &str = "robot";
-/// How many robots an element of it is.
+/// The list of the sites.
+const SITES: &str = "site";
+/// How many robots or sites an element is.
 const COUNT: &str = "count";
 
 /// Changes of a scenario file by the command line.
@@ -67,6 +69,11 @@ fn parse_value(text: &str) -> toml::Value {
 fn is_key(part: &str) -> bool {
     part.chars()
         .all(|c| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '*'))
+}
+
+/// Whether a list has elements with a count.
+fn is_bulk(list: &str) -> bool {
+    list == ROBOTS || list == SITES
 }
 
 fn is_index(part: &str) -> bool {
@@ -172,9 +179,9 @@ impl Override {
         })
     }
 
-    /// Whether it sets how many robots there are of a kind.
+    /// Whether it sets how many robots or sites there are of a kind.
     fn is_count(&self) -> bool {
-        matches!(&self.path[..], [robots, _, count] if robots == ROBOTS && count == COUNT)
+        matches!(&self.path[..], [list, _, count] if is_bulk(list) && count == COUNT)
     }
 
     /// The content of a file with the change.
@@ -183,11 +190,11 @@ impl Override {
     /// The path, and why there is no place for it.
     pub fn apply(&self, table: toml::Table) -> Result<toml::Table, String> {
         let mut root = toml::Value::Table(table);
-        if let [list, robots, ..] = &self.path[..]
-            && list == ROBOTS
-            && let Some(list) = root.get_mut(list).and_then(toml::Value::as_array_mut)
+        if let [list, names, ..] = &self.path[..]
+            && is_bulk(list)
+            && let Some(elements) = root.get_mut(list).and_then(toml::Value::as_array_mut)
         {
-            bulk::separate(list, robots);
+            bulk::separate(elements, list == ROBOTS, names);
         }
         set(&mut root, &self.path, &self.value, self.merges())
             .map_err(|reason| format!("{}: {reason}", self.path.join(".")))?;

@@ -111,6 +111,10 @@ quantity_type! {
     Speed, Dimension::Speed, "m/s"
 }
 quantity_type! {
+    /// An angle, radians.
+    Angle, Dimension::Angle, "rad"
+}
+quantity_type! {
     /// A time, seconds.
     Time, Dimension::Time, "s"
 }

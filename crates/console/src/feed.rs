@@ -452,6 +452,7 @@ mod tests {
             guests: vec![[1.0, 2.0]],
             guest_moods: BTreeMap::new(),
             obstacles: Vec::new(),
+            sites: Vec::new(),
             flights: vec![flight],
             cuts: Vec::new(),
             faults: Vec::new(),

@@ -87,6 +87,13 @@ impl Hosts {
             Event::Behavior { robot, to, .. } => (robot, format!("behavior {to}")),
             Event::Say { robot, text } => (robot, format!("says: {text}")),
             Event::Warned { robot, text } => (robot, format!("warning: {text}")),
+            Event::SiteChanged {
+                robot,
+                site,
+                key,
+                to,
+                ..
+            } => (robot, format!("sets {key} of site {site} to {to}")),
             Event::CommandSent {
                 from, to, command, ..
             } => (from, format!("sends {to}: {command}")),
@@ -96,6 +103,7 @@ impl Hosts {
             | Event::DoneLate { .. }
             | Event::Blocked { .. }
             | Event::Guest { .. }
+            | Event::SiteRefused { .. }
             | Event::CommandDropped { .. }
             | Event::CommandDelayed { .. }
             | Event::CommandDuplicated { .. }

@@ -406,6 +406,28 @@ fn event_cells(event: &Event) -> Vec<Column<'_>> {
         Event::Guest { guest, mood } => {
             vec![("guest", (*guest).into()), ("mood", json_name(mood))]
         }
+        Event::SiteChanged {
+            robot,
+            site,
+            key,
+            from,
+            to,
+        } => vec![
+            ("robot", robot.as_str().into()),
+            ("site", site.as_str().into()),
+            ("key", key.as_str().into()),
+            ("value_before", from.to_string().into()),
+            ("value_after", to.to_string().into()),
+        ],
+        Event::SiteRefused {
+            robot,
+            site,
+            because,
+        } => vec![
+            ("robot", robot.as_str().into()),
+            ("site", site.as_str().into()),
+            ("because", because.name().into()),
+        ],
         Event::Judged {
             expectation,
             verdict,

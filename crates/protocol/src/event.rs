@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::messages::is_false;
 use crate::messages::{
     End, Fate, FaultKind, Flight, GuestMood, LogKind, LogRecord, Payload, Performative, Point,
-    Reason, Verdict,
+    Reason, SiteRefusal, Variable, Verdict,
 };
 use crate::name::RobotName;
 use crate::plain::escape_line;
@@ -215,6 +215,28 @@ pub enum Event {
         /// Its mood now.
         mood: GuestMood,
     },
+    /// A robot changed a variable of a site.
+    SiteChanged {
+        /// Who.
+        robot: RobotName,
+        /// Name of the site.
+        site: String,
+        /// The variable.
+        key: String,
+        /// Its value before.
+        from: Variable,
+        /// Its value now.
+        to: Variable,
+    },
+    /// A robot's action on a site was refused.
+    SiteRefused {
+        /// Who.
+        robot: RobotName,
+        /// Name of the site, as the robot has it.
+        site: String,
+        /// Why.
+        because: SiteRefusal,
+    },
     /// The simulator refuses what a robot does. It says so once for each reason, and how often at the end of the run.
     Warned {
         /// Who.
@@ -381,6 +403,8 @@ impl Event {
             Self::Changed { .. } => "changed",
             Self::Say { .. } => "say",
             Self::Guest { .. } => "guest",
+            Self::SiteChanged { .. } => "site_changed",
+            Self::SiteRefused { .. } => "site_refused",
             Self::Warned { .. } => "warned",
             Self::Judged { .. } => "judged",
             Self::Tick { .. } => "tick",
@@ -560,6 +584,26 @@ impl Event {
                 simulator(LogKind::Run, shorten(format!("{who}from now on {set}")))
             }
             Self::Say { robot, text } => says(robot, LogKind::Say, text.clone()),
+            Self::SiteChanged {
+                robot,
+                site,
+                key,
+                from,
+                to,
+            } => says(
+                robot,
+                LogKind::Site,
+                format!("site {site}: {key} {from} -> {to}"),
+            ),
+            Self::SiteRefused {
+                robot,
+                site,
+                because,
+            } => says(
+                robot,
+                LogKind::Site,
+                format!("site {site} is not changed: {because}"),
+            ),
             Self::Warned { robot, text } => says(robot, LogKind::Say, format!("warning: {text}")),
             Self::Judged {
                 expectation,

@@ -20,7 +20,7 @@ pub mod time;
 pub use codec::{FieldError, Malformed, Message, decode, encode};
 pub use event::{Event, Line};
 pub use messages::{Epoch, Generation, Seq, Tick};
-pub use name::{BadName, RobotName, RunName};
+pub use name::{BadName, MAX_NAME_LEN, RobotName, RunName};
 pub use pattern::RobotPattern;
 
 /// Version of the contract. It is named where two sides first meet (join) and only a change that an old robot

@@ -7,7 +7,8 @@ use crate::payload::read_payload;
 use crate::scoped_borrow::with_cars;
 use crate::stream::Stream;
 use crate::values::{
-    command, point, read_point, sensed_body, sensed_robot, state, tuple, variables,
+    command, point, read_point, sensed_body, sensed_robot, sensed_site, site_result, state, tuple,
+    variables,
 };
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -108,6 +109,20 @@ impl Cars {
         }
         let bodies = with_cars(|cars| cars.bodies().to_vec())?;
         tuple(py, &bodies, |body| sensed_body(py, body))
+    }
+
+    /// The sites that it senses now, by name.
+    #[getter]
+    fn sites<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        let sites = with_cars(|cars| cars.sites().to_vec())?;
+        tuple(py, &sites, |site| sensed_site(py, site))
+    }
+
+    /// What became of its actions on sites in the tick before, in their order.
+    #[getter]
+    fn site_results<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        let results = with_cars(|cars| cars.site_results().to_vec())?;
+        tuple(py, &results, |result| site_result(py, result))
     }
 
     /// Its parameters, as an instance of the dataclass ``kind``: numbers in SI units.

@@ -5,7 +5,8 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyBool, PyDict, PyMapping, PyString, PyTuple, PyType};
 use robot::{
-    Action, Point, PublicState, ReceivedCommand, SensedBody, SensedKind, StateVariables, Variable,
+    Action, Point, PublicState, ReceivedCommand, SensedBody, SensedKind, SensedSite, SiteAction,
+    SiteResult, StateVariables, Variable,
 };
 
 use crate::payload::json_value;
@@ -64,6 +65,30 @@ pub(crate) fn sensed_body<'py>(py: Python<'py>, body: &SensedBody) -> PyResult<B
     CLASS
         .import(py, DATA, "SensedBody")?
         .call1((kind, location))
+}
+
+/// A site within its range.
+pub(crate) fn sensed_site<'py>(py: Python<'py>, site: &SensedSite) -> PyResult<Bound<'py, PyAny>> {
+    static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    let fields = (
+        &site.name,
+        &site.kind,
+        point(py, site.location)?,
+        variables(py, &site.state)?,
+    );
+    CLASS.import(py, DATA, "SensedSite")?.call1(fields)
+}
+
+/// What became of an action on a site.
+pub(crate) fn site_result<'py>(
+    py: Python<'py>,
+    result: &SiteResult,
+) -> PyResult<Bound<'py, PyAny>> {
+    static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    let refused = result.refused.map(robot::SiteRefusal::name);
+    CLASS
+        .import(py, DATA, "SiteResult")?
+        .call1((&result.site, refused))
 }
 
 /// What a robot published of itself.
@@ -155,7 +180,39 @@ pub(crate) fn read_action(value: &Bound<'_, PyAny>) -> PyResult<Action> {
         emotion_state: field(value, "emotion_state", "a text")?,
         behavior_state: field(value, "behavior_state", "a text")?,
         state_variables: read_variables(&variables)?,
+        site_actions: read_site_actions(&value.getattr("site_actions")?)?,
     })
+}
+
+/// Actions on sites.
+fn read_site_actions(value: &Bound<'_, PyAny>) -> PyResult<Vec<SiteAction>> {
+    let mut actions = Vec::new();
+    for action in value.try_iter()? {
+        let action = action?;
+        let read = |name: &str| -> PyResult<StateVariables> {
+            let variables = action.getattr(name).map_err(|_| {
+                let expected = "a sequence of cars.SiteAction";
+                wrong_field("site_actions", expected, value)
+            })?;
+            read_variables(&variables)
+        };
+        let mut add = std::collections::BTreeMap::new();
+        for (key, number) in &read("add")? {
+            let number = number.as_f64().ok_or_else(|| {
+                PyTypeError::new_err(format!(
+                    "a SiteAction adds numbers, not {number} to {key:?}"
+                ))
+            })?;
+            add.insert(key.to_owned(), number);
+        }
+        actions.push(SiteAction {
+            set: read("set")?,
+            add,
+            only_if: read("only_if")?,
+            site: action.getattr("site")?.extract()?,
+        });
+    }
+    Ok(actions)
 }
 
 /// A field of an action.

@@ -262,6 +262,8 @@ fn is_environment(event: &Event) -> bool {
             | Event::CommandSent { .. }
             | Event::Say { .. }
             | Event::Guest { .. }
+            | Event::SiteChanged { .. }
+            | Event::SiteRefused { .. }
             | Event::Missed { .. }
             | Event::DoneLate { .. }
             | Event::Judged { .. }

@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use protocol::messages::{
-    Awaited, Cut, DisplayUnit, GuestMood, LogRecord, Panel, Point, Report, Standing,
+    Awaited, Cut, DisplayUnit, GuestMood, LogRecord, Panel, Point, Report, SiteFrame, Standing,
+    StateVariables,
 };
 use protocol::{Epoch, Event, Message, RobotName, RunName, Tick};
 use schemars::JsonSchema;
@@ -39,6 +40,9 @@ pub struct Header {
     pub display_unit: DisplayUnit,
     /// Centers of the fixed obstacles, meters.
     pub obstacles: Vec<[f64; 2]>,
+    /// The sites as they are at the start, by name.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sites: Vec<SiteFrame>,
     /// The robots of the scenario, by name.
     pub robots: Vec<RobotName>,
 }
@@ -48,6 +52,18 @@ impl Header {
     #[must_use]
     pub fn time_ns(&self, tick: Tick) -> u64 {
         (tick as f64 * self.tick_s * 1e9).round() as u64
+    }
+
+    /// The sites after a tick, by name.
+    #[must_use]
+    pub fn sites_of(&self, frame: &Frame) -> Vec<SiteFrame> {
+        let mut sites = self.sites.clone();
+        for site in &mut sites {
+            if let Some(state) = frame.sites.get(&site.name) {
+                site.state = state.clone();
+            }
+        }
+        sites
     }
 
     /// What every reader of the format shows of the file.
@@ -251,6 +267,9 @@ pub struct Frame {
     /// Guests that are not content, by their index, by mood.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub guest_moods: BTreeMap<GuestMood, Vec<u32>>,
+    /// The states of sites that are others than at the start, by name of the site.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub sites: BTreeMap<String, StateVariables>,
     /// Pairs of robots between which the medium lets nothing through.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub cuts: Vec<Cut>,

@@ -39,6 +39,7 @@ fn header() -> Header {
         field_m: [30.0, 20.0],
         body_m: 0.5,
         display_unit: DisplayUnit::Feet,
+        sites: Vec::new(),
         obstacles: vec![[1.0, 2.0]],
         robots: vec![name("Butler"), name("Leguin")],
     }
@@ -64,6 +65,7 @@ fn report(tick: Tick) -> Report {
         .into(),
         commands: (tick % 3) as u32,
         log: vec![format!("line {tick}")],
+        site_actions: Vec::new(),
     }
 }
 
@@ -106,6 +108,7 @@ fn tick(tick: Tick) -> RecordedTick {
                 .collect(),
             guest_moods: [(GuestMood::Waiting, vec![3, 7])].into(),
             expectations: Vec::new(),
+            sites: BTreeMap::new(),
             cuts: vec![Cut {
                 from: name("Butler"),
                 to: name("Leguin"),
@@ -156,7 +159,7 @@ fn tick(tick: Tick) -> RecordedTick {
 fn end() -> Event {
     Event::End {
         reason: End::Finished,
-            because: None,
+        because: None,
         waited_for: Vec::new(),
         digest: "0".repeat(32),
         seal: None,

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use lockstep::Sent;
 use protocol::messages::{
     CommandText, MAX_ENTRIES, MAX_TEXT_BYTES, Payload, Performative, Point, PublicState,
-    SensedBody, SensedRobot, StateVariables, Target, TickUpdate, Welcome,
+    SensedBody, SensedRobot, SensedSite, SiteResult, StateVariables, Target, TickUpdate, Welcome,
 };
 use protocol::plain::cut;
 use protocol::random::Stream;
@@ -190,6 +190,18 @@ impl<'a> Cars<'a> {
         );
 
         &self.news.bodies
+    }
+
+    /// The sites that it senses now, by name.
+    #[must_use]
+    pub fn sites(&self) -> &'a [SensedSite] {
+        &self.news.sites
+    }
+
+    /// What became of its actions on sites in the tick before, in their order.
+    #[must_use]
+    pub fn site_results(&self) -> &'a [SiteResult] {
+        &self.news.site_results
     }
 
     /// Writes a line to the log of the run. Long lines are truncated, and lines beyond the limit of a tick are dropped; the log

@@ -1,6 +1,6 @@
 //! What a robot implements: one method from what it perceives to what it does.
 
-use protocol::messages::{Panel, Point, StateVariables, Variable};
+use protocol::messages::{Panel, Point, SiteAction, StateVariables, Variable};
 
 use crate::cars::Cars;
 use crate::error::{BadParameters, ParametersCheck};
@@ -74,6 +74,8 @@ pub struct Action {
     pub behavior_state: String,
     /// Further variables that it publishes.
     pub state_variables: StateVariables,
+    /// What it does to sites, in this order. What became of it is in [`Cars::site_results`] in the next tick.
+    pub site_actions: Vec<SiteAction>,
 }
 
 impl Action {
@@ -127,6 +129,13 @@ impl Action {
     #[must_use]
     pub fn behavior(mut self, name: impl Into<String>) -> Self {
         self.behavior_state = name.into();
+        self
+    }
+
+    /// Does this to a site.
+    #[must_use]
+    pub fn on_site(mut self, action: SiteAction) -> Self {
+        self.site_actions.push(action);
         self
     }
 

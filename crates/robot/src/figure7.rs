@@ -84,5 +84,6 @@ pub fn control_cycle(robot: &mut impl CarsRobotInterface, cars: &mut Cars<'_>) -
         emotion_state: robot.emotion_state().to_owned(),
         behavior_state: robot.behavior_state().to_owned(),
         state_variables: robot.state_variables(),
+        ..Action::default()
     }
 }

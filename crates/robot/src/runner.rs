@@ -274,6 +274,7 @@ impl Runner {
             state_variables: state.state_variables.clone(),
             commands: u32::try_from(commands.len()).unwrap_or(u32::MAX),
             log,
+            site_actions: action.site_actions,
         };
 
         // The simulator would refuse a message beyond the limits, and wait for another one.
@@ -318,7 +319,16 @@ fn is_small(report: &Report) -> bool {
         texts += name.len() + value.as_str().map_or(0, str::len);
     }
 
-    let entries = report.log.len() + report.state_variables.len();
+    let mut entries = report.log.len() + report.state_variables.len();
+    for action in &report.site_actions {
+        texts += action.site.len();
+        entries += 1 + action.set.len() + action.add.len() + action.only_if.len();
+        for (name, value) in action.set.iter().chain(&action.only_if) {
+            texts += name.len() + value.as_str().map_or(0, str::len);
+        }
+        texts += action.add.keys().map(String::len).sum::<usize>();
+    }
+
     texts * MAX_ESCAPED + entries * MAX_ENTRY + MAX_REST <= MAX_MESSAGE_BYTES
 }
 

@@ -13,6 +13,7 @@ use super::fault::Fault;
 use super::guests::GuestRules;
 use super::lateness::Lateness;
 use super::network::Network;
+use super::sites::SiteSpec;
 
 /// Seed if neither the file nor the command line gives one. It is fixed, so runs are reproducible by default.
 pub const DEFAULT_SEED: u64 = 1;
@@ -57,6 +58,8 @@ pub struct Scenario {
     pub guest_rules: GuestRules,
     /// Centers of the fixed obstacles, meters.
     pub obstacles: Vec<Point>,
+    /// The sites by name.
+    pub sites: BTreeMap<String, SiteSpec>,
     /// The robots by name.
     pub robots: BTreeMap<RobotName, RobotSpec>,
     /// Rules for late robots.

@@ -13,6 +13,7 @@ mod placing;
 mod raw;
 pub mod roster;
 mod setup;
+mod sites;
 
 use std::path::Path;
 
@@ -32,6 +33,7 @@ pub use fault::{Fault, FaultEnd};
 pub use guests::GuestRules;
 pub use lateness::Lateness;
 pub use network::Network;
+pub use sites::{OnConflict, SiteSpec, SiteVariable};
 
 /// Reads the expectations of a file, for a run with these robots. Other tables of the file are of no concern.
 ///
@@ -114,6 +116,8 @@ impl Scenario {
         self.seed = seed;
         let placed = placing::place_at_random(&mut self);
         placed.map_err(|error| FileError::new(format!("with the seed {seed}, {error}")))?;
+        sites::place_at_random(&mut self)
+            .map_err(|(_, error)| FileError::new(format!("with the seed {seed}, {error}")))?;
         Ok(self)
     }
 

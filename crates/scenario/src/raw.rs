@@ -8,6 +8,7 @@ pub(super) mod mood;
 mod network;
 mod numbers;
 mod place;
+mod site;
 mod times;
 mod unplaced;
 pub(super) mod words;
@@ -32,6 +33,7 @@ use guests::GuestsTable;
 use network::NetworkTable;
 use numbers::positive;
 use place::StartPlace;
+use site::SiteTable;
 use times::Times;
 use unplaced::unplaced;
 
@@ -41,6 +43,7 @@ use super::change::Parent;
 use super::checked::{self, DEFAULT_SEED, RecordContents, RobotSpec};
 use super::lateness::Lateness;
 use super::placing::{self, PlacingCause, PlacingError};
+use super::sites;
 
 /// Most ticks of a scenario.
 const MAX_TICKS: f64 = 1e9;
@@ -73,6 +76,8 @@ pub(super) struct ScenarioFile {
     parent: Option<ParentTable>,
     #[serde(default, rename = "obstacle", skip_serializing_if = "Vec::is_empty")]
     obstacles: Vec<Obstacle>,
+    #[serde(default, rename = "site", skip_serializing_if = "Vec::is_empty")]
+    sites: Vec<Spanned<SiteTable>>,
     #[serde(default, rename = "robot", skip_serializing_if = "Vec::is_empty")]
     robots: Vec<Spanned<RawRobot>>,
 }
@@ -150,6 +155,9 @@ impl ScenarioFile {
         for robot in &mut self.robots {
             robot.as_mut().at.forget();
         }
+        for site in &mut self.sites {
+            site.as_mut().forget_place();
+        }
         self
     }
 
@@ -213,6 +221,13 @@ impl ScenarioFile {
         let display_unit = field.and_then(|field| field.display_unit);
 
         let robots = robots(self.robots, source, folder)?;
+        let (sites, site_spans) = site::check(
+            self.sites,
+            size.0.map(|length| length.0),
+            Length(sensing_range_m),
+            &robots.keys().cloned().collect(),
+            source,
+        )?;
         let record = record(self.record, source)?;
         let network = network::check(self.network, &robots, tick_s, source)?;
         let faults = fault::check(self.faults, &robots, &lateness, tick_s, settled, source)?;
@@ -231,6 +246,7 @@ impl ScenarioFile {
             guests,
             guest_rules,
             obstacles,
+            sites,
             lateness,
             robots,
             network,
@@ -247,6 +263,9 @@ impl ScenarioFile {
             FileError::at(source, places.of_error(&error), &error.to_string())
         };
         placing::place_at_random(&mut scenario).map_err(refuse)?;
+        sites::place_at_random(&mut scenario).map_err(|(site, reason)| {
+            FileError::at(source, site_spans.get(&site).cloned(), &reason)
+        })?;
         if settled == 0 {
             placing::check(&scenario).map_err(refuse)?;
         }
@@ -534,6 +553,8 @@ impl From<&checked::Scenario> for ScenarioFile {
         let obstacles = obstacles.map(|at| Obstacle {
             at: unplaced(lengths(*at)),
         });
+        let sites = scenario.sites.iter();
+        let sites = sites.filter_map(|(name, spec)| SiteTable::of(name, spec));
         let robots = scenario.robots.iter();
         let robots = robots.map(|(name, spec)| unplaced(RawRobot::of(name, spec, lateness)));
 
@@ -561,6 +582,7 @@ impl From<&checked::Scenario> for ScenarioFile {
             end_when: scenario.end_when.clone().map(unplaced),
             parent: scenario.parent.as_ref().map(ParentTable::from),
             obstacles: obstacles.collect(),
+            sites: sites.map(unplaced).collect(),
             robots: robots.collect(),
         }
     }

@@ -919,7 +919,8 @@ fn the_condition_that_ends_a_run_is_kept_in_the_resolved_file() {
         "{ robot = \"A\", variable = \"x\", at_least = 3, for = \"10 s\" }",
         "[{ event = \"judged\", verdict = \"fail\" }, { robot = \"A\", behavior = \"DONE\" }]",
     ] {
-        let text = format!("end_when = {condition}\n[[robot]]\nname = \"A\"\nat = [\"5 m\", \"5 m\"]\n");
+        let text =
+            format!("end_when = {condition}\n[[robot]]\nname = \"A\"\nat = [\"5 m\", \"5 m\"]\n");
         let scenario = parse(&text).unwrap();
         assert!(scenario.end_when.is_some());
         let again = parse(&scenario.to_toml().unwrap()).unwrap();
@@ -930,16 +931,26 @@ fn the_condition_that_ends_a_run_is_kept_in_the_resolved_file() {
 #[test]
 fn a_condition_that_no_run_ends_by_is_refused() {
     for (condition, reason) in [
-        ("{ robot = \"B\", behavior = \"X\" }", "no robot of this scenario is called B"),
-        ("{ event = \"end\" }", "`end_when` cannot name the event \"end\""),
+        (
+            "{ robot = \"B\", behavior = \"X\" }",
+            "no robot of this scenario is called B",
+        ),
+        (
+            "{ event = \"end\" }",
+            "`end_when` cannot name the event \"end\"",
+        ),
         ("{ robot = \"A\" }", "a condition is an event"),
     ] {
-        let text = format!("end_when = {condition}\n[[robot]]\nname = \"A\"\nat = [\"5 m\", \"5 m\"]\n");
+        let text =
+            format!("end_when = {condition}\n[[robot]]\nname = \"A\"\nat = [\"5 m\", \"5 m\"]\n");
         let error = parse(&text).unwrap_err();
         assert!(error.reason().contains(reason), "{condition}: {error}");
     }
 
     let change = "[[change]]\nat = \"10 s\"\nset = ['end_when={ event = \"say\" }']\n";
     let error = expecting(change).unwrap_err();
-    assert!(error.reason().contains("holds for the whole run"), "{error}");
+    assert!(
+        error.reason().contains("holds for the whole run"),
+        "{error}"
+    );
 }

@@ -2,7 +2,7 @@
 //! which a robot sent them.
 
 use protocol::messages::{Payload, Point, Report, StateVariables, Variable};
-use protocol::{RobotName, Tick};
+use protocol::{Event, RobotName, Tick};
 
 use crate::medium::SentCommand;
 use xxhash_rust::xxh3::xxh3_128;
@@ -82,10 +82,44 @@ impl TickDigest {
         self.integer(variables.len() as u64);
         for (name, value) in variables {
             self.text(name);
-            match value {
-                Variable::Flag(flag) => self.integer(u64::from(*flag)),
-                Variable::Number(number) => self.number(*number),
-                Variable::Text(text) => self.text(text),
+            self.variable(value);
+        }
+    }
+
+    fn variable(&mut self, value: &Variable) {
+        match value {
+            Variable::Flag(flag) => self.integer(u64::from(*flag)),
+            Variable::Number(number) => self.number(*number),
+            Variable::Text(text) => self.text(text),
+        }
+    }
+
+    /// Adds what became of the robots' actions on sites.
+    pub fn sites(&mut self, events: &[Event]) {
+        for event in events {
+            match event {
+                Event::SiteChanged {
+                    robot,
+                    site,
+                    key,
+                    from: _,
+                    to,
+                } => {
+                    self.text(robot.as_str());
+                    self.text(site);
+                    self.text(key);
+                    self.variable(to);
+                }
+                Event::SiteRefused {
+                    robot,
+                    site,
+                    because,
+                } => {
+                    self.text(robot.as_str());
+                    self.text(site);
+                    self.text(because.name());
+                }
+                _ => {}
             }
         }
     }

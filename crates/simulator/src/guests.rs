@@ -244,6 +244,7 @@ mod tests {
                 .collect(),
             commands: 0,
             log: log.iter().map(|line| (*line).to_owned()).collect(),
+            site_actions: Vec::new(),
         }
     }
 

@@ -11,6 +11,7 @@ pub mod medium;
 pub mod recorder;
 pub mod server;
 pub mod simulation;
+pub mod sites;
 mod summarized;
 
 pub use protocol::{Event, Line};

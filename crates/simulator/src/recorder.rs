@@ -566,6 +566,7 @@ pub fn header(run: &RunName, simulation: &Simulation) -> Header {
         body_m: scenario.body_m,
         display_unit: scenario.display_unit,
         obstacles: scenario.obstacles.iter().map(|at| [at.x, at.y]).collect(),
+        sites: crate::sites::at_start(scenario),
         robots: simulation.names().to_vec(),
     }
 }
@@ -602,6 +603,7 @@ fn set_frame(frame: &mut Frame, simulation: &Simulation, record: &TickRecord) {
 
     frame.guest_moods = simulation.guest_moods();
     frame.tick = record.tick;
+    frame.sites = simulation.sites().changed();
     frame.cuts = simulation.cuts();
     frame.unreachable.clone_from(simulation.unreachable());
     frame.expectations = simulation.standings();

@@ -21,6 +21,7 @@ use world::{Body, HallError, MoveOutcome, Reaction, World};
 use crate::digest::{Digest, TickDigest};
 use crate::guests::GuestState;
 use crate::medium::{Arrival, Medium, SentCommand};
+use crate::sites::{SiteOrders, Sites};
 use scenario::{Change, FaultEnd, Lateness, Override, Scenario, to_wire, to_world};
 
 /// Most bodies in the news of a robot, so that the news fit into a message.
@@ -71,6 +72,7 @@ pub struct Simulation {
     now: Tick,
     world: World<Stream>,
     guests: GuestState,
+    sites: Sites,
     medium: Medium,
     /// Robots with the bodies around them in their news.
     with_bodies: BTreeSet<RobotName>,
@@ -145,6 +147,7 @@ impl Simulation {
             tick: 0,
             now: 0,
             guests: GuestState::new(scenario.guest_rules.clone(), scenario.guests.count),
+            sites: Sites::new(&scenario),
             world,
             medium,
             names,
@@ -408,6 +411,7 @@ impl Simulation {
             digest.place(body.x, body.y);
         }
         self.note_reports(outcome.reports, &mut digest);
+        self.act_on_sites(&mut digest);
         self.note_guests();
 
         self.tick = self.now;
@@ -492,6 +496,25 @@ impl Simulation {
                 self.events.push(Event::Missed { robot: name });
             }
         }
+    }
+
+    /// Carries out what robots do to sites by their reports of the tick.
+    fn act_on_sites(&mut self, digest: &mut TickDigest) {
+        let reports = self.reports_of(self.now);
+        let mut orders = Vec::new();
+        for (robot, report) in &reports {
+            if !report.site_actions.is_empty() {
+                orders.push(SiteOrders {
+                    robot,
+                    at: self.location(robot).unwrap_or_default(),
+                    actions: &report.site_actions,
+                });
+            }
+        }
+
+        let events = self.sites.carry_out(&orders);
+        digest.sites(&events);
+        self.events.extend(events);
     }
 
     /// A robot has done a tick of which its report does not count, because the clock goes on without it.
@@ -695,6 +718,8 @@ impl Simulation {
                 unreachable: self.unreachable.get(name).cloned().unwrap_or_default(),
                 sensed: self.sensed_robots(index),
                 bodies: self.sensed_bodies(index),
+                sites: self.sites.near(to_wire(self.world.robots()[index])),
+                site_results: self.sites.results(name).to_vec(),
             };
             // A robot without news gets none: silence says that all is as it expects.
             if !news.is_empty() {
@@ -1091,6 +1116,18 @@ impl Simulation {
     #[must_use]
     pub fn guest_moods(&self) -> BTreeMap<GuestMood, Vec<u32>> {
         self.guests.moods()
+    }
+
+    /// The sites.
+    #[must_use]
+    pub fn sites(&self) -> &Sites {
+        &self.sites
+    }
+
+    /// The state of a site; `None` if the scenario has no such site.
+    #[must_use]
+    pub fn site_state(&self, name: &str) -> Option<&StateVariables> {
+        self.sites.state(name)
     }
 
     /// Whether a robot's last move was blocked.

@@ -84,6 +84,7 @@ impl Exchange<TickUpdate, Arc<Report>, CommandText> for Robots {
                 state_variables: StateVariables::new(),
                 commands: commands.len() as u32,
                 log: Vec::new(),
+                site_actions: Vec::new(),
             };
             outcome
                 .reports

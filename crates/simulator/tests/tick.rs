@@ -62,6 +62,7 @@ impl<F: FnMut(&RobotName, &mut Report, &mut Commands)> Puppets<F> {
             state_variables: StateVariables::new(),
             commands: 0,
             log: vec![],
+            site_actions: Vec::new(),
         }
     }
 }

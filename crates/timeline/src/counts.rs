@@ -107,6 +107,8 @@ impl Counts {
             | Event::Changed { .. }
             | Event::Say { .. }
             | Event::Guest { .. }
+            | Event::SiteChanged { .. }
+            | Event::SiteRefused { .. }
             | Event::Warned { .. }
             | Event::Judged { .. }
             | Event::Tick { .. }

@@ -167,6 +167,8 @@ impl Timeline {
             | Event::Blocked { .. }
             | Event::Say { .. }
             | Event::Guest { .. }
+            | Event::SiteChanged { .. }
+            | Event::SiteRefused { .. }
             | Event::Warned { .. }
             | Event::Judged { .. }
             | Event::Tick { .. }

@@ -65,6 +65,7 @@ mod motion;
 mod placing;
 mod point;
 mod reactions;
+mod sight;
 mod triangular;
 
 pub use bodies::{Blocker, Body, Near};
@@ -75,4 +76,5 @@ pub use motion::{MoveOutcome, World};
 pub use placing::RobotPlacer;
 pub use point::Point;
 pub use reactions::{Reaction, Response};
+pub use sight::{Rectangle, is_hidden};
 pub use triangular::Triangular;

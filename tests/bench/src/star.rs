@@ -265,6 +265,7 @@ fn report_of(clock: Clock) -> Report {
         state_variables: StateVariables::default(),
         commands: 0,
         log: Vec::new(),
+        site_actions: Vec::new(),
     }
 }
 

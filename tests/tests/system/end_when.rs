@@ -43,7 +43,10 @@ fn a_run_ends_when_the_condition_holds_in_one_process_and_as_processes() {
 
     for run in ["local", "launched"] {
         let said = lab.ok(&["verify", run]);
-        assert!(said.contains(&format!("{ticks} ticks to the end")), "{said}");
+        assert!(
+            said.contains(&format!("{ticks} ticks to the end")),
+            "{said}"
+        );
     }
 }
 

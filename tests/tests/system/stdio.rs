@@ -122,9 +122,13 @@ fn robots_in_javascript_bid_by_broadcasts_with_payloads() {
     }
 
     let lab = Lab::new();
-    let bidder = root().join("sdk/stdio/node/bidder.mjs").display().to_string();
+    let bidder = root()
+        .join("sdk/stdio/node/bidder.mjs")
+        .display()
+        .to_string();
     let mut scenario = "duration = \"3 s\"\n".to_owned();
-    let mut launch = "scenario = \"bids.toml\"\nspeed = \"max\"\n[console]\nenabled = false\n".to_owned();
+    let mut launch =
+        "scenario = \"bids.toml\"\nspeed = \"max\"\n[console]\nenabled = false\n".to_owned();
     for (name, x) in [("Ada", "3.1"), ("Bo", "1.3"), ("Cyd", "5.7")] {
         scenario += &format!("[[robot]]\nname = \"{name}\"\nat = [\"{x} m\", \"2 m\"]\n");
         launch += &format!(
@@ -145,7 +149,10 @@ fn robots_in_javascript_bid_by_broadcasts_with_payloads() {
     // Once for each broadcast, and to the last bit: the distance of Bo.
     assert_eq!(payloads.len(), 3);
     let distance_m = (1.3_f64 * 1.3 + 2.0 * 2.0).sqrt();
-    assert_eq!(payloads[1], format!(r#"{{"distance_m":{distance_m},"task":"clean"}}"#));
+    assert_eq!(
+        payloads[1],
+        format!(r#"{{"distance_m":{distance_m},"task":"clean"}}"#)
+    );
     let gave_up: Vec<&str> = of_kind("behavior")
         .filter(|event| event["tick"] == 2 && event["to"] == "WAIT")
         .filter_map(|event| event["robot"].as_str())

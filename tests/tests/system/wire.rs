@@ -252,6 +252,7 @@ impl Hand {
             state_variables: StateVariables::new(),
             commands: 0,
             log: vec![],
+            site_actions: Vec::new(),
         }
     }
 

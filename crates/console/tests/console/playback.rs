@@ -32,6 +32,7 @@ fn header() -> Header {
         field_m: [15.24, 15.24],
         body_m: 0.6096,
         display_unit: DisplayUnit::Feet,
+        sites: Vec::new(),
         obstacles: vec![[1.0, 2.0]],
         robots: vec![robot("Butler")],
     }
@@ -50,6 +51,7 @@ fn report(tick: u64) -> Report {
         state_variables: [("treats".to_owned(), (tick as f64).into())].into(),
         commands: 0,
         log: Vec::new(),
+        site_actions: Vec::new(),
     }
 }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use protocol::Message;
 use protocol::messages::{
     End, MAX_TEXT_BYTES, Panel, Parameters, Payload, Performative, Point, PublicState, SensedRobot,
-    StateVariables, Variable,
+    SensedSite, SiteAction, SiteResult, StateVariables, Variable,
 };
 use protocol::plain::escape_line;
 use protocol::{RobotName, RunName, Tick};
@@ -22,6 +22,7 @@ const DONE_FIELDS: &[&str] = &[
     "emotion_state",
     "behavior_state",
     "state_variables",
+    "site_actions",
 ];
 /// Most unknown fields that are named.
 const MAX_UNKNOWN: usize = 5;
@@ -57,6 +58,8 @@ pub(super) enum ToProgram<'a> {
         roster: &'a [RobotName],
         parameters: &'a Parameters,
         sensed: &'a [SensedRobot],
+        #[serde(skip_serializing_if = "<[_]>::is_empty")]
+        sites: &'a [SensedSite],
         #[serde(skip_serializing_if = "Option::is_none")]
         last_state_variables: Option<&'a StateVariables>,
     },
@@ -70,6 +73,10 @@ pub(super) enum ToProgram<'a> {
         commands: &'a [Arrived],
         #[serde(skip_serializing_if = "<[_]>::is_empty")]
         sensed: &'a [SensedRobot],
+        #[serde(skip_serializing_if = "<[_]>::is_empty")]
+        sites: &'a [SensedSite],
+        #[serde(skip_serializing_if = "<[_]>::is_empty")]
+        site_results: &'a [SiteResult],
     },
     /// The answer to `query`, `percept` or `random`.
     Answer {
@@ -126,7 +133,12 @@ impl From<End> for EndReason {
 
 impl<'a> ToProgram<'a> {
     /// The line `init` for a welcome.
-    pub(super) fn init(welcome: &'a Welcome, tick: Tick, sensed: &'a [SensedRobot]) -> Self {
+    pub(super) fn init(
+        welcome: &'a Welcome,
+        tick: Tick,
+        sensed: &'a [SensedRobot],
+        sites: &'a [SensedSite],
+    ) -> Self {
         Self::Init {
             protocol: welcome.protocol,
             run: &welcome.run,
@@ -144,6 +156,7 @@ impl<'a> ToProgram<'a> {
             roster: &welcome.roster,
             parameters: &welcome.parameters,
             sensed,
+            sites,
             last_state_variables: welcome
                 .last_state
                 .as_ref()
@@ -235,6 +248,7 @@ pub(super) struct DoneLine {
     pub(super) emotion_state: String,
     pub(super) behavior_state: String,
     pub(super) state_variables: StateVariables,
+    pub(super) site_actions: Vec<SiteAction>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -247,6 +261,7 @@ struct RawDone {
     emotion_state: String,
     behavior_state: String,
     state_variables: BTreeMap<String, Value>,
+    site_actions: Vec<SiteAction>,
 }
 
 impl ReadLine {
@@ -388,6 +403,7 @@ fn check_done(raw: RawDone) -> Result<DoneLine, String> {
         emotion_state: state.emotion_state,
         behavior_state: state.behavior_state,
         state_variables: state.state_variables,
+        site_actions: raw.site_actions,
     })
 }
 
@@ -429,7 +445,7 @@ mod tests {
             "roster":["A","B"],"parameters":{"v_mps":1e-7}}"#;
         let welcome: Welcome = serde_json::from_str(welcome).unwrap();
         assert_eq!(
-            line(&ToProgram::init(&welcome, 6, &[])),
+            line(&ToProgram::init(&welcome, 6, &[], &[])),
             "{\"type\":\"init\",\"protocol\":2,\"run\":\"r\",\"name\":\"A\",\"generation\":2,\"epoch\":3,\"tick\":6,\"seed\":5,\
              \"stream\":\"robot/A#2\",\"tick_s\":0.5,\"field_m\":[9.0,8.5],\"body_m\":0.6,\"sensing_range_m\":2.0,\
              \"location\":{\"x\":1.0,\"y\":2.0},\"roster\":[\"A\",\"B\"],\"parameters\":{\"v_mps\":1e-7},\"sensed\":[]}\n"
@@ -445,6 +461,8 @@ mod tests {
             blocked: false,
             commands: &[],
             sensed: &[],
+            sites: &[],
+            site_results: &[],
         };
         assert_eq!(
             line(&quiet),
@@ -467,6 +485,8 @@ mod tests {
             blocked: true,
             commands: &commands,
             sensed: &sensed,
+            sites: &[],
+            site_results: &[],
         };
         assert_eq!(
             line(&busy),

@@ -200,6 +200,8 @@ impl ProgramRobot {
                 blocked: cars.was_blocked(),
                 commands: &commands,
                 sensed: cars.sensed_robots(),
+                sites: cars.sites(),
+                site_results: cars.site_results(),
             };
 
             // What the program says after an `init` in the middle of a run may arrive before this line is sent.
@@ -257,7 +259,12 @@ impl Robot for ProgramRobot {
 
         let welcome = cars.welcome();
         // What the program says to this is read in the tick that follows.
-        let begun = self.begin(&ToProgram::init(welcome, cars.tick(), cars.sensed_robots()));
+        let begun = self.begin(&ToProgram::init(
+            welcome,
+            cars.tick(),
+            cars.sensed_robots(),
+            cars.sites(),
+        ));
         self.is_initializing = true;
         if let Err(reason) = begun {
             cars.give_up(reason);
@@ -279,6 +286,7 @@ impl Robot for ProgramRobot {
             emotion_state: self.done.emotion_state.clone(),
             behavior_state: self.done.behavior_state.clone(),
             state_variables: self.done.state_variables.clone(),
+            site_actions: self.done.site_actions.clone(),
         }
     }
 

@@ -72,6 +72,8 @@ pub enum LogKind {
     Network,
     /// A robot said something, or the simulator warns of what a robot does.
     Say,
+    /// A robot changed a site, or was refused to.
+    Site,
     /// It was decided whether an expectation is met.
     Verdict,
     /// The clock waits; wall-clock matter, not part of the run's record.

@@ -8,6 +8,7 @@ mod observe;
 mod payload;
 mod performative;
 mod point;
+mod site;
 mod state;
 mod step;
 mod target;
@@ -29,6 +30,10 @@ pub use observe::{
 pub use payload::{MAX_PAYLOAD_BYTES, MAX_PAYLOAD_DEPTH, Payload};
 pub use performative::Performative;
 pub use point::Point;
+pub use site::{
+    MAX_SITE_ACTIONS, MAX_SITE_TEXT_BYTES, MAX_SITE_VARIABLES, MAX_SITES, SensedSite, SiteAction,
+    SiteFrame, SiteRefusal, SiteResult,
+};
 pub use state::{Answer, PublicState};
 pub use step::{
     Clock, Command, CommandText, Correction, Delivery, End, JoinAnswer, JoinRequest, NEWS_FLAGS,

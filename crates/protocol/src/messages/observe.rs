@@ -9,6 +9,7 @@ use super::control::{Awaited, FaultKind, Phase, Presence};
 use super::limits::{counted, few, finite, short};
 use super::numbers::{Epoch, Generation, Seq, Tick};
 use super::point::Point;
+use super::site::SiteFrame;
 use super::variables::StateVariables;
 use crate::codec::{FieldError, Message, as_json};
 use crate::name::{RobotName, RunName};
@@ -55,6 +56,9 @@ pub struct WorldFrame {
     pub guest_moods: BTreeMap<GuestMood, Vec<u32>>,
     /// Centers of the fixed obstacles, meters.
     pub obstacles: Vec<[f64; 2]>,
+    /// The sites, by name.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sites: Vec<SiteFrame>,
     /// Commands that were sent, or whose fate was decided, since the frame before; the newest [`MAX_FLIGHTS`] of them.
     #[serde(default)]
     pub flights: Vec<Flight>,

@@ -10,6 +10,7 @@ use super::numbers::{Epoch, Generation, Tick};
 use super::payload::Payload;
 use super::performative::Performative;
 use super::point::Point;
+use super::site::{SensedSite, SiteAction, SiteResult, check_site_actions};
 use super::state::PublicState;
 use super::target::Target;
 use super::variables::{StateVariables, check_variables};
@@ -252,6 +253,13 @@ pub struct TickUpdate {
     /// All bodies within its sensing range, itself excepted, in a fixed order; only if it asked for them when it joined.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub bodies: Vec<SensedBody>,
+    /// All sites that it senses, by name. The whole list comes in every tick with one in range, so that a robot needs no memory of
+    /// it, whichever incarnation it is.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sites: Vec<SensedSite>,
+    /// What became of its actions on sites in the tick before, in their order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub site_results: Vec<SiteResult>,
 }
 
 impl TickUpdate {
@@ -268,6 +276,8 @@ impl TickUpdate {
             unreachable,
             sensed,
             bodies,
+            sites,
+            site_results,
         } = self;
 
         joined.is_none()
@@ -277,6 +287,8 @@ impl TickUpdate {
             && unreachable.is_empty()
             && sensed.is_empty()
             && bodies.is_empty()
+            && sites.is_empty()
+            && site_results.is_empty()
     }
 }
 
@@ -356,6 +368,9 @@ pub struct Report {
     /// Lines for the log: what it says, what it did.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub log: Vec<String>,
+    /// What it does to sites, in this order. It is carried out when all reports of the tick are in.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub site_actions: Vec<SiteAction>,
 }
 
 impl Report {
@@ -387,6 +402,7 @@ impl Message for Report {
         check_variables(&self.state_variables)?;
         few(self.commands as usize, "commands")?;
         few(self.log.len(), "log")?;
+        check_site_actions(&self.site_actions)?;
         self.log.iter().try_for_each(|line| short(line, "log"))
     }
 }

@@ -39,6 +39,7 @@ fn report() -> Report {
         .into(),
         commands: 3,
         log: vec!["jokes".into()],
+        site_actions: Vec::new(),
     }
 }
 
@@ -63,6 +64,8 @@ fn news() -> TickUpdate {
             name: name("Vonda"),
             location: Point::new(0.3, 0.7),
         }],
+        sites: Vec::new(),
+        site_results: Vec::new(),
         bodies: vec![SensedBody {
             kind: SensedKind::Guest,
             location: Point::new(0.1 + 0.2, 1e-300),

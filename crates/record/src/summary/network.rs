@@ -88,6 +88,8 @@ impl NetworkSummary {
             | Event::Blocked { .. }
             | Event::Say { .. }
             | Event::Guest { .. }
+            | Event::SiteChanged { .. }
+            | Event::SiteRefused { .. }
             | Event::Warned { .. }
             | Event::CommandSent { .. }
             | Event::CommandDelayed { .. }

@@ -308,6 +308,8 @@ impl Stage {
             unreachable,
             sensed,
             bodies: self.bodies(robot),
+            sites: Vec::new(),
+            site_results: Vec::new(),
         }
     }
 

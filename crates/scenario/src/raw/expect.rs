@@ -1,8 +1,8 @@
 //! The table `[[expect]]` and the key `end_when` as written in the file.
 
 use config::{FileError, Source};
-use observe::{Expectation, TickCondition};
 use observe::expect::check_all;
+use observe::{Expectation, TickCondition};
 use protocol::RobotName;
 use serde::Deserialize;
 use toml::Spanned;

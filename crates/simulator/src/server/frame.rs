@@ -46,6 +46,7 @@ pub(super) fn frame(
             .map(|obstacle| [obstacle.x, obstacle.y])
             .collect(),
         guest_moods: simulation.guest_moods(),
+        sites: simulation.sites().frames(),
         cuts: simulation.cuts(),
         faults: simulation.held_processes(&late),
         expectations: simulation.standings(),
@@ -75,6 +76,7 @@ pub(super) fn empty_frame(status: &Status, field_m: [f64; 2], body_m: f64) -> Wo
         guests: Vec::new(),
         guest_moods: BTreeMap::new(),
         obstacles: Vec::new(),
+        sites: Vec::new(),
         flights: Vec::new(),
         cuts: Vec::new(),
         faults: Vec::new(),

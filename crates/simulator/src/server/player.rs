@@ -149,6 +149,7 @@ impl Player {
             guests,
             guest_moods: frame.guest_moods.clone(),
             obstacles: header.obstacles.clone(),
+            sites: header.sites_of(frame),
             cuts: frame.cuts.clone(),
             expectations: frame.standings(self.events()),
             display_unit: header.display_unit,

@@ -11,3 +11,4 @@ mod motion;
 mod near;
 mod placing;
 mod reactions;
+mod sight;

@@ -2,7 +2,17 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TypeVar
 
-from ._data import Command, Point, PublicState, SensedBody, SensedRobot, StateVariables, Welcome
+from ._data import (
+    Command,
+    Point,
+    PublicState,
+    SensedBody,
+    SensedRobot,
+    SensedSite,
+    SiteResult,
+    StateVariables,
+    Welcome,
+)
 from ._robot import Robot
 
 P = TypeVar("P")
@@ -32,6 +42,10 @@ class Cars:
     def sensed_robots(self) -> tuple[SensedRobot, ...]: ...
     @property
     def bodies(self) -> tuple[SensedBody, ...]: ...
+    @property
+    def sites(self) -> tuple[SensedSite, ...]: ...
+    @property
+    def site_results(self) -> tuple[SiteResult, ...]: ...
     def parameters(self, kind: type[P]) -> P: ...
     def log(self, line: str) -> None: ...
     def set_robot_command(self, to: str, command: str) -> None: ...

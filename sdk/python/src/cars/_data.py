@@ -6,7 +6,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple, Optional, Union
 
 Variable = Union[bool, float, str]
@@ -61,6 +61,36 @@ class SensedBody(NamedTuple):
     location: Point
 
 
+class SensedSite(NamedTuple):
+    """A site within its range: a thing at a place, of a kind, with a state."""
+
+    name: str
+    kind: str
+    location: Point
+    state: StateVariables
+
+
+@dataclass
+class SiteAction:
+    """What a robot does to a site: all of it happens, or nothing."""
+
+    site: str
+    set: StateVariables = field(default_factory=dict)
+    """New values of variables of its state."""
+    add: Mapping[str, float] = field(default_factory=dict)
+    """What is added to numbers of its state."""
+    only_if: StateVariables = field(default_factory=dict)
+    """Values that its state must have when the action is carried out; otherwise the action is refused."""
+
+
+class SiteResult(NamedTuple):
+    """What became of an action on a site."""
+
+    site: str
+    refused: Optional[str]
+    """Why it was refused; None if it was carried out."""
+
+
 class PublicState(NamedTuple):
     """A robot as it reported itself for ``tick``: the answer to all six queries of the common robot interface."""
 
@@ -107,7 +137,8 @@ class Welcome:
 def read_welcome(text: str) -> Welcome:
     """A welcome from the message of the protocol."""
     given = json.loads(text)
-    known = {field.name: given[field.name] for field in fields(Welcome) if field.name in given}
+    names = [one.name for one in fields(Welcome)]
+    known = {name: given[name] for name in names if name in given}
     known["field_m"] = tuple(given["field_m"])
     known["location"] = Point(**given["location"])
     known["roster"] = tuple(given["roster"])

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from ._data import Point, StateVariables
+from ._data import Point, SiteAction, StateVariables
 from .panel import Panel
 
 if TYPE_CHECKING:
@@ -30,6 +30,8 @@ class Action:
     """Name of its behavior."""
     state_variables: StateVariables = field(default_factory=dict)
     """Further variables that it publishes: numbers, flags and texts by name."""
+    site_actions: Sequence[SiteAction] = ()
+    """What it does to sites, in this order; what became of it is in ``cars.site_results`` in the next tick."""
 
     @classmethod
     def stay(cls, cars: Cars, **published: Any) -> Action:

@@ -193,6 +193,7 @@ impl Host {
             state_variables,
             commands: stated,
             log,
+            site_actions: Vec::new(),
         }
     }
 

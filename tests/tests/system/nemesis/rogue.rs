@@ -404,6 +404,7 @@ fn report(epoch: Epoch, tick: Tick, generation: Generation) -> Report {
         state_variables: StateVariables::new(),
         commands: 0,
         log: Vec::new(),
+        site_actions: Vec::new(),
     }
 }
 

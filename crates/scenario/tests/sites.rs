@@ -1,0 +1,177 @@
+//! Sites in scenario files: what they mean, and what people are told when they are wrong.
+
+#![expect(clippy::unwrap_used, reason = "helpers of tests")]
+
+use std::path::Path;
+
+use protocol::messages::{MAX_SITE_TEXT_BYTES, MAX_SITE_VARIABLES, MAX_SITES, Point, Variable};
+use scenario::diagnostic::{FileError, Source};
+use scenario::{Changes, OnConflict, Scenario};
+
+const BULK: &str = "[[site]]\nname = \"T\"\ncount = 3\nkind = \"task\"\nat = \"random\"\nrange = \"1 m\"\n\
+                    state = { stock = { start = 30, min = 0, max = 30 }, done = false, label = \"A\" }\n";
+
+fn source(text: &str) -> Source {
+    Source {
+        name: "hall.toml".into(),
+        text: text.into(),
+    }
+}
+
+fn parse(text: &str) -> Result<Scenario, FileError> {
+    Scenario::parse(&source(text), Path::new("."))
+}
+
+/// The error as people see it, without colors.
+fn shown(error: &FileError) -> String {
+    config::render_plain(error, None, 200)
+}
+
+fn changed(text: &str, set: &[&str]) -> Result<Scenario, FileError> {
+    let changes = Changes {
+        set: set.iter().map(|change| change.parse().unwrap()).collect(),
+        ..Changes::default()
+    };
+    parse(&changes.apply(&source(text))?.text)
+}
+
+#[test]
+fn a_site_has_defaults_and_is_kept() {
+    let text = "[sensing]\nrange = \"3 m\"\n[[site]]\nname = \"T\"\nat = [\"2 m\", \"3 m\"]\n";
+    let scenario = parse(text).unwrap();
+    let site = &scenario.sites["T"];
+    assert_eq!(
+        (site.kind.as_str(), site.at),
+        ("site", Point::new(2.0, 3.0))
+    );
+    assert_eq!((site.range_m, site.on_conflict), (3.0, OnConflict::First));
+    assert!(site.state.is_empty() && !site.is_at_random);
+
+    let text = text.to_owned()
+        + "on_conflict = \"refuse\"\nkind = \"task\"\nrange = \"1 m\"\n\
+           state = { n = 7, x = { start = 0.5, max = 1 }, done = true, label = \"7 m\" }\n";
+    let scenario = parse(&text).unwrap();
+    let state = &scenario.sites["T"].state;
+    assert_eq!(state["n"].start, Variable::Number(7.0));
+    assert_eq!((state["x"].min, state["x"].max), (None, Some(1.0)));
+    assert_eq!(state["label"].start, Variable::from("7 m"));
+    let written = parse(&scenario.to_toml().unwrap()).unwrap();
+    assert_eq!(written.sites, scenario.sites);
+}
+
+#[test]
+fn sites_in_bulk_stand_where_their_names_and_the_seed_have_them() {
+    let scenario = parse(BULK).unwrap();
+    let names: Vec<&str> = scenario.sites.keys().map(String::as_str).collect();
+    assert_eq!(names, ["T1", "T2", "T3"]);
+    let more = parse(&BULK.replace("count = 3", "count = 4")).unwrap();
+    let moved = parse(&("seed = 2\n".to_owned() + BULK)).unwrap();
+    let again = scenario.clone().with_seed(2).unwrap();
+    for name in names {
+        let at = scenario.sites[name].at;
+        assert_eq!(more.sites[name].at, at, "one more moves none");
+        assert_ne!(moved.sites[name].at, at);
+        assert_eq!(again.sites[name].at, moved.sites[name].at);
+    }
+    let written = parse(&scenario.to_toml().unwrap()).unwrap();
+    assert_eq!(written.sites["T2"].at, scenario.sites["T2"].at);
+    let template = scenario.to_toml_without_seed().unwrap();
+    assert!(template.contains("random"), "{template}");
+}
+
+#[test]
+fn changes_name_sites_of_a_table_one_by_one() {
+    let scenario = changed(BULK, &["site.T2.state.stock=5", "site.T*.range=2 m"]).unwrap();
+    let stock = |name: &str| scenario.sites[name].state["stock"].start.clone();
+    assert_eq!([stock("T1"), stock("T2")], [30.0.into(), 5.0.into()]);
+    assert_eq!(scenario.sites["T3"].range_m, 2.0);
+    let scenario = changed(BULK, &["site.T.count=5"]).unwrap();
+    assert_eq!(scenario.sites.len(), 5);
+}
+
+#[test]
+fn a_site_that_cannot_be_is_refused_where_it_is_written() {
+    let long = "x".repeat(MAX_SITE_TEXT_BYTES + 1);
+    let many: Vec<String> = (0..=MAX_SITE_VARIABLES)
+        .map(|i| format!("v{i} = 1"))
+        .collect();
+    for (text, line, reason) in [
+        (
+            BULK.replace("\"random\"", "[\"20 m\", \"1 m\"]"),
+            5,
+            "outside the field",
+        ),
+        (
+            BULK.replace("range = \"1 m\"", "range = \"0 m\""),
+            6,
+            "more than zero",
+        ),
+        (
+            BULK.replace("range", "solid = true\nrange"),
+            6,
+            "never solid",
+        ),
+        (
+            BULK.replace("\"task\"", "\"a task\""),
+            4,
+            "a kind is a word",
+        ),
+        (
+            BULK.replace("done =", "\"a b\" ="),
+            7,
+            "a key of the state is a word",
+        ),
+        (
+            BULK.replace("false", "[1]"),
+            7,
+            "a variable of a site is a number, a text",
+        ),
+        (BULK.replace("false", "nan"), 7, "not a finite number"),
+        (
+            BULK.replace("start = 30", "start = 31"),
+            7,
+            "outside the bounds",
+        ),
+        (
+            BULK.replace("min = 0", "least = 0"),
+            7,
+            "unknown field `least`",
+        ),
+        (
+            BULK.replace("\"A\"", &format!("\"{long}\"")),
+            7,
+            "bytes of text",
+        ),
+        (
+            BULK.replace("done = false", &many.join(", ")),
+            7,
+            "more than 16 variables",
+        ),
+        (
+            BULK.replace("count = 3", &format!("count = {}", MAX_SITES + 1)),
+            1,
+            "more than 1024",
+        ),
+        (
+            format!("{BULK}[[site]]\nname = \"T2\"\nat = \"random\"\n"),
+            8,
+            "a second site called T2",
+        ),
+        (
+            format!("{BULK}[[robot]]\nname = \"T2\"\nat = \"random\"\n"),
+            1,
+            "a robot is called T2",
+        ),
+        (
+            format!("{BULK}[[change]]\nat = \"5 s\"\nset = [\"site.T.state.done=true\"]\n"),
+            8,
+            "only the network, faults",
+        ),
+    ] {
+        let error = shown(&parse(&text).unwrap_err());
+        let place = format!("hall.toml:{line}:");
+        assert!(error.contains(&place) && error.contains(reason), "{error}");
+    }
+    let most = BULK.replace("count = 3", &format!("count = {MAX_SITES}"));
+    assert_eq!(parse(&most).unwrap().sites.len(), MAX_SITES);
+}

@@ -1,0 +1,121 @@
+//! What hides what, and how far it is to the next body.
+
+use proptest::prelude::*;
+use rand::SeedableRng;
+use rand_xoshiro::Xoshiro256PlusPlus;
+use world::{Field, Guests, Hall, Point, Rectangle, Triangular, World, is_hidden};
+
+fn wall(x: f64, y: f64, half_x: f64, half_y: f64) -> Rectangle {
+    Rectangle {
+        center: Point::new(x, y),
+        half_m: (half_x, half_y),
+    }
+}
+
+#[test]
+fn a_wall_hides_what_is_behind_it_and_nothing_beside_it() {
+    let wall = [wall(5.0, 5.0, 0.5, 2.0)];
+    let eye = Point::new(1.0, 5.0);
+    for (x, y, hidden) in [
+        (9.0, 5.0, true),
+        // Before it.
+        (4.0, 5.0, false),
+        // At its face, and within it.
+        (4.5, 5.0, false),
+        (4.6, 5.0, true),
+        // That way is 6.75 m up at the face of the wall, which ends at 7 m.
+        (9.0, 9.0, true),
+        (5.0, 9.5, false),
+        (1.0, 9.0, false),
+        (0.0, 5.0, false),
+    ] {
+        assert_eq!(is_hidden(eye, Point::new(x, y), &wall), hidden, "{x}, {y}");
+    }
+    // A way along the face only touches it.
+    let (from, to) = (Point::new(4.5, 0.0), Point::new(4.5, 9.0));
+    assert!(!is_hidden(from, to, &wall));
+    assert!(!is_hidden(eye, eye, &wall));
+}
+
+/// A field of 10 m by 10 m with bodies of 1 m.
+fn world(obstacles: &[Point], robots: &[Point]) -> World<Xoshiro256PlusPlus> {
+    let still = Triangular::new(0.0, 0.0, 0.0).unwrap();
+    let hall = Hall {
+        field: Field {
+            size_m: (10.0, 10.0),
+            body_m: 1.0,
+        },
+        obstacles: obstacles.to_vec(),
+        guests: Guests {
+            count: 0,
+            speed_mps: still,
+            duration_s: still,
+        },
+        robots: robots.to_vec(),
+        tick_s: 1.0,
+        max_speed_mps: 1.0,
+    };
+    World::new(&hall, Xoshiro256PlusPlus::seed_from_u64(1)).unwrap()
+}
+
+#[test]
+fn a_ray_ends_at_the_next_body_at_the_edge_or_at_its_range() {
+    let robots = [Point::new(3.0, 5.0), Point::new(3.0, 8.0)];
+    let world = world(&[Point::new(6.0, 5.0), Point::new(8.0, 5.0)], &robots);
+    let directions = [
+        (1.0, 0.0),
+        (0.0, 1.0),
+        (-1.0, 0.0),
+        (0.0, -1.0),
+        (0.6, -0.8),
+    ];
+    let directions = directions.map(|(x, y)| Point::new(x, y));
+
+    // The faces of the obstacle at 6 and of the robot at 8 are half a meter before their centers.
+    let ranges = world.ranges_m(0, &directions, 4.0);
+    assert_eq!(ranges, [2.5, 2.5, 3.0, 4.0, 4.0]);
+    assert_eq!(world.ranges_m(0, &directions, 2.0), [2.0; 5]);
+    assert_eq!(
+        world.walls_near(robots[0], 9.0, Some(0)),
+        [wall(8.0, 5.0, 0.5, 0.5)]
+    );
+}
+
+proptest! {
+    #[test]
+    fn hiding_is_mutual(
+        from in (0.0..10.0, 0.0..10.0_f64),
+        to in (0.0..10.0, 0.0..10.0_f64),
+        at in (2.0..8.0, 2.0..8.0_f64),
+        half in (0.1..2.0, 0.1..2.0_f64),
+    ) {
+        let (from, to) = (Point::new(from.0, from.1), Point::new(to.0, to.1));
+        let walls = [wall(at.0, at.1, half.0, half.1)];
+        prop_assert_eq!(is_hidden(from, to, &walls), is_hidden(to, from, &walls));
+    }
+
+    #[test]
+    fn a_ray_enters_where_the_point_is_on_the_rectangle(
+        from in (0.0..10.0, 0.0..10.0_f64),
+        to in (0.0..10.0, 0.0..10.0_f64),
+        at in (2.0..8.0, 2.0..8.0_f64),
+        half in (0.1..2.0, 0.1..2.0_f64),
+    ) {
+        let (from, to) = (Point::new(from.0, from.1), Point::new(to.0, to.1));
+        let wall = wall(at.0, at.1, half.0, half.1);
+        if let Some(share) = wall.entered_after(from, to) {
+            let point = from + (to - from) * share;
+            let (x, y) = ((point.x - at.0).abs() - half.0, (point.y - at.1).abs() - half.1);
+            prop_assert!(x.max(y) <= 1e-9);
+            prop_assert!(share == 0.0 || x.max(y) >= -1e-9);
+        } else {
+            // No point of the way is inside.
+            for step in 0..=100 {
+                let point = from + (to - from) * (f64::from(step) / 100.0);
+                let is_inside = (point.x - at.0).abs() < half.0 - 1e-9
+                    && (point.y - at.1).abs() < half.1 - 1e-9;
+                prop_assert!(!is_inside);
+            }
+        }
+    }
+}
