@@ -140,7 +140,7 @@ fn robots_in_javascript_bid_by_broadcasts_with_payloads() {
     lab.ok(&["launch", launch.to_str().unwrap(), "--run", "bids"]);
 
     let events = lab.events("bids");
-    let of_kind = |kind: &str| events.iter().filter(move |event| event["event"] == kind);
+    let of_kind = |kind: &'static str| events.iter().filter(move |event| event["event"] == kind);
     assert_eq!(of_kind("command_delivered").count(), 6);
     let payloads: Vec<String> = of_kind("command_sent")
         .filter(|event| !event["payload"].is_null())

@@ -265,7 +265,7 @@ impl Intruder<'_> {
                     command: "refill".to_owned(),
                     payload: Payload::new(serde_json::json!({ "rogue": true })),
                 };
-                let key = if tick % 2 == 0 {
+                let key = if tick.is_multiple_of(2) {
                     keys.outbox(robot)
                 } else {
                     keys.command(other, robot)
