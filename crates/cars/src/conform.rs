@@ -121,7 +121,7 @@ fn take_scenario(setting: &mut CheckSetting, file: &Path) -> Result<()> {
     setting.tick_s = scenario.tick_s;
     setting.field_m = scenario.field_m;
     setting.body_m = scenario.body_m;
-    setting.sensing_range_m = scenario.sensing_range_m;
+    setting.sensing_range_m = scenario.sensing.range_m;
 
     setting.fake_peers.clear();
     for (name, spec) in &scenario.robots {

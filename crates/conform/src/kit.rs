@@ -187,6 +187,7 @@ impl Kit {
             field_m: setting.field_m,
             body_m: setting.body_m,
             sensing_range_m: setting.sensing_range_m,
+            rays: None,
             location: role.location,
             roster: fake_peers.into_keys().collect(),
             parameters: role.parameters,

@@ -23,6 +23,7 @@ import { Player } from "./recording.js";
 import { setRoster } from "./roster.js";
 import { SetupView } from "./setup.js";
 import { download, readLink, share } from "./share.js";
+import { renderKinds } from "./sites.js";
 import { splitter } from "./splitter.js";
 import { Store } from "./store.js";
 import { renderStranger } from "./stranger.js";
@@ -296,6 +297,7 @@ function drawBar() {
   timeline.render();
   crosshair.render();
   renderEmotions(box("emotions"), store);
+  renderKinds(box("site-kinds"), store.frame?.sites ?? []);
   document.body.dataset.time = isRecording() ? "recording" : player.isLive ? "live" : "past";
   const isPast = isRecording() || store.replayOf !== null;
   box("tab-setup").hidden = isPast;

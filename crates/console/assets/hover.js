@@ -1,5 +1,7 @@
 // @ts-check
-// The full name and the states of the robot below the pointer.
+// The full name and the states of the robot below the pointer, or the site with its state.
+
+import { siteAt, siteWords } from "./sites.js";
 
 /** @typedef {import("./plan.js").Plan} Plan */
 
@@ -25,6 +27,18 @@ export class Hover {
     this.render();
   }
 
+  /** What is at a place, in words. @param {{x: number, y: number}} place */
+  words(place) {
+    const { plan } = this;
+    const { frame } = plan.store;
+    const name = plan.robotAt(place);
+    const robot = frame?.robots.find((one) => one.name === name);
+    if (robot) return [robot.name, robot.emotion_state, robot.behavior_state].filter(Boolean).join(" · ");
+
+    const site = siteAt(frame?.sites ?? [], place, plan.camera.scale, frame?.body_m ?? 0);
+    return site ? siteWords(site) : "";
+  }
+
   leave() {
     this.at = null;
     this.label.hidden = true;
@@ -34,12 +48,11 @@ export class Hover {
     const { at, plan } = this;
     if (!at) return;
 
-    const name = plan.editor.draft ? null : plan.robotAt(plan.camera.place(at.x, at.y));
-    const robot = plan.store.frame?.robots.find((one) => one.name === name);
-    this.label.hidden = !robot;
-    if (!robot) return;
+    const words = plan.editor.draft ? "" : this.words(plan.camera.place(at.x, at.y));
+    this.label.hidden = !words;
+    if (!words) return;
 
-    this.label.textContent = [robot.name, robot.emotion_state, robot.behavior_state].filter(Boolean).join(" · ");
+    this.label.textContent = words;
     const isRight = at.x > plan.camera.width_px / 2;
     this.label.style.left = isRight ? "" : `${at.x + 14}px`;
     this.label.style.right = isRight ? `${plan.camera.width_px - at.x + 14}px` : "";

@@ -7,6 +7,7 @@ import * as draw from "./draw.js";
 import { faceShapes } from "./face.js";
 import { intensityOf } from "./known.js";
 import { arrow, barrier, cross, disk, envelope, line, ring } from "./shapes.js";
+import { diamond, kindsInLegend } from "./sites.js";
 import { readTheme } from "./theme.js";
 import { seconds } from "./units.js";
 import { Vector } from "./vector.js";
@@ -230,6 +231,9 @@ function legend(paper, words, theme, frame, hasTrails, y) {
     paper.lineWidth = 1;
     paper.strokeRect(x - 5.5, at - 5.5, 11, 11);
   }, "obstacle");
+  for (const { kind, color } of kindsInLegend(frame?.sites ?? [])) {
+    row((at) => diamond({ context: paper, theme }, color, false, x, at, 5.5), kind);
+  }
   row((at) => barrier(paper, x - 8, at, 6, 0, theme.warning), "blocked");
   row((at) => envelope(paper, x, at, theme.accent, theme.field), "command under way");
   row((at) => {

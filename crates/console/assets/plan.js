@@ -6,6 +6,7 @@ import { Crowd } from "./crowd.js";
 import * as draw from "./draw.js";
 import { Gestures } from "./gestures.js";
 import { Motion } from "./motion.js";
+import { drawSites } from "./sites.js";
 import { Ground, Sprites } from "./sprites.js";
 import { onThemeChange, readTheme } from "./theme.js";
 
@@ -184,6 +185,7 @@ export class Plan {
   paintMoving(pen, frame, drawRobot) {
     const { motion } = this;
     draw.guestMoods(pen, motion.now_m, frame.guest_moods, draw.guestRadius(pen.camera, frame.body_m));
+    drawSites(pen, frame.sites ?? [], frame.body_m);
     if (this.hasTrails) this.paintTrails(pen, frame);
     /** @type {{words: draw.Area[], robots: draw.Area[]}} */
     const taken = { words: [], robots: [] };

@@ -24,7 +24,7 @@ import { hasGuessedNames, orderNames } from "./palette.js";
  */
 /**
  * @typedef {{tick: number, robots: RobotFrame[], guests_mm: number[], guest_moods: WorldFrame["guest_moods"], cuts: Cut[], faults: HeldProcess[],
- *   awaiting: Awaited[], expectations: Standing[]}} RecordedTick
+ *   awaiting: Awaited[], expectations: Standing[], sites: WorldFrame["sites"]}} RecordedTick
  */
 /** A panel and its tick. @typedef {{tick: number, robot: string, panel: Panel}} RecordedPanel */
 /** Ticks before `end`; `earlier_flights` are of commands that the first ones show, too. @typedef {{end: number, ticks: RecordedTick[], panels: RecordedPanel[], earlier_flights: Flight[], flights: Flight[],
@@ -520,6 +520,7 @@ export class Player {
       cuts: record.cuts,
       faults: record.faults,
       expectations: record.expectations,
+      sites: record.sites,
       robots: record.robots,
     };
   }

@@ -351,6 +351,7 @@ fn add_tick(
         ("guest_moods", &to_json(&recorded.frame.guest_moods)),
         ("cuts", &to_json(&recorded.frame.cuts)),
         ("faults", &to_json(&faults)),
+        ("sites", &to_json(&file.header().sites_of(&recorded.frame))),
         (
             "expectations",
             &to_json(&recorded.frame.standings(&recorded.events)),

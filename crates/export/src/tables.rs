@@ -24,7 +24,7 @@ const WHEN: &str = "epoch tick time_s";
 /// A row for each event.
 const EVENTS: &str = "event robot generation x_m y_m blocked_by blocked_by_robot state_before state_after from_robot \
                       to_robot seq performative command payload_bytes because until_tick cuts_commands cuts_queries fault begins guest mood \
-                      set by_hand expectation verdict text seed version protocol tick_s reason digest";
+                      site key value_before value_after set by_hand expectation verdict text seed version protocol tick_s reason digest";
 /// A row for each robot in each tick.
 const STATES: &str = "robot generation x_m y_m speed_mps direction_rad emotion behavior blocked missed commands \
                       proposal_x_m proposal_y_m";

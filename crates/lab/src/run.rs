@@ -303,6 +303,7 @@ fn runners(
     let mut runners = Vec::new();
     for (name, robot) in robots {
         simulation.list_bodies(&name, robot.senses_bodies());
+        simulation.list_ranges(&name, robot.senses_ranges());
         if let Some(welcome) = simulation.welcome(run, &name, 1, None) {
             runners.push((robot, welcome));
         }

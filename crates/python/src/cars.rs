@@ -20,14 +20,16 @@ use robot::{CallError, PublicState};
 pub(crate) struct Cars {
     welcome: Py<PyAny>,
     senses_bodies: bool,
+    senses_ranges: bool,
 }
 
 impl Cars {
     /// The simulation as a robot sees it that has been welcomed.
-    pub(crate) fn new(welcome: Py<PyAny>, senses_bodies: bool) -> Self {
+    pub(crate) fn new(welcome: Py<PyAny>, senses_bodies: bool, senses_ranges: bool) -> Self {
         Self {
             welcome,
             senses_bodies,
+            senses_ranges,
         }
     }
 }
@@ -109,6 +111,19 @@ impl Cars {
         }
         let bodies = with_cars(|cars| cars.bodies().to_vec())?;
         tuple(py, &bodies, |body| sensed_body(py, body))
+    }
+
+    /// The distance along each ray to the next body or the edge of the field now, meters. Its class must have
+    /// ``senses_ranges = True``.
+    #[getter]
+    fn ranges<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        if !self.senses_ranges {
+            let name = self.name()?;
+            return Err(PyRuntimeError::new_err(format!(
+                "{name} uses cars.ranges and its senses_ranges is False"
+            )));
+        }
+        PyTuple::new(py, with_cars(|cars| cars.ranges().to_vec())?)
     }
 
     /// The sites that it senses now, by name.

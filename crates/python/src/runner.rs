@@ -48,6 +48,7 @@ impl FirstException {
 pub(crate) struct PythonRobot {
     object: Py<PyAny>,
     senses_bodies: bool,
+    senses_ranges: bool,
     is_quick: bool,
     /// What it is given in every tick of an epoch.
     cars: Option<Py<Cars>>,
@@ -59,6 +60,7 @@ impl PythonRobot {
     pub(crate) fn new(object: &Bound<'_, PyAny>, failure: &FirstException) -> PyResult<Self> {
         Ok(Self {
             senses_bodies: object.getattr("senses_bodies")?.is_truthy()?,
+            senses_ranges: object.getattr("senses_ranges")?.is_truthy()?,
             is_quick: object.getattr("is_quick")?.is_truthy()?,
             object: object.clone().unbind(),
             cars: None,
@@ -103,7 +105,10 @@ impl PythonRobot {
         let text = serde_json::to_string(cars.welcome()).map_err(crate::error::plain)?;
         let read = py.import("cars._data")?.getattr("read_welcome")?;
         let welcome = read.call1((text,))?.unbind();
-        let own = Bound::new(py, Cars::new(welcome, self.senses_bodies))?;
+        let own = Bound::new(
+            py,
+            Cars::new(welcome, self.senses_bodies, self.senses_ranges),
+        )?;
         self.cars = Some(own.clone().unbind());
         Ok(own)
     }
@@ -156,6 +161,10 @@ impl Robot for PythonRobot {
 
     fn senses_bodies(&self) -> bool {
         self.senses_bodies
+    }
+
+    fn senses_ranges(&self) -> bool {
+        self.senses_ranges
     }
 
     fn is_quick(&self) -> bool {

@@ -83,6 +83,7 @@ pub struct Cars<'a> {
     pub(crate) news: &'a TickUpdate,
     pub(crate) random: &'a mut Stream,
     pub(crate) senses_bodies: bool,
+    pub(crate) senses_ranges: bool,
     pub(crate) outbox: &'a mut Vec<Sent<CommandText>>,
     pub(crate) log: &'a mut Vec<String>,
     pub(crate) left_out: &'a mut LeftOut,
@@ -190,6 +191,22 @@ impl<'a> Cars<'a> {
         );
 
         &self.news.bodies
+    }
+
+    /// The distance along each ray ([`Welcome::rays`]) to the next body or the edge of the field now, meters; the range of the
+    /// rays where nothing is nearer. Empty if the scenario has no rays.
+    ///
+    /// # Panics
+    /// If the robot does not ask for them by [`Robot::senses_ranges`](crate::Robot::senses_ranges).
+    #[must_use]
+    pub fn ranges(&self) -> &'a [f64] {
+        assert!(
+            self.senses_ranges,
+            "{} uses ranges() and its senses_ranges() is false",
+            self.welcome.name
+        );
+
+        &self.news.ranges
     }
 
     /// The sites that it senses now, by name.

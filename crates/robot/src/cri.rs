@@ -36,6 +36,11 @@ pub trait Robot: Send {
         false
     }
 
+    /// Whether the robot perceives the distances along the rays of the scenario ([`Cars::ranges`]): its news are larger then.
+    fn senses_ranges(&self) -> bool {
+        false
+    }
+
     /// Whether `init`, `resume` and every tick take some milliseconds at most. Then they may run on the thread on which messages
     /// arrive, which gives up to twice the ticks per second. That thread also keeps the process connected: one that is held
     /// for more than a second may be taken for lost. By default not: robots run on a thread of their own and may take any time.

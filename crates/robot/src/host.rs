@@ -140,6 +140,7 @@ struct HostedRobot {
     welcome: Option<Welcome>,
     /// Whether it perceives all bodies around it.
     senses_bodies: bool,
+    senses_ranges: bool,
     explanation: String,
     report: Publisher,
     state: WatchedPublisher,
@@ -195,6 +196,7 @@ impl Host {
         for (name, robot) in robots {
             let member = HostedRobot {
                 senses_bodies: robot.senses_bodies(),
+                senses_ranges: robot.senses_ranges(),
                 robot: Some(robot),
                 runner: None,
                 welcome: None,
@@ -460,6 +462,7 @@ impl Host {
             name: name.clone(),
             instance: self.bus.id(),
             bodies: member.senses_bodies,
+            ranges: member.senses_ranges,
             sdk: concat!("rust/", env!("CARGO_PKG_VERSION")).to_owned(),
         };
         let key = self.keys.join_as(name);

@@ -56,8 +56,8 @@ pub use local::LocalHost;
 pub use network::{PeerNetwork, Undelivered};
 pub use protocol::messages::{
     Clock, Command, CommandText, Correction, End, Face, Panel, Parameters, Payload, Point,
-    PublicState, Report, SensedBody, SensedKind, SensedRobot, SensedSite, SiteAction, SiteRefusal,
-    SiteResult, StateVariables, TickUpdate, Tone, Variable, Welcome, Widget,
+    PublicState, Rays, Report, SensedBody, SensedKind, SensedRobot, SensedSite, SiteAction,
+    SiteRefusal, SiteResult, StateVariables, TickUpdate, Tone, Variable, Welcome, Widget,
 };
 pub use protocol::random::Stream;
 pub use protocol::{RobotName, RobotPattern, RunName, Tick};

@@ -187,6 +187,7 @@ impl Runner {
             commands: &commands,
             news,
             senses_bodies: self.robot.senses_bodies(),
+            senses_ranges: self.robot.senses_ranges(),
             random: &mut self.random,
             outbox: &mut self.outbox,
             log,

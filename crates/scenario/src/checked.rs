@@ -13,6 +13,7 @@ use super::fault::Fault;
 use super::guests::GuestRules;
 use super::lateness::Lateness;
 use super::network::Network;
+use super::sensing::Sensing;
 use super::sites::SiteSpec;
 
 /// Seed if neither the file nor the command line gives one. It is fixed, so runs are reproducible by default.
@@ -50,8 +51,8 @@ pub struct Scenario {
     pub display_unit: DisplayUnit,
     /// Highest speed, m/s. A faster move is refused.
     pub max_speed_mps: f64,
-    /// Distance within which robots sense other bodies, meters.
-    pub sensing_range_m: f64,
+    /// How robots sense.
+    pub sensing: Sensing,
     /// The moving obstacles.
     pub guests: Guests,
     /// What they do beside walking.

@@ -12,6 +12,7 @@ mod over_time;
 mod placing;
 mod raw;
 pub mod roster;
+mod sensing;
 mod setup;
 mod sites;
 
@@ -33,6 +34,7 @@ pub use fault::{Fault, FaultEnd};
 pub use guests::GuestRules;
 pub use lateness::Lateness;
 pub use network::Network;
+pub use sensing::Sensing;
 pub use sites::{OnConflict, SiteSpec, SiteVariable};
 
 /// Reads the expectations of a file, for a run with these robots. Other tables of the file are of no concern.

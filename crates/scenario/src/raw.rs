@@ -8,6 +8,7 @@ pub(super) mod mood;
 mod network;
 mod numbers;
 mod place;
+mod sensing;
 mod site;
 mod times;
 mod unplaced;
@@ -33,6 +34,7 @@ use guests::GuestsTable;
 use network::NetworkTable;
 use numbers::positive;
 use place::StartPlace;
+use sensing::SensingTable;
 use site::SiteTable;
 use times::Times;
 use unplaced::unplaced;
@@ -93,12 +95,6 @@ struct FieldTable {
 
 #[derive(Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-struct SensingTable {
-    range: Spanned<Length>,
-}
-
-#[derive(Debug, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
 struct RecordTable {
     log: Option<bool>,
     log_name: Option<Spanned<String>>,
@@ -141,8 +137,6 @@ const MAX_SPEED: Speed = Speed(3.048);
 const DEADLINE: Time = Time(2.0);
 /// Consecutive missed ticks after which a robot is lost [I].
 const LOSE_AFTER: u32 = 10;
-/// Sensing range, 6 ft [I].
-const SENSING_RANGE: Length = Length(1.8288);
 
 impl ScenarioFile {
     pub(super) fn to_toml(&self) -> Result<String, FileError> {
@@ -204,8 +198,7 @@ impl ScenarioFile {
         let tick_s = self.tick_s(source)?;
         let ticks = self.ticks(source, tick_s)?;
         let lateness = self.lateness(source)?;
-        let sensing_range = self.sensing.as_ref().map(|table| &table.range);
-        let sensing_range_m = positive(source, sensing_range, SENSING_RANGE, "the range")?.0;
+        let sensing = sensing::check(self.sensing.as_ref(), source)?;
         let guests = self.guests.as_ref().map(Spanned::get_ref);
         let guest_rules = guests::rules(guests, tick_s, source)?;
         let guests = guests::walks(guests, source)?;
@@ -224,7 +217,7 @@ impl ScenarioFile {
         let (sites, site_spans) = site::check(
             self.sites,
             size.0.map(|length| length.0),
-            Length(sensing_range_m),
+            Length(sensing.range_m),
             &robots.keys().cloned().collect(),
             source,
         )?;
@@ -242,7 +235,7 @@ impl ScenarioFile {
             body_m: body.0,
             display_unit: display_unit.unwrap_or_default(),
             max_speed_mps: max_speed.unwrap_or(MAX_SPEED).0,
-            sensing_range_m,
+            sensing,
             guests,
             guest_rules,
             obstacles,
@@ -566,9 +559,7 @@ impl From<&checked::Scenario> for ScenarioFile {
             deadline: Some(unplaced(Time(lateness.deadline_s))),
             lose_after: Some(unplaced(lateness.lose_after)),
             field: Some(unplaced(field)),
-            sensing: Some(SensingTable {
-                range: unplaced(Length(scenario.sensing_range_m)),
-            }),
+            sensing: Some(SensingTable::from(&scenario.sensing)),
             guests: Some(unplaced(GuestsTable::of(
                 &scenario.guests,
                 &scenario.guest_rules,

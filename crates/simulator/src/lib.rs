@@ -9,6 +9,7 @@ pub mod digest;
 mod guests;
 pub mod medium;
 pub mod recorder;
+mod sensing;
 pub mod server;
 pub mod simulation;
 pub mod sites;

@@ -9,8 +9,9 @@ use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::event::{Blocker, Cause, WaitedFor};
 use protocol::messages::{
     CommandText, Correction, Cut, Delivery, End, FaultKind, GuestMood, HeldProcess, Intervention,
-    NEWS_FLAGS, OnLate, Parameters, ParametersOffer, Point, ProcessOrder, PublicState, Report,
-    SensedBody, SensedKind, SensedRobot, Standing, StateVariables, Target, TickUpdate, Welcome,
+    NEWS_FLAGS, OnLate, Parameters, ParametersOffer, Performative, Point, ProcessOrder,
+    PublicState, Report, SensedBody, SensedKind, SensedRobot, SensedSite, Standing, StateVariables,
+    Target, TickUpdate, Welcome,
 };
 use protocol::random::{Stream, stream};
 use protocol::{
@@ -21,11 +22,15 @@ use world::{Body, HallError, MoveOutcome, Reaction, World};
 use crate::digest::{Digest, TickDigest};
 use crate::guests::GuestState;
 use crate::medium::{Arrival, Medium, SentCommand};
-use crate::sites::{SiteOrders, Sites};
+use crate::sensing::{Observer, ranges_m};
+use crate::sites::{SiteOrders, Sites, most_bytes};
 use scenario::{Change, FaultEnd, Lateness, Override, Scenario, to_wire, to_world};
 
 /// Most bodies in the news of a robot, so that the news fit into a message.
 const MAX_BODIES: usize = 4096;
+
+/// Most bytes of sites in the news of a robot, which also have commands and bodies.
+const MAX_SITE_BYTES: usize = MAX_MESSAGE_BYTES / 16;
 
 /// Most bytes of parameters of one kind of other times in a welcome, so that it fits into a message.
 const MAX_OTHER_PARAMETERS: usize = MAX_MESSAGE_BYTES / 4;
@@ -76,6 +81,8 @@ pub struct Simulation {
     medium: Medium,
     /// Robots with the bodies around them in their news.
     with_bodies: BTreeSet<RobotName>,
+    /// Robots with the ranges of their rays in their news.
+    with_ranges: BTreeSet<RobotName>,
     /// Commands that arrive in the tick in progress, by target.
     arriving: BTreeMap<RobotName, Vec<Arrival>>,
     /// Robots that each robot cannot query in the tick in progress.
@@ -152,6 +159,7 @@ impl Simulation {
             medium,
             names,
             with_bodies: BTreeSet::new(),
+            with_ranges: BTreeSet::new(),
             arriving: BTreeMap::new(),
             unreachable: BTreeMap::new(),
             news: BTreeMap::new(),
@@ -581,6 +589,15 @@ impl Simulation {
         }
     }
 
+    /// Whether the news of a robot contain the ranges of its rays, from the next tick on.
+    pub fn list_ranges(&mut self, name: &RobotName, is_wanted: bool) {
+        if is_wanted {
+            self.with_ranges.insert(name.clone());
+        } else {
+            self.with_ranges.remove(name);
+        }
+    }
+
     /// The proposed location of each robot; `None` for a robot without a report of the last tick.
     fn proposals(&self) -> Vec<Option<world::Point>> {
         let mut proposals = Vec::with_capacity(self.names.len());
@@ -701,6 +718,7 @@ impl Simulation {
     fn compose_news(&mut self, verdicts: &[MoveOutcome]) {
         let mut all = BTreeMap::new();
         for (index, name) in self.names.iter().enumerate() {
+            let observer = self.observer(index);
             let is_refused = !verdicts.is_empty() && self.blocked[index];
             // What a robot proposed that has missed the last tick did not count. An incarnation that takes part from this tick
             // on is named: see `Self::news`.
@@ -716,9 +734,10 @@ impl Simulation {
                 }),
                 commands: self.deliveries(name),
                 unreachable: self.unreachable.get(name).cloned().unwrap_or_default(),
-                sensed: self.sensed_robots(index),
-                bodies: self.sensed_bodies(index),
-                sites: self.sites.near(to_wire(self.world.robots()[index])),
+                sensed: self.sensed_robots(index, &observer),
+                bodies: self.sensed_bodies(index, &observer),
+                ranges: self.sensed_ranges(index),
+                sites: self.sensed_sites(index, &observer),
                 site_results: self.sites.results(name).to_vec(),
             };
             // A robot without news gets none: silence says that all is as it expects.
@@ -1030,7 +1049,8 @@ impl Simulation {
             tick_s: self.scenario.tick_s,
             field_m: self.scenario.field_m,
             body_m: self.scenario.body_m,
-            sensing_range_m: self.scenario.sensing_range_m,
+            sensing_range_m: self.scenario.sensing.range_m,
+            rays: self.scenario.sensing.rays,
             location,
             roster: self.names.clone(),
             parameters: parameters.clone(),
@@ -1061,39 +1081,111 @@ impl Simulation {
         }
     }
 
+    /// A robot as it looks around in the tick in progress.
+    fn observer(&self, of: usize) -> Observer<'_> {
+        let reach_m = self.scenario.sensing.range_m.max(self.sites.reach_m());
+        Observer::new(
+            &self.scenario,
+            &self.world,
+            self.now,
+            &self.names[of],
+            self.world.robots()[of],
+            self.heading_rad(of),
+            reach_m,
+        )
+    }
+
+    /// The direction of motion that a robot reported last, radians.
+    fn heading_rad(&self, of: usize) -> f64 {
+        let report = self.reports.get(&self.names[of]);
+        report.map_or(0.0, |report| report.direction_rad)
+    }
+
+    /// The ranges of a robot's rays, if its news contain them.
+    fn sensed_ranges(&self, of: usize) -> Vec<f64> {
+        if !self.with_ranges.contains(&self.names[of]) {
+            return Vec::new();
+        }
+        ranges_m(
+            &self.scenario.sensing,
+            &self.world,
+            of,
+            self.heading_rad(of),
+        )
+    }
+
+    /// The sites that a robot senses, the first of them by name that fit into its news.
+    fn sensed_sites(&self, of: usize, observer: &Observer<'_>) -> Vec<SensedSite> {
+        let mut sensed = Vec::new();
+        let mut bytes = 0;
+        for site in self.sites.near(to_wire(self.world.robots()[of])) {
+            let what = format_args!("site/{}", site.name);
+            if let Some(at) = observer.senses(what, to_world(site.location), None) {
+                bytes += most_bytes(&site);
+                if bytes > MAX_SITE_BYTES {
+                    break;
+                }
+                sensed.push(SensedSite {
+                    location: to_wire(at),
+                    ..site
+                });
+            }
+        }
+        sensed
+    }
+
     /// All bodies within a robot's sensing range, if its news contain them.
-    fn sensed_bodies(&self, of: usize) -> Vec<SensedBody> {
+    fn sensed_bodies(&self, of: usize, observer: &Observer<'_>) -> Vec<SensedBody> {
         if !self.with_bodies.contains(&self.names[of]) {
             return Vec::new();
         }
 
         let center = self.world.robots()[of];
-        let near = self.world.near(center, self.scenario.sensing_range_m);
+        let near = self.world.near(center, self.scenario.sensing.range_m);
         let others = near.into_iter().filter(|near| near.body != Body::Robot(of));
         let mut sensed = Vec::new();
         for near in others.take(MAX_BODIES) {
-            let kind = match near.body {
-                Body::Obstacle(_) => SensedKind::Obstacle,
-                Body::Guest(_) => SensedKind::Guest,
-                Body::Robot(_) => SensedKind::Robot,
+            let at = near.center;
+            let (kind, sensed_at) = match near.body {
+                Body::Obstacle(index) => {
+                    let what = format_args!("obstacle/{index}");
+                    let at = observer.senses(what, at, Some(index));
+                    (SensedKind::Obstacle, at)
+                }
+                Body::Guest(index) => {
+                    let at = observer.senses(format_args!("guest/{index}"), at, None);
+                    (SensedKind::Guest, at)
+                }
+                Body::Robot(index) => (SensedKind::Robot, self.senses_robot(observer, index)),
             };
-            sensed.push(SensedBody {
-                kind,
-                location: to_wire(near.center),
-            });
+            if let Some(at) = sensed_at {
+                sensed.push(SensedBody {
+                    kind,
+                    location: to_wire(at),
+                });
+            }
         }
         sensed
     }
 
-    fn sensed_robots(&self, of: usize) -> Vec<SensedRobot> {
+    /// Where a robot senses another one that is within range.
+    fn senses_robot(&self, observer: &Observer<'_>, other: usize) -> Option<world::Point> {
+        let what = format_args!("robot/{}", self.names[other]);
+        observer.senses(what, self.world.robots()[other], None)
+    }
+
+    fn sensed_robots(&self, of: usize, observer: &Observer<'_>) -> Vec<SensedRobot> {
         let robots = self.world.robots();
         let mut sensed = Vec::new();
         for (other, center) in robots.iter().enumerate() {
-            let is_near = robots[of].distance_m(*center) <= self.scenario.sensing_range_m;
-            if other != of && is_near {
+            let is_near = robots[of].distance_m(*center) <= self.scenario.sensing.range_m;
+            if other == of || !is_near {
+                continue;
+            }
+            if let Some(at) = self.senses_robot(observer, other) {
                 sensed.push(SensedRobot {
                     name: self.names[other].clone(),
-                    location: to_wire(*center),
+                    location: to_wire(at),
                 });
             }
         }

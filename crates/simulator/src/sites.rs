@@ -180,6 +180,13 @@ impl Sites {
         near
     }
 
+    /// The greatest distance at which a site is sensed, meters.
+    #[must_use]
+    pub fn reach_m(&self) -> f64 {
+        let ranges = self.sites.values().map(|site| site.spec.range_m);
+        ranges.fold(0.0, f64::max)
+    }
+
     /// What became of a robot's actions of the last tick, in their order.
     #[must_use]
     pub fn results(&self, robot: &RobotName) -> &[SiteResult] {
@@ -262,6 +269,22 @@ impl Site {
             && variable.min.is_none_or(|min| number >= min)
             && variable.max.is_none_or(|max| number <= max)
     }
+}
+
+/// An upper bound of the bytes of a sensed site in a message.
+pub(crate) fn most_bytes(site: &SensedSite) -> usize {
+    /// Of a byte of a text, which JSON may escape.
+    const ESCAPED: usize = 6;
+    /// Of the names of fields, a number and its separators.
+    const FIELDS: usize = 120;
+    const VARIABLE: usize = 30;
+
+    let mut bytes = FIELDS + site.name.len() + site.kind.len();
+    for (key, value) in &site.state {
+        let text = value.as_str().map_or(0, str::len);
+        bytes += VARIABLE + key.len() + ESCAPED * text;
+    }
+    bytes
 }
 
 /// The sites of a scenario at the start, for observers.

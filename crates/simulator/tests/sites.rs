@@ -405,3 +405,27 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn news_hold_as_many_sites_as_fit() {
+    let mut text = FILE.to_owned();
+    for number in 0..1000 {
+        text += &format!(
+            "[[site]]\nname = \"W{number:03}\"\nat = [\"2 m\", \"2 m\"]\nrange = \"1 m\"\nstate = {{ "
+        );
+        for key in 0..4 {
+            text += &format!("k{key} = {:e}, ", f64::MAX);
+        }
+        text += &format!("label = '{}' }}\n", "\t".repeat(16));
+    }
+    let mut simulation = Simulation::new(scenario(&text), 1).unwrap();
+    simulation.begin_init();
+    let news = simulation.news(&name("A"), IncarnationNotice::default());
+    assert!(
+        (100..1000).contains(&news.sites.len()),
+        "{}",
+        news.sites.len()
+    );
+    let bytes = protocol::encode(&news).len();
+    assert!((20 * 1024..70 * 1024).contains(&bytes), "{bytes}");
+}

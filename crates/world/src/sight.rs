@@ -47,20 +47,23 @@ fn crossed(from: f64, to: f64, center: f64, half: f64) -> (f64, f64) {
 
 /// Whether one of these rectangles lies on the way from `from` to `to`.
 #[must_use]
-pub fn is_hidden(from: Point, to: Point, walls: &[Rectangle]) -> bool {
-    let mut walls = walls.iter();
+pub fn is_hidden<'a>(
+    from: Point,
+    to: Point,
+    walls: impl IntoIterator<Item = &'a Rectangle>,
+) -> bool {
+    let mut walls = walls.into_iter();
     walls.any(|wall| wall.entered_after(from, to).is_some())
 }
 
 impl<R> World<R> {
-    /// The fixed obstacles that may hide something within `range_m` of a place, except one.
+    /// The fixed obstacles that may hide something within `range_m` of a place, by index.
     #[must_use]
-    pub fn walls_near(&self, from: Point, range_m: f64, except: Option<usize>) -> Vec<Rectangle> {
+    pub fn walls_near(&self, from: Point, range_m: f64) -> Vec<(usize, Rectangle)> {
         let mut walls = Vec::new();
         for (body, rectangle) in self.rectangles_near(from, range_m) {
-            match body {
-                Body::Obstacle(index) if Some(index) != except => walls.push(rectangle),
-                _ => {}
+            if let Body::Obstacle(index) = body {
+                walls.push((index, rectangle));
             }
         }
         walls

@@ -276,6 +276,7 @@ impl World {
             name: own.name.clone(),
             instance: format!("process {process}"),
             bodies: own.senses_bodies,
+            ranges: false,
             sdk: "schedules".to_owned(),
         };
         let get = self.next_id();

@@ -60,6 +60,7 @@ impl Process {
             name: name.clone(),
             instance: instance.to_owned(),
             bodies: robot.senses_bodies(),
+            ranges: false,
             sdk: concat!("rust/", env!("CARGO_PKG_VERSION")).to_owned(),
         };
 

@@ -234,7 +234,7 @@ export type Presence = "here" | "gone" | "lost";
  * Kinds of log lines, to filter by.
  */
 export type LogKind =
-  "run" | "membership" | "emotion" | "behavior" | "command" | "network" | "say" | "verdict" | "late";
+  "run" | "membership" | "emotion" | "behavior" | "command" | "network" | "say" | "site" | "verdict" | "late";
 /**
  * One element of a panel.
  */
@@ -669,6 +669,10 @@ export interface WorldFrame {
    */
   seed: number;
   /**
+   * The sites, by name.
+   */
+  sites?: SiteFrame[];
+  /**
    * Real-time factor; `null` is as fast as the barrier goes.
    */
   speed?: number | null;
@@ -775,6 +779,26 @@ export interface RobotFrame {
    * What it publishes about itself.
    */
   state_variables: {
+    [k: string]: Variable;
+  };
+}
+/**
+ * A site as observers see it.
+ */
+export interface SiteFrame {
+  /**
+   * A word for what it is.
+   */
+  kind: string;
+  location: Point;
+  /**
+   * Its name.
+   */
+  name: string;
+  /**
+   * Its state.
+   */
+  state?: {
     [k: string]: Variable;
   };
 }

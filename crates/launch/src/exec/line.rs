@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use protocol::Message;
 use protocol::messages::{
-    End, MAX_TEXT_BYTES, Panel, Parameters, Payload, Performative, Point, PublicState, SensedRobot,
-    SensedSite, SiteAction, SiteResult, StateVariables, Variable,
+    End, MAX_TEXT_BYTES, Panel, Parameters, Payload, Performative, Point, PublicState, Rays,
+    SensedRobot, SensedSite, SiteAction, SiteResult, StateVariables, Variable,
 };
 use protocol::plain::escape_line;
 use protocol::{RobotName, RunName, Tick};
@@ -33,7 +33,7 @@ const QUOTED: usize = 200;
 /// The byte order mark, with which some languages begin a stream in UTF-8.
 const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
 /// The lines that a program may write, for errors.
-const EXPECTED: &str = "expected is one JSON object a line with a \"type\" of query, percept, random, command, log, panel or \
+const EXPECTED: &str = "expected is one JSON object a line with a \"type\" of query, percept, ranges, random, command, log, panel or \
                         done";
 
 /// A line to the program.
@@ -54,6 +54,8 @@ pub(super) enum ToProgram<'a> {
         field_m: [f64; 2],
         body_m: f64,
         sensing_range_m: f64,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        rays: Option<Rays>,
         location: Point,
         roster: &'a [RobotName],
         parameters: &'a Parameters,
@@ -78,7 +80,7 @@ pub(super) enum ToProgram<'a> {
         #[serde(skip_serializing_if = "<[_]>::is_empty")]
         site_results: &'a [SiteResult],
     },
-    /// The answer to `query`, `percept` or `random`.
+    /// The answer to `query`, `percept`, `ranges` or `random`.
     Answer {
         #[serde(flatten)]
         result: Answered,
@@ -152,6 +154,7 @@ impl<'a> ToProgram<'a> {
             field_m: welcome.field_m,
             body_m: welcome.body_m,
             sensing_range_m: welcome.sensing_range_m,
+            rays: welcome.rays,
             location: welcome.location,
             roster: &welcome.roster,
             parameters: &welcome.parameters,
@@ -209,6 +212,7 @@ impl std::fmt::Display for UnknownFields {
 pub(super) enum FromProgram {
     Query(QueryLine),
     Percept,
+    Ranges,
     Random,
     Command(CommandRequest),
     Log(Log),
@@ -297,6 +301,7 @@ fn parse(line: &[u8]) -> Result<ReadLine, String> {
     let message = match kind {
         "query" => FromProgram::Query(fields(&value)?),
         "percept" => FromProgram::Percept,
+        "ranges" => FromProgram::Ranges,
         "random" => FromProgram::Random,
         "command" => FromProgram::Command(check_order(fields(&value)?)?),
         "log" => FromProgram::Log(fields(&value)?),
@@ -313,6 +318,7 @@ fn unknown_fields(message: &FromProgram, value: &Value) -> Option<UnknownFields>
     let (kind, known): (_, &[_]) = match message {
         FromProgram::Query(_) => ("query", &["of", "what"]),
         FromProgram::Percept => ("percept", &["type"]),
+        FromProgram::Ranges => ("ranges", &["type"]),
         FromProgram::Random => ("random", &["type"]),
         FromProgram::Command(_) => ("command", &["to", "command", "payload"]),
         FromProgram::Log(_) => ("log", &["text"]),

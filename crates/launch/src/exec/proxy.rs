@@ -152,6 +152,10 @@ impl ProgramRobot {
                 let bodies = serde_json::json!({ "bodies": cars.bodies() });
                 self.answer(Ok(bodies))?;
             }
+            FromProgram::Ranges => {
+                let ranges = serde_json::json!({ "ranges": cars.ranges() });
+                self.answer(Ok(ranges))?;
+            }
             FromProgram::Random => self.answer(Ok(unit(cars.random()).into()))?,
             FromProgram::Command(order) => {
                 if order.to == OTHERS {
@@ -291,6 +295,10 @@ impl Robot for ProgramRobot {
     }
 
     fn senses_bodies(&self) -> bool {
+        true
+    }
+
+    fn senses_ranges(&self) -> bool {
         true
     }
 

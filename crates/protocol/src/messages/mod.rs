@@ -8,6 +8,7 @@ mod observe;
 mod payload;
 mod performative;
 mod point;
+mod sensing;
 mod site;
 mod state;
 mod step;
@@ -30,6 +31,7 @@ pub use observe::{
 pub use payload::{MAX_PAYLOAD_BYTES, MAX_PAYLOAD_DEPTH, Payload};
 pub use performative::Performative;
 pub use point::Point;
+pub use sensing::{MAX_RAYS, Rays};
 pub use site::{
     MAX_SITE_ACTIONS, MAX_SITE_TEXT_BYTES, MAX_SITE_VARIABLES, MAX_SITES, SensedSite, SiteAction,
     SiteFrame, SiteRefusal, SiteResult,

@@ -10,6 +10,7 @@ use super::numbers::{Epoch, Generation, Tick};
 use super::payload::Payload;
 use super::performative::Performative;
 use super::point::Point;
+use super::sensing::Rays;
 use super::site::{SensedSite, SiteAction, SiteResult, check_site_actions};
 use super::state::PublicState;
 use super::target::Target;
@@ -31,6 +32,9 @@ pub struct JoinRequest {
     /// Whether its news list the bodies around it ([`TickUpdate::bodies`]).
     #[serde(default, skip_serializing_if = "is_false")]
     pub bodies: bool,
+    /// Whether its news list the ranges of its rays ([`TickUpdate::ranges`]).
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub ranges: bool,
     /// Language and version of what it is written with, for people.
     #[serde(default)]
     pub sdk: String,
@@ -140,6 +144,9 @@ pub struct Welcome {
     pub body_m: f64,
     /// Distance within which it senses other bodies, meters.
     pub sensing_range_m: f64,
+    /// The fan of rays by which it may sense distances, if the scenario has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rays: Option<Rays>,
     /// Where it stands.
     pub location: Point,
     /// Names of all robots of the scenario, itself included, in the order of their bytes.
@@ -253,6 +260,10 @@ pub struct TickUpdate {
     /// All bodies within its sensing range, itself excepted, in a fixed order; only if it asked for them when it joined.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub bodies: Vec<SensedBody>,
+    /// The distance from its center in the direction of each ray ([`Welcome::rays`]) to the next body or the edge of the field,
+    /// meters; the range of the rays where nothing is nearer. Only if it asked for them when it joined.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub ranges: Vec<f64>,
     /// All sites that it senses, by name. The whole list comes in every tick with one in range, so that a robot needs no memory of
     /// it, whichever incarnation it is.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -276,6 +287,7 @@ impl TickUpdate {
             unreachable,
             sensed,
             bodies,
+            ranges,
             sites,
             site_results,
         } = self;
@@ -287,6 +299,7 @@ impl TickUpdate {
             && unreachable.is_empty()
             && sensed.is_empty()
             && bodies.is_empty()
+            && ranges.is_empty()
             && sites.is_empty()
             && site_results.is_empty()
     }

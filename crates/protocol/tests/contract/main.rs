@@ -9,8 +9,9 @@ use std::path::{Path, PathBuf};
 
 use protocol::messages::{
     Clock, Command, Control, Correction, Delivery, End, Face, JoinRequest, LogRecord, MAX_ENTRIES,
-    MAX_TEXT_BYTES, NEWS_FLAGS, Panel, Payload, Performative, Point, Report, SensedBody,
-    SensedKind, SensedRobot, Target, TickPanel, TickUpdate, Tone, Variable, Widget,
+    MAX_SITE_ACTIONS, MAX_SITE_VARIABLES, MAX_TEXT_BYTES, NEWS_FLAGS, Panel, Payload, Performative,
+    Point, Report, SensedBody, SensedKind, SensedRobot, SensedSite, SiteAction, SiteRefusal,
+    SiteResult, Target, TickPanel, TickUpdate, Tone, Variable, Widget,
 };
 use protocol::{Message, RobotName, RunName, decode, encode};
 use serde::Serialize;
@@ -39,7 +40,11 @@ fn report() -> Report {
         .into(),
         commands: 3,
         log: vec!["jokes".into()],
-        site_actions: Vec::new(),
+        site_actions: vec![
+            SiteAction::set("T3", "done", true)
+                .and_add("stock", -1.0)
+                .only_if("done", false),
+        ],
     }
 }
 
@@ -64,8 +69,23 @@ fn news() -> TickUpdate {
             name: name("Vonda"),
             location: Point::new(0.3, 0.7),
         }],
-        sites: Vec::new(),
-        site_results: Vec::new(),
+        ranges: vec![0.75, 5.0],
+        sites: vec![SensedSite {
+            name: "T3".into(),
+            kind: "task".into(),
+            location: Point::new(0.1, 0.2),
+            state: [("done", true.into()), ("stock", 29.0.into())].into(),
+        }],
+        site_results: vec![
+            SiteResult {
+                site: "T3".into(),
+                refused: None,
+            },
+            SiteResult {
+                site: "T4".into(),
+                refused: Some(SiteRefusal::OutOfRange),
+            },
+        ],
         bodies: vec![SensedBody {
             kind: SensedKind::Guest,
             location: Point::new(0.1 + 0.2, 1e-300),
@@ -110,6 +130,7 @@ fn what_is_written_is_read_back_to_the_last_bit() {
         name: name("Butler"),
         instance: "a".into(),
         bodies: true,
+        ranges: true,
         sdk: "rust".into(),
     });
     round_trip(&Control::Step { n: 10 });
@@ -247,7 +268,13 @@ fn malformed_messages_are_named_by_key_sender_and_field() {
             r#""proposal":[0.3,-2.0]"#,
             "proposal",
         ),
-        (r#""log":["jokes"]}"#, r#""log":["jokes"]} trailing"#, "."),
+        (r#""done":false}}]}"#, r#""done":false}}]} trailing"#, "."),
+        (
+            r#""add":{"stock":-1.0}"#,
+            r#""add":{"stock":"x"}"#,
+            "site_actions[0].add.stock",
+        ),
+        (r#""site":"T3""#, r#""site":7"#, "site_actions[0].site"),
     ] {
         assert!(good.contains(from), "{from} is not in {good}");
         let error = decode::<Report>(key, "Butler", good.replace(from, to).as_bytes()).unwrap_err();
@@ -281,6 +308,11 @@ fn malformed_news_are_named_by_key_sender_and_field() {
             r#""unreachable":[7]"#,
             "unreachable[0]",
         ),
+        (
+            r#""out_of_range""#,
+            r#""out_of_luck""#,
+            "site_results[1].refused",
+        ),
         (r#""kind":"guest""#, r#""kind":"ghost""#, "bodies[0].kind"),
     ] {
         assert!(good.contains(from), "{from} is not in {good}");
@@ -292,6 +324,35 @@ fn malformed_news_are_named_by_key_sender_and_field() {
         );
         assert_eq!(error.field, field, "{to}: {error}");
     }
+}
+
+#[test]
+fn actions_on_sites_are_bounded() {
+    let check = |actions: Vec<SiteAction>| {
+        let report = Report {
+            site_actions: actions,
+            ..report()
+        };
+        decode::<Report>("key", "Butler", &encode(&report)).map_err(|error| error.field)
+    };
+    let one = SiteAction::set("T", "done", true);
+    assert!(check(vec![one.clone(); MAX_SITE_ACTIONS]).is_ok());
+    let many = check(vec![one.clone(); MAX_SITE_ACTIONS + 1]);
+    assert_eq!(many.unwrap_err(), "site_actions");
+
+    let with = |variables: usize| {
+        let all = 0..variables;
+        vec![all.fold(one.clone(), |action, i| {
+            action.and_add(format!("v{i}"), 1.0)
+        })]
+    };
+    assert!(check(with(MAX_SITE_VARIABLES)).is_ok());
+    assert_eq!(
+        check(with(MAX_SITE_VARIABLES + 1)).unwrap_err(),
+        "site_actions"
+    );
+    let long = SiteAction::set("T".repeat(65), "done", true);
+    assert_eq!(check(vec![long]).unwrap_err(), "site_actions.site");
 }
 
 #[test]

@@ -308,6 +308,7 @@ impl Stage {
             unreachable,
             sensed,
             bodies: self.bodies(robot),
+            ranges: Vec::new(),
             sites: Vec::new(),
             site_results: Vec::new(),
         }
@@ -376,6 +377,7 @@ pub(crate) fn welcome(
         field_m: [FIELD_M, FIELD_M],
         body_m: BODY_M,
         sensing_range_m: SENSING_M,
+        rays: None,
         location: at,
         roster: roster.to_vec(),
         parameters,

@@ -95,7 +95,9 @@ impl From<&Sensing> for SensingTable {
         });
         Self {
             range: Some(unplaced(Length(sensing.range_m))),
-            field_of_view: sensing.field_of_view_rad.map(|angle| unplaced(Angle(angle))),
+            field_of_view: sensing
+                .field_of_view_rad
+                .map(|angle| unplaced(Angle(angle))),
             walls_hide: sensing.walls_hide.then_some(true),
             misses: (sensing.misses > 0.0).then(|| unplaced(sensing.misses)),
             noise: (sensing.noise_m > 0.0).then(|| unplaced(Length(sensing.noise_m))),

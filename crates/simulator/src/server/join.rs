@@ -49,8 +49,14 @@ impl LiveRun {
         } else {
             self.with_bodies.remove(name);
         }
+        if request.ranges {
+            self.with_ranges.insert(name.clone());
+        } else {
+            self.with_ranges.remove(name);
+        }
         let simulation = &mut self.epoch.simulation;
         simulation.list_bodies(name, request.bodies);
+        simulation.list_ranges(name, request.ranges);
 
         // A predecessor may have answered the open tick: then its successor begins after that answer.
         let open = self.barrier.open_report(name).map(AsRef::as_ref);

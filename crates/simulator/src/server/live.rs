@@ -54,6 +54,8 @@ pub struct LiveRun {
     pub(super) orders: Orders,
     /// Robots whose news list the bodies around them.
     pub(super) with_bodies: BTreeSet<RobotName>,
+    /// Robots with the ranges of their rays in their news.
+    pub(super) with_ranges: BTreeSet<RobotName>,
 
     pub(super) epoch: LiveEpoch,
     /// The tick at which the thread that works now stops for a moment.
@@ -176,6 +178,7 @@ impl Server<LiveRun> {
             departed: Departed::default(),
             orders: Orders::new(bus.watched_publisher(&keys.faults())?, options.is_launched),
             with_bodies: BTreeSet::new(),
+            with_ranges: BTreeSet::new(),
             epoch: LiveEpoch::begin(scenario, number, folder, &frontend, replay_log)?,
             pause_at: 0,
         };
@@ -462,6 +465,9 @@ impl LiveRun {
         // A robot says this when it joins, which may have been in an earlier epoch.
         for name in &self.with_bodies {
             simulation.list_bodies(name, true);
+        }
+        for name in &self.with_ranges {
+            simulation.list_ranges(name, true);
         }
 
         if !simulation.scenario().record.has_panels() {

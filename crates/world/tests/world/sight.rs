@@ -76,9 +76,10 @@ fn a_ray_ends_at_the_next_body_at_the_edge_or_at_its_range() {
     assert_eq!(ranges, [2.5, 2.5, 3.0, 4.0, 4.0]);
     assert_eq!(world.ranges_m(0, &directions, 2.0), [2.0; 5]);
     assert_eq!(
-        world.walls_near(robots[0], 9.0, Some(0)),
-        [wall(8.0, 5.0, 0.5, 0.5)]
+        world.walls_near(robots[0], 4.9),
+        [(0, wall(6.0, 5.0, 0.5, 0.5)), (1, wall(8.0, 5.0, 0.5, 0.5))]
     );
+    assert_eq!(world.walls_near(robots[0], 3.9).len(), 1);
 }
 
 proptest! {

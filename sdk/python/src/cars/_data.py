@@ -91,6 +91,13 @@ class SiteResult(NamedTuple):
     """Why it was refused; None if it was carried out."""
 
 
+class Rays(NamedTuple):
+    """A fan of rays: the first in the direction of motion that the robot reported last, the others counter-clockwise."""
+
+    count: int
+    range_m: float
+
+
 class PublicState(NamedTuple):
     """A robot as it reported itself for ``tick``: the answer to all six queries of the common robot interface."""
 
@@ -130,6 +137,8 @@ class Welcome:
     """Names of all robots of the scenario, itself included."""
     parameters: Mapping[str, Any]
     """Its parameters, as the scenario says, lengths and times in SI units."""
+    rays: Optional[Rays] = None
+    """The fan of rays of ``cars.ranges``, if the scenario has one."""
     last_state: Optional[Mapping[str, Any]] = None
     """What its previous incarnation reported last in this epoch."""
 
@@ -141,5 +150,7 @@ def read_welcome(text: str) -> Welcome:
     known = {name: given[name] for name in names if name in given}
     known["field_m"] = tuple(given["field_m"])
     known["location"] = Point(**given["location"])
+    if "rays" in given:
+        known["rays"] = Rays(**given["rays"])
     known["roster"] = tuple(given["roster"])
     return Welcome(**known)

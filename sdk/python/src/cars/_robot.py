@@ -61,6 +61,9 @@ class Robot(ABC):
     senses_bodies = False
     """Whether the robot uses ``cars.bodies``: its news are larger then."""
 
+    senses_ranges = False
+    """Whether the robot uses ``cars.ranges``: its news are larger then."""
+
     is_quick = False
     """Whether every call takes some milliseconds at most. Then it may run on the thread on which messages arrive, which gives more
     ticks per second; a call that holds it for more than a second may have the robot taken for lost."""

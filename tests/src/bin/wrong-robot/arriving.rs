@@ -137,6 +137,7 @@ impl Host {
             name: self.name.clone(),
             instance,
             bodies: false,
+            ranges: false,
             sdk: "wrong robot".to_owned(),
         };
         if is_again && self.wrong.is("epoch.init:token") {

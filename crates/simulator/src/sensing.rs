@@ -1,0 +1,123 @@
+//! What a robot senses of what is within range: where it looks, what walls hide, what it misses, and where it errs.
+
+use std::fmt::Arguments;
+
+use protocol::RobotName;
+use protocol::Tick;
+use protocol::random::{stream, unit};
+use scenario::{Scenario, Sensing};
+use world::{Point, Rectangle, World, is_hidden};
+
+/// Ranges are sensed in steps of 0.1 mm, so that they are short in messages.
+const RANGE_STEPS_PER_M: f64 = 10_000.0;
+
+/// A robot that looks around in a tick.
+pub(crate) struct Observer<'a> {
+    sensing: &'a Sensing,
+    seed: u64,
+    tick: Tick,
+    robot: &'a RobotName,
+    at: Point,
+    /// Direction of motion that it reported last, radians.
+    heading_rad: f64,
+    /// The obstacles that may hide something from it, by index.
+    walls: Vec<(usize, Rectangle)>,
+}
+
+impl<'a> Observer<'a> {
+    /// A robot at a place. Nothing that it senses is farther away than `reach_m`.
+    pub(crate) fn new<R>(
+        scenario: &'a Scenario,
+        world: &World<R>,
+        tick: Tick,
+        robot: &'a RobotName,
+        at: Point,
+        heading_rad: f64,
+        reach_m: f64,
+    ) -> Self {
+        let sensing = &scenario.sensing;
+        let walls = if sensing.walls_hide {
+            world.walls_near(at, reach_m)
+        } else {
+            Vec::new()
+        };
+        Self {
+            sensing,
+            seed: scenario.seed,
+            tick,
+            robot,
+            at,
+            heading_rad,
+            walls,
+        }
+    }
+
+    /// Where it senses something that is within range; `None` if it does not. `what` is unique among all that is sensed. An
+    /// obstacle does not hide itself.
+    pub(crate) fn senses(
+        &self,
+        what: Arguments<'_>,
+        at: Point,
+        obstacle: Option<usize>,
+    ) -> Option<Point> {
+        let others = self.walls.iter();
+        let walls = others.filter(|(index, _)| Some(*index) != obstacle);
+        let walls = walls.map(|(_, wall)| wall);
+        if !self.looks_at(at) || is_hidden(self.at, at, walls) {
+            return None;
+        }
+        if self.sensing.misses == 0.0 && self.sensing.noise_m == 0.0 {
+            return Some(at);
+        }
+
+        // A stream for each tick, robot and thing: none changes what another one draws.
+        let name = format!("sensing/{}/{}/{what}", self.tick, self.robot);
+        let mut stream = stream(self.seed, &name);
+        if unit(&mut stream) < self.sensing.misses {
+            return None;
+        }
+        // The sum of two uniform numbers is triangular.
+        let mut error_m = || (unit(&mut stream) + unit(&mut stream) - 1.0) * self.sensing.noise_m;
+        let x = at.x + error_m();
+        let y = at.y + error_m();
+        Some(Point::new(x, y))
+    }
+
+    /// Whether a place is within its field of view.
+    fn looks_at(&self, at: Point) -> bool {
+        let Some(field_rad) = self.sensing.field_of_view_rad else {
+            return true;
+        };
+        let offset = at - self.at;
+        let distance_m = offset.length_squared_m2().sqrt();
+        let ahead = direction(self.heading_rad);
+        let forward_m = offset.x * ahead.x + offset.y * ahead.y;
+        forward_m >= libm::cos(field_rad * 0.5) * distance_m
+    }
+}
+
+/// The ranges of a robot's rays, meters.
+pub(crate) fn ranges_m<R>(
+    sensing: &Sensing,
+    world: &World<R>,
+    robot: usize,
+    heading_rad: f64,
+) -> Vec<f64> {
+    let Some(rays) = sensing.rays else {
+        return Vec::new();
+    };
+
+    let mut directions = Vec::new();
+    for index in 0..rays.count as usize {
+        directions.push(direction(heading_rad + rays.bearing_rad(index)));
+    }
+    let mut ranges = world.ranges_m(robot, &directions, rays.range_m);
+    for range_m in &mut ranges {
+        *range_m = (*range_m * RANGE_STEPS_PER_M + 0.5).floor() / RANGE_STEPS_PER_M;
+    }
+    ranges
+}
+
+fn direction(angle_rad: f64) -> Point {
+    Point::new(libm::cos(angle_rad), libm::sin(angle_rad))
+}

@@ -1,0 +1,242 @@
+//! Sensing: field of view, walls that hide, misses, noise, and rays.
+
+#![expect(clippy::unwrap_used, reason = "helpers of tests")]
+
+use std::collections::BTreeMap;
+use std::convert::Infallible;
+use std::path::Path;
+use std::sync::Arc;
+
+use lockstep::{Bulletin, Exchange, IncarnationNotice, TickOutcome};
+use protocol::RobotName;
+use protocol::messages::{CommandText, Point, Report, SensedKind, StateVariables, TickUpdate};
+use scenario::Scenario;
+use scenario::diagnostic::{FileError, Source};
+use simulator::Simulation;
+
+/// A at 2 m, 2 m looks around; B is 2 m to its right, behind an obstacle; C is 2 m above it; a site is at C.
+const FILE: &str = r#"
+duration = "1000 s"
+[field]
+size = ["10 m", "10 m"]
+body = "0.5 m"
+[[obstacle]]
+at = ["3 m", "2 m"]
+[[robot]]
+name = "A"
+at = ["2 m", "2 m"]
+[[robot]]
+name = "B"
+at = ["4 m", "2 m"]
+[[robot]]
+name = "C"
+at = ["2 m", "4 m"]
+[[site]]
+name = "T"
+at = ["2 m", "4 m"]
+[sensing]
+range = "3 m"
+"#;
+
+fn scenario(sensing: &str) -> Result<Scenario, FileError> {
+    let source = Source {
+        name: "test".into(),
+        text: format!("{FILE}{sensing}\n"),
+    };
+    Scenario::parse(&source, Path::new("."))
+}
+
+/// Robots that stay and look in a direction; the news of A.
+struct Watchers {
+    places: BTreeMap<RobotName, Point>,
+    heading_rad: f64,
+    news: Vec<TickUpdate>,
+}
+
+impl Exchange<TickUpdate, Arc<Report>, CommandText> for Watchers {
+    type Error = Infallible;
+
+    fn exchange(
+        &mut self,
+        tick: u64,
+        bulletin: &dyn Bulletin<TickUpdate>,
+    ) -> Result<TickOutcome<Arc<Report>, CommandText>, Infallible> {
+        let mut outcome = TickOutcome::default();
+        for (name, proposal) in &self.places {
+            if name.as_str() == "A" {
+                let news = bulletin.compose(name, IncarnationNotice::default());
+                self.news.push(news);
+            }
+            let report = Report {
+                epoch: 1,
+                tick,
+                generation: 1,
+                proposal: *proposal,
+                speed_mps: 0.0,
+                direction_rad: self.heading_rad,
+                emotion_state: String::new(),
+                behavior_state: String::new(),
+                state_variables: StateVariables::new(),
+                commands: 0,
+                log: Vec::new(),
+                site_actions: Vec::new(),
+            };
+            let answer = (Arc::new(report), Vec::new());
+            outcome.reports.insert(name.clone(), answer);
+        }
+        Ok(outcome)
+    }
+}
+
+/// The news of A in ticks 0 to `ticks`, while it looks in a direction.
+fn news(sensing: &str, heading_rad: f64, ticks: usize) -> Vec<TickUpdate> {
+    let mut simulation = Simulation::new(scenario(sensing).unwrap(), 1).unwrap();
+    let names = simulation.names().to_vec();
+    let a = names[0].clone();
+    simulation.list_bodies(&a, true);
+    simulation.list_ranges(&a, true);
+    let place = |name: &RobotName| (name.clone(), simulation.location(name).unwrap());
+    let mut watchers = Watchers {
+        places: names.iter().map(place).collect(),
+        heading_rad,
+        news: Vec::new(),
+    };
+    simulation.init(&mut watchers).unwrap();
+    for _ in 0..ticks {
+        simulation.step(&mut watchers).unwrap();
+    }
+    watchers.news
+}
+
+/// The names of robots and sites that A senses, and how many obstacles.
+fn seen(news: &TickUpdate) -> String {
+    let mut seen = String::new();
+    for robot in &news.sensed {
+        seen += robot.name.as_str();
+    }
+    for site in &news.sites {
+        seen += &site.name;
+    }
+    let obstacles = news.bodies.iter();
+    let obstacles = obstacles.filter(|body| body.kind == SensedKind::Obstacle);
+    format!("{seen}{}", obstacles.count())
+}
+
+#[test]
+fn a_robot_senses_where_it_looks_and_what_no_wall_hides() {
+    const UP: f64 = std::f64::consts::FRAC_PI_2;
+    for (sensing, heading_rad, expected) in [
+        ("", 0.0, "BCT1"),
+        ("walls_hide = true", 0.0, "CT1"),
+        ("field_of_view = \"120 deg\"", 0.0, "B1"),
+        ("field_of_view = \"120 deg\"", UP, "CT0"),
+        ("field_of_view = \"120 deg\"", -UP, "0"),
+        // 90 deg to the side is within 181 deg, and not within 179 deg.
+        ("field_of_view = \"181 deg\"", 0.0, "BCT1"),
+        ("field_of_view = \"179 deg\"", 0.0, "B1"),
+        ("field_of_view = \"360 deg\"", 2.0, "BCT1"),
+        ("field_of_view = \"120 deg\"\nwalls_hide = true", 0.0, "1"),
+        ("misses = 1.0", 0.0, "0"),
+    ] {
+        let news = news(sensing, heading_rad, 1);
+        assert_eq!(seen(&news[1]), expected, "{sensing}, {heading_rad}");
+    }
+}
+
+#[test]
+fn misses_come_as_often_as_they_should_and_noise_stays_within_its_bounds() {
+    const TICKS: usize = 2000;
+    let all = news("misses = 0.25\nnoise = \"0.2 m\"", 0.0, TICKS);
+    let mut errors_m = Vec::new();
+    for news in &all[1..] {
+        // What is sensed twice is missed twice, and at the same place.
+        let bodies = news.bodies.iter();
+        let robots = bodies.filter(|body| body.kind == SensedKind::Robot);
+        let places: Vec<Point> = robots.map(|body| body.location).collect();
+        let sensed: Vec<Point> = news.sensed.iter().map(|robot| robot.location).collect();
+        assert_eq!(places, sensed);
+        for robot in news
+            .sensed
+            .iter()
+            .filter(|robot| robot.name.as_str() == "B")
+        {
+            errors_m.push(robot.location.x - 4.0);
+            assert!((robot.location.y - 2.0).abs() <= 0.2);
+        }
+    }
+
+    // Binomial: 1500 with a standard deviation of 19; five of them.
+    assert!((1403..1597).contains(&errors_m.len()), "{}", errors_m.len());
+    assert!(errors_m.iter().all(|error_m| error_m.abs() <= 0.2));
+    let count = errors_m.len() as f64;
+    let mean = errors_m.iter().sum::<f64>() / count;
+    let square = errors_m
+        .iter()
+        .map(|error_m| error_m * error_m)
+        .sum::<f64>()
+        / count;
+    // A triangular distribution on -0.2 to 0.2 has the variance 0.04 / 6.
+    assert!(mean.abs() < 0.011, "{mean}");
+    assert!((square / (0.04 / 6.0) - 1.0).abs() < 0.15, "{square}");
+    assert_eq!(
+        all,
+        news("misses = 0.25\nnoise = \"0.2 m\"", 0.0, TICKS),
+        "by the seed"
+    );
+}
+
+#[test]
+fn one_more_robot_changes_no_other_ones_chance() {
+    let sensing = "misses = 0.5\nnoise = \"0.1 m\"";
+    let more = format!("{sensing}\n[[robot]]\nname = \"Aa\"\nat = [\"3 m\", \"3 m\"]");
+    for (few, many) in news(sensing, 0.0, 50).iter().zip(news(&more, 0.0, 50)) {
+        let others = many.sensed.into_iter();
+        let others: Vec<_> = others.filter(|robot| robot.name.as_str() != "Aa").collect();
+        assert_eq!(few.sensed, others);
+        assert_eq!(few.sites, many.sites);
+    }
+}
+
+#[test]
+fn rays_begin_in_the_direction_of_motion_and_go_counter_clockwise() {
+    let rays = "rays = { count = 4, range = \"5 m\" }";
+    // To the right: the obstacle's face at 2.75 m. Up: the face of C at 3.75 m. Then the edges.
+    let ahead = news(rays, 0.0, 1);
+    assert_eq!(ahead[1].ranges, [0.75, 1.75, 2.0, 2.0]);
+    let turned = news(rays, std::f64::consts::FRAC_PI_2, 1);
+    assert_eq!(turned[1].ranges, [1.75, 2.0, 2.0, 0.75]);
+    let short = news("rays = { count = 4, range = \"1 m\" }", 0.0, 1);
+    assert_eq!(short[1].ranges, [0.75, 1.0, 1.0, 1.0]);
+    assert!(news("", 0.0, 1)[1].ranges.is_empty());
+}
+
+#[test]
+fn rules_of_sensing_are_kept_and_checked() {
+    let text = "field_of_view = \"120 deg\"\nwalls_hide = true\nmisses = 0.1\nnoise = \"0.1 m\"\nrays = { count = 720 }";
+    let first = scenario(text).unwrap();
+    assert_eq!(first.sensing.rays.unwrap().range_m, 3.0);
+    let source = Source {
+        name: "again".into(),
+        text: first.to_toml().unwrap(),
+    };
+    let again = Scenario::parse(&source, Path::new(".")).unwrap();
+    assert_eq!(again.sensing, first.sensing);
+    // What is not used is not written: the records of older scenarios keep their bytes.
+    let plain = scenario("").unwrap().to_toml().unwrap();
+    assert!(!plain.contains("walls_hide") && !plain.contains("rays"));
+
+    for (wrong, reason) in [
+        ("field_of_view = \"0 deg\"", "more than 0"),
+        ("field_of_view = \"361 deg\"", "at most 360 deg"),
+        ("field_of_view = 120", "an angle such as"),
+        ("misses = 1.5", "between 0 and 1"),
+        ("misses = nan", "between 0 and 1"),
+        ("noise = \"-1 m\"", "less than 0 m"),
+        ("rays = { count = 721 }", "more than 720 rays"),
+        ("rays = { count = 0 }", "more than zero"),
+    ] {
+        let error = scenario(wrong).unwrap_err();
+        let shown = config::render_plain(&error, None, 200);
+        assert!(shown.contains(reason), "{shown}");
+    }
+}
