@@ -61,7 +61,8 @@ fn separate_where(
             (Some(name), Some(count)) if count <= MAX_SEPARATED && is_chosen(name, count) => {
                 let table = element.as_table().cloned().unwrap_or_default();
                 separated.extend(
-                    (1..=count).map(|number| single(table.clone(), have_classes, name, number)),
+                    (1..=count)
+                        .map(|number| single(table.clone(), have_classes, name, (number, count))),
                 );
             }
             _ => separated.push(element),
@@ -73,9 +74,22 @@ fn separate_where(
 /// Most robots that are separated: a scenario with more is refused.
 const MAX_SEPARATED: usize = 10_000;
 
-/// The table of one robot or site. Robots have a class: without one in the file it is the name of the table.
-fn single(mut table: toml::Table, have_classes: bool, name: &str, number: usize) -> toml::Value {
+/// The table of one robot or site, the `number`th of `count`. Robots have a class: without one in the file it is the name of the
+/// table.
+fn single(
+    mut table: toml::Table,
+    have_classes: bool,
+    name: &str,
+    (number, count): (usize, usize),
+) -> toml::Value {
     table.remove("count");
+    // Its place in a pattern of places.
+    if let Some(at) = table.get_mut("at").and_then(toml::Value::as_table_mut) {
+        for (key, value) in [("number", number), ("of", count)] {
+            let value = i64::try_from(value).unwrap_or(i64::MAX);
+            at.entry(key).or_insert(value.into());
+        }
+    }
     if have_classes {
         table
             .entry("class")

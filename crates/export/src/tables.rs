@@ -464,6 +464,7 @@ fn message_cells<'a>(from: &'a RobotName, to: &'a RobotName, seq: Option<Seq>) -
 fn blocker(by: &Blocker) -> &'static str {
     match by {
         Blocker::Edge => "edge",
+        Blocker::Wall => "wall",
         Blocker::Obstacle => "obstacle",
         Blocker::Guest => "guest",
         Blocker::TooFast => "too_fast",

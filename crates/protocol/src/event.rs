@@ -300,6 +300,8 @@ impl std::fmt::Display for WaitedFor {
 pub enum Blocker {
     /// The edge of the field.
     Edge,
+    /// A wall.
+    Wall,
     /// A fixed obstacle.
     Obstacle,
     /// A guest.
@@ -314,6 +316,7 @@ impl std::fmt::Display for Blocker {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Edge => f.write_str("the edge"),
+            Self::Wall => f.write_str("a wall"),
             Self::Obstacle => f.write_str("an obstacle"),
             Self::Guest => f.write_str("a guest"),
             Self::TooFast => f.write_str("too_fast"),

@@ -6,7 +6,7 @@ use observe::{Expectation, Setting, TickCondition};
 use protocol::messages::{DisplayUnit, Parameters, Point};
 use protocol::{RobotName, Tick};
 use serde::{Deserialize, Serialize};
-use world::{Field, Guests, Hall};
+use world::{Field, Guests, Hall, Region, Shape, Shapes, Wall};
 
 use super::change::{Change, Parent};
 use super::fault::Fault;
@@ -45,7 +45,7 @@ pub struct Scenario {
     pub ticks: Tick,
     /// Width and height of the field, meters.
     pub field_m: [f64; 2],
-    /// Side of every body, meters.
+    /// Side of every body without a shape of its own, meters.
     pub body_m: f64,
     /// In what people are shown lengths and speeds.
     pub display_unit: DisplayUnit,
@@ -57,8 +57,10 @@ pub struct Scenario {
     pub guests: Guests,
     /// What they do beside walking.
     pub guest_rules: GuestRules,
-    /// Centers of the fixed obstacles, meters.
-    pub obstacles: Vec<Point>,
+    /// The fixed obstacles.
+    pub obstacles: Vec<Obstacle>,
+    /// The walls.
+    pub walls: Vec<Wall>,
     /// The sites by name.
     pub sites: BTreeMap<String, SiteSpec>,
     /// The robots by name.
@@ -130,6 +132,29 @@ impl Default for RecordContents {
     }
 }
 
+/// A fixed obstacle.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Obstacle {
+    /// Its center, meters.
+    pub at: Point,
+    /// Its shape; a square of the scenario's size if there is none.
+    pub shape: Option<Shape>,
+    /// Where its place was drawn, if it follows from the seed.
+    pub drawn: Option<Region>,
+}
+
+impl Obstacle {
+    /// A square of the scenario's size.
+    #[must_use]
+    pub fn square(at: Point) -> Self {
+        Self {
+            at,
+            shape: None,
+            drawn: None,
+        }
+    }
+}
+
 /// A robot of the scenario.
 #[derive(Debug, Clone)]
 pub struct RobotSpec {
@@ -137,8 +162,10 @@ pub struct RobotSpec {
     pub class: String,
     /// Initial location, meters.
     pub at: Point,
-    /// Whether the location follows from the seed.
-    pub is_at_random: bool,
+    /// Where the location was drawn, if it follows from the seed.
+    pub drawn: Option<Region>,
+    /// Shape of its body; a square of the scenario's size if there is none.
+    pub shape: Option<Shape>,
     /// Parameters of the robot; lengths, speeds and times are SI numbers.
     pub parameters: Parameters,
 }
@@ -171,20 +198,47 @@ impl Scenario {
     /// The initial environment; robots are in the order of their names.
     #[must_use]
     pub fn hall(&self) -> Hall {
-        let field = Field {
-            size_m: (self.field_m[0], self.field_m[1]),
-            body_m: self.body_m,
-        };
-        let robots = self.robots.values().map(|robot| to_world(robot.at));
+        self.hall_of(
+            &self.obstacles.iter().collect::<Vec<_>>(),
+            self.robots.values(),
+        )
+    }
 
-        Hall {
-            field,
-            obstacles: self.obstacles.iter().copied().map(to_world).collect(),
+    /// The environment with these obstacles and robots only.
+    pub(super) fn hall_of<'a>(
+        &self,
+        obstacles: &[&Obstacle],
+        robots: impl Iterator<Item = &'a RobotSpec>,
+    ) -> Hall {
+        let mut hall = Hall {
+            field: Field {
+                size_m: (self.field_m[0], self.field_m[1]),
+                body_m: self.body_m,
+            },
+            obstacles: Vec::new(),
             guests: self.guests,
-            robots: robots.collect(),
+            robots: Vec::new(),
+            shapes: Shapes {
+                walls: self.walls.clone(),
+                ..Shapes::default()
+            },
             tick_s: self.tick_s,
             max_speed_mps: self.max_speed_mps,
+        };
+
+        for (index, obstacle) in obstacles.iter().enumerate() {
+            hall.obstacles.push(to_world(obstacle.at));
+            if let Some(shape) = obstacle.shape {
+                hall.shapes.obstacles.insert(index, shape);
+            }
         }
+        for (index, robot) in robots.enumerate() {
+            hall.robots.push(to_world(robot.at));
+            if let Some(shape) = robot.shape {
+                hall.shapes.robots.insert(index, shape);
+            }
+        }
+        hall
     }
 }
 

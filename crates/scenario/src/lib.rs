@@ -5,6 +5,7 @@ pub mod change;
 mod checked;
 pub mod fault;
 pub mod files;
+mod floor_plan;
 pub mod guests;
 mod lateness;
 pub mod network;
@@ -28,7 +29,9 @@ pub use protocol::messages::OnLate;
 
 pub use by_hand::kind_in_words;
 pub use change::{Change, Parent};
-pub use checked::{DEFAULT_SEED, MAX_GUESTS, RecordContents, RobotSpec, Scenario, SyncPoint};
+pub use checked::{
+    DEFAULT_SEED, MAX_GUESTS, Obstacle, RecordContents, RobotSpec, Scenario, SyncPoint,
+};
 pub use checked::{to_wire, to_world};
 pub use fault::{Fault, FaultEnd};
 pub use guests::GuestRules;

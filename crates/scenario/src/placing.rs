@@ -2,9 +2,9 @@
 //! here name them.
 
 use protocol::RobotName;
-use world::{HallError, RobotPlacer, World};
+use world::{HallError, Placer, Region, World};
 
-use super::checked::{Scenario, to_wire, to_world};
+use super::checked::{Obstacle, Scenario, to_wire};
 
 /// A body of a scenario cannot be placed.
 #[derive(Debug, Clone)]
@@ -14,14 +14,16 @@ pub(super) struct PlacingError {
     robot: Option<RobotName>,
     /// The robot that it overlaps.
     other: Option<RobotName>,
+    /// The obstacle that has no free place.
+    obstacle: Option<usize>,
 }
 
 /// Why a body cannot be placed.
 #[derive(Debug, Clone, Copy)]
 enum PlacingReason {
     Hall(HallError),
-    /// All random places of a robot overlap another body.
-    NoFreePlace,
+    /// All places of a robot or an obstacle that were drawn in a region overlap another body, or the edge.
+    NoFreePlace(Region),
 }
 
 /// The part of a scenario that keeps its bodies from being placed.
@@ -31,6 +33,7 @@ pub(super) enum PlacingCause<'a> {
     Field,
     Guests,
     Obstacle(usize),
+    Wall(usize),
     Robot(&'a RobotName),
 }
 
@@ -43,40 +46,61 @@ pub(super) fn check(scenario: &Scenario) -> Result<(), PlacingError> {
     }
 }
 
-/// Places the robots whose places are random, each by a stream of its own, after those whose places are given. Of two that hinder
-/// each other the one with the longer name gives way, and then the later one in the alphabet: so one more robot in bulk moves none.
+/// Places what has no given place, each by a stream of its own, after what has one: obstacles in their order, then robots. Of two
+/// robots that hinder each other the one with the longer name gives way, and then the later one in the alphabet: so one more robot
+/// in bulk moves none.
 pub(super) fn place_at_random(scenario: &mut Scenario) -> Result<(), PlacingError> {
-    let mut hall = scenario.hall();
-    hall.robots.clear();
-    let mut fixed = Vec::new();
-    let mut random = Vec::new();
+    let is_drawn = |obstacle: &Obstacle| obstacle.drawn.is_some();
+    let mut drawn_robots = Vec::new();
+    let mut given_names = Vec::new();
     for (name, robot) in &scenario.robots {
-        if robot.is_at_random {
-            random.push(name.clone());
-        } else {
-            fixed.push(name.clone());
-            hall.robots.push(to_world(robot.at));
+        match robot.drawn {
+            Some(_) => drawn_robots.push(name.clone()),
+            None => given_names.push(name.clone()),
         }
     }
-    if random.is_empty() {
+    if drawn_robots.is_empty() && !scenario.obstacles.iter().any(is_drawn) {
         return Ok(());
     }
-    random.sort_by_key(|name| (name.as_str().len(), name.clone()));
+    drawn_robots.sort_by_key(|name| (name.as_str().len(), name.clone()));
 
-    let placer = RobotPlacer::new(&hall);
-    let mut placer = placer.map_err(|error| PlacingError::of(error, &fixed))?;
-    for name in random {
-        let mut stream = protocol::random::stream(scenario.seed, &format!("at/{name}"));
-        let Some(at) = placer.place(&mut stream) else {
-            return Err(PlacingError {
-                reason: PlacingReason::NoFreePlace,
-                robot: Some(name),
-                other: None,
-            });
-        };
-        if let Some(robot) = scenario.robots.get_mut(&name) {
-            robot.at = to_wire(at);
+    let mut given = Vec::new();
+    let mut given_indices = Vec::new();
+    for (index, obstacle) in scenario.obstacles.iter().enumerate() {
+        if !is_drawn(obstacle) {
+            given.push(obstacle);
+            given_indices.push(index);
         }
+    }
+    let robots = scenario.robots.values();
+    let hall = scenario.hall_of(&given, robots.filter(|robot| robot.drawn.is_none()));
+    let placer = Placer::new(&hall);
+    let mut placer = placer
+        .map_err(|error| PlacingError::of(error, &given_names).with_obstacles(&given_indices))?;
+
+    for (index, obstacle) in scenario.obstacles.iter_mut().enumerate() {
+        let Some(region) = obstacle.drawn else {
+            continue;
+        };
+        // Counted from 1, as people count the tables.
+        let name = format!("at/obstacle/{}", index + 1);
+        let mut stream = protocol::random::stream(scenario.seed, &name);
+        let Some(at) = placer.place(obstacle.shape, region, &mut stream) else {
+            return Err(PlacingError::no_room(region, None, Some(index)));
+        };
+        obstacle.at = to_wire(at);
+    }
+
+    for name in drawn_robots {
+        let mut stream = protocol::random::stream(scenario.seed, &format!("at/{name}"));
+        let Some(robot) = scenario.robots.get_mut(&name) else {
+            continue;
+        };
+        let region = robot.drawn.unwrap_or(Region::Field);
+        let Some(at) = placer.place(robot.shape, region, &mut stream) else {
+            return Err(PlacingError::no_room(region, Some(name), None));
+        };
+        robot.at = to_wire(at);
     }
     Ok(())
 }
@@ -89,7 +113,10 @@ impl PlacingError {
         let mut robot = None;
         let mut other = None;
         match error {
-            HallError::RobotOffField { index, .. } | HallError::RobotOnObstacle { index, .. } => {
+            HallError::RobotOffField { index, .. }
+            | HallError::RobotOnObstacle { index, .. }
+            | HallError::RobotOnWall { index, .. }
+            | HallError::RobotSize { index, .. } => {
                 robot = name(index);
             }
             HallError::RobotOnRobot {
@@ -107,7 +134,33 @@ impl PlacingError {
             reason: PlacingReason::Hall(error),
             robot,
             other,
+            obstacle: None,
         }
+    }
+
+    /// An error of a region that has no room.
+    fn no_room(region: Region, robot: Option<RobotName>, obstacle: Option<usize>) -> Self {
+        Self {
+            reason: PlacingReason::NoFreePlace(region),
+            robot,
+            other: None,
+            obstacle,
+        }
+    }
+
+    /// The same error of a hall whose obstacles have these numbers in the scenario.
+    fn with_obstacles(mut self, indices: &[usize]) -> Self {
+        if let PlacingReason::Hall(
+            HallError::ObstacleOffField { index, .. }
+            | HallError::ObstacleSize { index, .. }
+            | HallError::RobotOnObstacle {
+                obstacle: index, ..
+            },
+        ) = &mut self.reason
+        {
+            *index = indices.get(*index).copied().unwrap_or(*index);
+        }
+        self
     }
 
     /// The part of the scenario that has to change.
@@ -116,11 +169,20 @@ impl PlacingError {
             return PlacingCause::Robot(robot);
         }
 
+        if let Some(obstacle) = self.obstacle {
+            return PlacingCause::Obstacle(obstacle);
+        }
+
         let PlacingReason::Hall(error) = self.reason else {
             return PlacingCause::Field;
         };
         match error {
-            HallError::ObstacleOffField { index, .. } => PlacingCause::Obstacle(index),
+            HallError::ObstacleOffField { index, .. } | HallError::ObstacleSize { index, .. } => {
+                PlacingCause::Obstacle(index)
+            }
+            HallError::WallOffField { index, .. } | HallError::WallTooShort { index, .. } => {
+                PlacingCause::Wall(index)
+            }
             HallError::NoRoom { .. } | HallError::TooManyBodies { .. } => PlacingCause::Guests,
             HallError::OutOfRange { name: "tick_s", .. } => PlacingCause::Tick,
             _ => PlacingCause::Field,
@@ -133,7 +195,9 @@ impl PlacingError {
             PlacingCause::Robot(robot) => format!("robots.{robot}"),
             PlacingCause::Obstacle(_) => "obstacles".to_owned(),
             PlacingCause::Guests => "guests".to_owned(),
-            PlacingCause::Tick | PlacingCause::Field => "field_m".to_owned(),
+            PlacingCause::Tick | PlacingCause::Field | PlacingCause::Wall(_) => {
+                "field_m".to_owned()
+            }
         }
     }
 }
@@ -157,15 +221,31 @@ impl std::fmt::Display for PlacingError {
                     "robot {robot} at {at} m does not lie wholly inside the field"
                 )
             }
-            (PlacingReason::NoFreePlace, Some(robot), _) => {
+            (PlacingReason::Hall(HallError::RobotOnWall { at, wall, .. }), Some(robot), _) => {
+                write!(f, "robot {robot} at {at} m stands on wall {wall}")
+            }
+            (PlacingReason::Hall(HallError::RobotSize { value_m, .. }), Some(robot), _) => {
                 write!(
                     f,
-                    "there is no free place for robot {robot} in {} draws: the field is too full",
-                    RobotPlacer::TRIES
+                    "robot {robot} is {value_m} m wide or high: too small or too large"
+                )
+            }
+            (PlacingReason::NoFreePlace(region), ..) => {
+                let whose = match (&self.robot, self.obstacle) {
+                    (Some(robot), _) => format!("robot {robot}"),
+                    (None, obstacle) => format!("obstacle {}", obstacle.unwrap_or(0)),
+                };
+                let tries = Placer::TRIES;
+                let why = match region {
+                    Region::Field => "the field is too full",
+                    _ => "the region of its place is too small, too full, or off the field",
+                };
+                write!(
+                    f,
+                    "there is no free place for {whose} in {tries} draws: {why}"
                 )
             }
             (PlacingReason::Hall(error), ..) => error.fmt(f),
-            (PlacingReason::NoFreePlace, None, _) => f.write_str("the field is too full"),
         }
     }
 }

@@ -10,6 +10,7 @@ mod numbers;
 mod place;
 mod sensing;
 mod site;
+mod solids;
 mod times;
 mod unplaced;
 pub(super) mod words;
@@ -23,7 +24,7 @@ use config::overrides::merge;
 use config::units::{Length, Speed, Time, quantity};
 use config::{FileError, FixedList, Source, seed, shipped};
 use observe::{Expectation, TickCondition};
-use protocol::messages::{DisplayUnit, OnLate, Parameters, Point};
+use protocol::messages::{DisplayUnit, OnLate, Parameters};
 use protocol::{RobotName, Tick};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
@@ -36,13 +37,14 @@ use numbers::positive;
 use place::StartPlace;
 use sensing::SensingTable;
 use site::SiteTable;
+use solids::{Fixed, FloorPlanTable, ObstacleTable, Size, WallTable};
 use times::Times;
 use unplaced::unplaced;
 
 pub(super) use expect::Expectations;
 
 use super::change::Parent;
-use super::checked::{self, DEFAULT_SEED, RecordContents, RobotSpec};
+use super::checked::{self, DEFAULT_SEED, RecordContents, RobotSpec, to_wire, to_world};
 use super::lateness::Lateness;
 use super::placing::{self, PlacingCause, PlacingError};
 use super::sites;
@@ -77,9 +79,12 @@ pub(super) struct ScenarioFile {
     end_when: Option<Spanned<TickCondition>>,
     parent: Option<ParentTable>,
     #[serde(default, rename = "obstacle", skip_serializing_if = "Vec::is_empty")]
-    obstacles: Vec<Obstacle>,
+    obstacles: Vec<ObstacleTable>,
     #[serde(default, rename = "site", skip_serializing_if = "Vec::is_empty")]
     sites: Vec<Spanned<SiteTable>>,
+    #[serde(default, rename = "wall", skip_serializing_if = "Vec::is_empty")]
+    walls: Vec<WallTable>,
+    floor_plan: Option<Spanned<FloorPlanTable>>,
     #[serde(default, rename = "robot", skip_serializing_if = "Vec::is_empty")]
     robots: Vec<Spanned<RawRobot>>,
 }
@@ -103,12 +108,6 @@ struct RecordTable {
     sync: Option<checked::SyncPoint>,
 }
 
-#[derive(Debug, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
-struct Obstacle {
-    at: Spanned<FixedList<Length, 2>>,
-}
-
 #[derive(Debug, Clone, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct RawRobot {
@@ -117,6 +116,8 @@ struct RawRobot {
     count: Option<usize>,
     class: Option<String>,
     at: StartPlace,
+    size: Option<Spanned<Size>>,
+    radius: Option<Spanned<Length>>,
     on_late: Option<OnLate>,
     params_from: Option<Spanned<PathBuf>>,
     #[serde(default)]
@@ -151,6 +152,9 @@ impl ScenarioFile {
         }
         for site in &mut self.sites {
             site.as_mut().forget_place();
+        }
+        for obstacle in &mut self.obstacles {
+            obstacle.forget();
         }
         self
     }
@@ -202,10 +206,11 @@ impl ScenarioFile {
         let guests = self.guests.as_ref().map(Spanned::get_ref);
         let guest_rules = guests::rules(guests, tick_s, source)?;
         let guests = guests::walks(guests, source)?;
-        let places = FilePlaces::of(&self);
-        let obstacles = self.obstacles.iter();
-        let obstacles = obstacles.map(|obstacle| point(*obstacle.at.get_ref()));
-        let obstacles = obstacles.collect();
+        let mut fixed = Fixed::read(&self.obstacles, &self.walls, source)?;
+        if let Some(plan) = &self.floor_plan {
+            fixed.add_plan(plan, folder, source)?;
+        }
+        let places = FilePlaces::of(&self, &fixed);
 
         let field = self.field.as_ref().map(Spanned::get_ref);
         let size = field.and_then(|field| field.size).unwrap_or(FIELD);
@@ -238,7 +243,12 @@ impl ScenarioFile {
             sensing,
             guests,
             guest_rules,
-            obstacles,
+            obstacles: fixed
+                .obstacles
+                .into_iter()
+                .map(|(obstacle, _)| obstacle)
+                .collect(),
+            walls: fixed.walls.into_iter().map(|(wall, _)| wall).collect(),
             sites,
             lateness,
             robots,
@@ -372,6 +382,7 @@ fn single_robots(
                 count: None,
                 class: class.or_else(|| Some(table.name.to_string())),
                 name,
+                at: table.at.member(number, count),
                 ..table.clone()
             };
             robots.push(Spanned::new(span.clone(), robot));
@@ -424,10 +435,12 @@ fn spec(
         .map_err(|reason| FileError::at(source, Some(span), &reason))?;
 
     let class = robot.class;
+    let (at, drawn) = robot.at.resolve();
     Ok(RobotSpec {
         class: class.unwrap_or_else(|| robot.name.as_str().to_owned()),
-        at: robot.at.point(),
-        is_at_random: robot.at == StartPlace::Random,
+        at: to_wire(at),
+        drawn,
+        shape: solids::shape(robot.size.as_ref(), robot.radius.as_ref(), source)?,
         parameters: to_parameters(&parameters),
     })
 }
@@ -460,18 +473,21 @@ struct FilePlaces {
     field: Option<Span<usize>>,
     guests: Option<Span<usize>>,
     obstacles: Vec<Span<usize>>,
+    walls: Vec<Span<usize>>,
     robots: BTreeMap<RobotName, Span<usize>>,
 }
 
 impl FilePlaces {
-    fn of(raw: &ScenarioFile) -> Self {
-        let obstacles = raw.obstacles.iter();
+    fn of(raw: &ScenarioFile, fixed: &Fixed) -> Self {
+        let obstacles = fixed.obstacles.iter();
+        let walls = fixed.walls.iter();
         let robots = raw.robots.iter();
         Self {
             tick: raw.tick.as_ref().map(Spanned::span),
             field: raw.field.as_ref().map(Spanned::span),
             guests: raw.guests.as_ref().map(Spanned::span),
-            obstacles: obstacles.map(|obstacle| obstacle.at.span()).collect(),
+            obstacles: obstacles.map(|(_, span)| span.clone()).collect(),
+            walls: walls.map(|(_, span)| span.clone()).collect(),
             robots: robots
                 .map(|robot| (robot.get_ref().name.clone(), robot.span()))
                 .collect(),
@@ -484,13 +500,10 @@ impl FilePlaces {
             PlacingCause::Field => self.field.clone(),
             PlacingCause::Guests => self.guests.clone(),
             PlacingCause::Obstacle(index) => self.obstacles.get(index).cloned(),
+            PlacingCause::Wall(index) => self.walls.get(index).cloned(),
             PlacingCause::Robot(name) => self.robots.get(name).cloned(),
         }
     }
-}
-
-fn point(FixedList([x, y]): FixedList<Length, 2>) -> Point {
-    Point::new(x.0, y.0)
 }
 
 /// Parameters as JSON for the welcome of a robot. Texts that are quantities become SI numbers.
@@ -542,10 +555,7 @@ impl From<&checked::Scenario> for ScenarioFile {
         let changes = scenario.changes.iter();
         let changes = changes.map(|change| unplaced(ChangeTable::of(change, tick_s)));
         let expectations = scenario.expectations.iter().cloned().map(unplaced);
-        let obstacles = scenario.obstacles.iter();
-        let obstacles = obstacles.map(|at| Obstacle {
-            at: unplaced(lengths(*at)),
-        });
+        let obstacles = scenario.obstacles.iter().map(ObstacleTable::of);
         let sites = scenario.sites.iter();
         let sites = sites.filter_map(|(name, spec)| SiteTable::of(name, spec));
         let robots = scenario.robots.iter();
@@ -574,6 +584,9 @@ impl From<&checked::Scenario> for ScenarioFile {
             parent: scenario.parent.as_ref().map(ParentTable::from),
             obstacles: obstacles.collect(),
             sites: sites.map(unplaced).collect(),
+            walls: WallTable::of_all(&scenario.walls),
+            // The record has what is on it, and does not need the drawing.
+            floor_plan: None,
             robots: robots.collect(),
         }
     }
@@ -581,22 +594,21 @@ impl From<&checked::Scenario> for ScenarioFile {
 
 impl RawRobot {
     fn of(name: &RobotName, spec: &RobotSpec, lateness: &Lateness) -> Self {
+        let (size, radius) = solids::keys(spec.shape);
         let parameters = spec.parameters.iter();
         let params = parameters.filter_map(|(key, value)| Some((key.clone(), to_toml(value)?)));
         Self {
             name: name.clone(),
             count: None,
             class: Some(spec.class.clone()),
-            at: StartPlace::of(spec),
+            at: StartPlace::of(to_world(spec.at), spec.drawn),
+            size,
+            radius,
             on_late: lateness.own.get(name).copied(),
             params_from: None,
             params: params.collect(),
         }
     }
-}
-
-fn lengths(at: Point) -> FixedList<Length, 2> {
-    FixedList([Length(at.x), Length(at.y)])
 }
 
 /// The inverse of [`to_json`]; parameters come from TOML, which has no `null`.

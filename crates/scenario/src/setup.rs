@@ -3,7 +3,7 @@
 use protocol::messages::{FieldError, LogFile, Range, Setup};
 use world::{Guests, Triangular};
 
-use super::checked::{Scenario, check_guests};
+use super::checked::{Obstacle, Scenario, check_guests};
 use super::placing;
 use crate::files;
 
@@ -24,7 +24,7 @@ impl Scenario {
             guests: u32::try_from(self.guests.count).unwrap_or(u32::MAX),
             guest_speed_mps: range(&self.guests.speed_mps),
             guest_duration_s: range(&self.guests.duration_s),
-            obstacles: self.obstacles.clone(),
+            obstacles: self.obstacles.iter().map(|obstacle| obstacle.at).collect(),
             robots: robots.collect(),
             log_file: LogFile {
                 enabled: self.record.log,
@@ -59,7 +59,7 @@ impl Scenario {
 
         scenario.field_m = setup.field_m;
         scenario.guests = self.guests_of(setup, &mut errors);
-        scenario.obstacles.clone_from(&setup.obstacles);
+        scenario.obstacles = self.obstacles_of(setup);
         scenario.place_robots(setup, &mut errors);
 
         scenario.record.log = setup.log_file.enabled;
@@ -82,6 +82,21 @@ impl Scenario {
         }
     }
 
+    /// The obstacles of a set-up, which has places only: one at the place of another keeps its shape.
+    fn obstacles_of(&self, setup: &Setup) -> Vec<Obstacle> {
+        let obstacles = setup.obstacles.iter().map(|at| {
+            let mut same = self.obstacles.iter().filter(|old| old.at == *at);
+            same.next().map_or_else(
+                || Obstacle::square(*at),
+                |old| Obstacle {
+                    drawn: None,
+                    ..old.clone()
+                },
+            )
+        });
+        obstacles.collect()
+    }
+
     fn guests_of(&self, setup: &Setup, errors: &mut Errors) -> Guests {
         let speed_mps = errors.triangular("guest_speed_mps", &setup.guest_speed_mps);
         let duration_s = errors.triangular("guest_duration_s", &setup.guest_duration_s);
@@ -101,7 +116,7 @@ impl Scenario {
             match setup.robots.get(name) {
                 Some(at) => {
                     robot.at = *at;
-                    robot.is_at_random = false;
+                    robot.drawn = None;
                 }
                 None => errors.add(&format!("robots.{name}"), &"its location is missing"),
             }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use protocol::messages::{Point, Variable};
 use serde::{Deserialize, Serialize};
-use world::RobotPlacer;
+use world::{Placer, Region};
 
 use super::checked::{Scenario, to_wire};
 
@@ -15,8 +15,8 @@ pub struct SiteSpec {
     pub kind: String,
     /// Its place, meters.
     pub at: Point,
-    /// Whether the place follows from the seed.
-    pub is_at_random: bool,
+    /// Where the place is drawn, if it follows from the seed.
+    pub drawn: Option<Region>,
     /// Distance within which robots sense it and may act on it, meters.
     pub range_m: f64,
     /// What happens where two robots change the same variable of it in a tick.
@@ -53,27 +53,27 @@ pub enum OnConflict {
 /// # Errors
 /// The name of a site that has no place, and why.
 pub(super) fn place_at_random(scenario: &mut Scenario) -> Result<(), (String, String)> {
-    let is_any_random = scenario.sites.values().any(|site| site.is_at_random);
+    let is_any_random = scenario.sites.values().any(|site| site.drawn.is_some());
     if !is_any_random {
         return Ok(());
     }
 
     let mut hall = scenario.hall();
     hall.robots.clear();
-    let placer = RobotPlacer::new(&hall);
+    let placer = Placer::new(&hall);
     let seed = scenario.seed;
     for (name, site) in &mut scenario.sites {
-        if !site.is_at_random {
+        let Some(region) = site.drawn else {
             continue;
-        }
+        };
         let refuse = |reason: String| (name.clone(), reason);
         // What is placed in a copy leaves no trace.
         let mut placer = placer.clone().map_err(|error| refuse(error.to_string()))?;
         let mut stream = protocol::random::stream(seed, &format!("at/{name}"));
-        let at = placer.place(&mut stream).ok_or_else(|| {
+        let at = placer.place(None, region, &mut stream).ok_or_else(|| {
             refuse(format!(
                 "there is no free place for site {name} in {} draws: the field is too full",
-                RobotPlacer::TRIES
+                Placer::TRIES
             ))
         })?;
         site.at = to_wire(at);

@@ -565,7 +565,11 @@ pub fn header(run: &RunName, simulation: &Simulation) -> Header {
         field_m: scenario.field_m,
         body_m: scenario.body_m,
         display_unit: scenario.display_unit,
-        obstacles: scenario.obstacles.iter().map(|at| [at.x, at.y]).collect(),
+        obstacles: scenario
+            .obstacles
+            .iter()
+            .map(|obstacle| [obstacle.at.x, obstacle.at.y])
+            .collect(),
         sites: crate::sites::at_start(scenario),
         robots: simulation.names().to_vec(),
     }

@@ -6,7 +6,7 @@ use protocol::RobotName;
 use protocol::Tick;
 use protocol::random::{stream, unit};
 use scenario::{Scenario, Sensing};
-use world::{Point, Rectangle, World, is_hidden};
+use world::{Opaque, Point, World, is_hidden};
 
 /// Ranges are sensed in steps of 0.1 mm, so that they are short in messages.
 const RANGE_STEPS_PER_M: f64 = 10_000.0;
@@ -20,8 +20,8 @@ pub(crate) struct Observer<'a> {
     at: Point,
     /// Direction of motion that it reported last, radians.
     heading_rad: f64,
-    /// The obstacles that may hide something from it, by index.
-    walls: Vec<(usize, Rectangle)>,
+    /// What may hide something from it; obstacles by index.
+    opaque: Vec<(Option<usize>, Opaque)>,
 }
 
 impl<'a> Observer<'a> {
@@ -36,8 +36,8 @@ impl<'a> Observer<'a> {
         reach_m: f64,
     ) -> Self {
         let sensing = &scenario.sensing;
-        let walls = if sensing.walls_hide {
-            world.walls_near(at, reach_m)
+        let opaque = if sensing.walls_hide {
+            world.opaque_near(at, reach_m)
         } else {
             Vec::new()
         };
@@ -48,7 +48,7 @@ impl<'a> Observer<'a> {
             robot,
             at,
             heading_rad,
-            walls,
+            opaque,
         }
     }
 
@@ -60,10 +60,10 @@ impl<'a> Observer<'a> {
         at: Point,
         obstacle: Option<usize>,
     ) -> Option<Point> {
-        let others = self.walls.iter();
-        let walls = others.filter(|(index, _)| Some(*index) != obstacle);
-        let walls = walls.map(|(_, wall)| wall);
-        if !self.looks_at(at) || is_hidden(self.at, at, walls) {
+        let all = self.opaque.iter();
+        let others = all.filter(|(index, _)| index.is_none() || *index != obstacle);
+        let others = others.map(|(_, opaque)| opaque);
+        if !self.looks_at(at) || is_hidden(self.at, at, others) {
             return None;
         }
         if self.sensing.misses == 0.0 && self.sensing.noise_m == 0.0 {

@@ -708,6 +708,7 @@ impl Simulation {
 
         Some(match by {
             world::Blocker::Edge => Blocker::Edge,
+            world::Blocker::Wall(_) => Blocker::Wall,
             world::Blocker::Body(Body::Obstacle(_)) => Blocker::Obstacle,
             world::Blocker::Body(Body::Guest(_)) => Blocker::Guest,
             world::Blocker::Body(Body::Robot(index)) => Blocker::Robot(self.names[index].clone()),

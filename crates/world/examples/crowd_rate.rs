@@ -7,7 +7,7 @@
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::time::Instant;
-use world::{Field, Guests, Hall, Triangular, World};
+use world::{Field, Guests, Hall, Shapes, Triangular, World};
 
 const FT: f64 = 0.3048;
 
@@ -62,6 +62,7 @@ fn hall(count: usize) -> Result<Hall, Box<dyn std::error::Error>> {
         },
         robots: Vec::new(),
         tick_s: 0.1,
+        shapes: Shapes::default(),
         max_speed_mps: 1.0,
     })
 }

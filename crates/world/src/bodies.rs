@@ -6,6 +6,9 @@
 use crate::grid::Grid;
 use crate::hall::Field;
 use crate::point::Point;
+use crate::shape::{Shape, Wall};
+use crate::shapes::Shapes;
+use crate::solids::{SolidBlocker, Solids};
 
 /// A body, identified by its kind and its index among bodies of that kind.
 ///
@@ -22,12 +25,13 @@ pub enum Body {
 
 /// What prevented a body from moving to its proposed location.
 ///
-/// When several obstructions apply, this is the edge if it is one of them, and otherwise the first body in the
-/// order of [`Body`].
+/// When several obstructions apply, this is the first of them in the order of this type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Blocker {
     /// The edge of the field.
     Edge,
+    /// A wall in the way, by index.
+    Wall(usize),
     /// A body that occupies part of the proposed location.
     Body(Body),
 }
@@ -50,6 +54,8 @@ pub(crate) struct Bodies {
     guests_from: usize,
     centers: Vec<Point>,
     grid: Grid,
+    /// Walls and shapes; `None` where all bodies are squares of one size, which are tested by their centers alone.
+    solids: Option<Box<Solids>>,
 }
 
 impl Bodies {
@@ -65,7 +71,53 @@ impl Bodies {
             guests_from: obstacles + robots,
             centers: Vec::with_capacity(count),
             grid: Grid::new(field.size_m, field.body_m, count),
+            solids: None,
         }
+    }
+
+    /// Adds walls, and shapes of bodies. All obstacles have been pushed, and no robot.
+    pub(crate) fn set_solids(&mut self, solids: Solids) {
+        self.solids = Some(Box::new(solids));
+    }
+
+    /// Adds the next body, a robot of this shape; see [`Self::push`].
+    pub(crate) fn push_shaped(&mut self, center: Point, shape: Option<Shape>) {
+        if let Some(shape) = shape {
+            let id = self.centers.len();
+            let field = self.field;
+            let obstacles = &self.centers[..self.robots_from];
+            let solids = self
+                .solids
+                .get_or_insert_with(|| Box::new(Solids::new(field, &Shapes::default(), obstacles)));
+            solids.set_shape(id, shape);
+        }
+        self.push(center);
+    }
+
+    pub(crate) fn walls(&self) -> &[Wall] {
+        self.solids.as_ref().map_or(&[], |solids| solids.walls())
+    }
+
+    /// The shape of a body.
+    pub(crate) fn shape(&self, body: Body) -> Shape {
+        let id = match body {
+            Body::Obstacle(index) => index,
+            Body::Robot(index) => self.robots_from + index,
+            Body::Guest(index) => self.guests_from + index,
+        };
+        self.shape_of(id)
+    }
+
+    fn shape_of(&self, id: usize) -> Shape {
+        match &self.solids {
+            Some(solids) => solids.shape(id),
+            None => Shape::square(self.field.body_m),
+        }
+    }
+
+    pub(crate) fn half_max_m(&self) -> f64 {
+        let solids = self.solids.as_ref();
+        solids.map_or(self.field.body_m * 0.5, |solids| solids.half_max_m())
     }
 
     pub(crate) fn field(&self) -> &Field {
@@ -98,14 +150,24 @@ impl Bodies {
         &self.centers[self.guests_from..]
     }
 
-    /// The first body, in the order of [`Body`], that a new body at this center would overlap.
-    pub(crate) fn hit(&self, center: Point) -> Option<Body> {
-        self.first_hit(center, usize::MAX).map(|id| self.body(id))
+    /// What a new body of this shape at this center would overlap; a square of the field if it has none of its own.
+    pub(crate) fn hit(&self, center: Point, shape: Option<Shape>) -> Option<Blocker> {
+        if self.solids.is_none() && shape.is_none() {
+            let id = self.first_hit(center, usize::MAX)?;
+            return Some(Blocker::Body(self.body(id)));
+        }
+        let shape = shape.unwrap_or(Shape::square(self.field.body_m));
+        self.first_blocker(shape, center, center, usize::MAX)
     }
 
-    /// The largest x, in meters, of the centers that a new body at this center would overlap.
+    /// The largest x, in meters, of the centers that a new square at this center would overlap. Anything but a square counts as
+    /// one with the same right edge.
     pub(crate) fn rightmost_hit_x_m(&self, center: Point) -> Option<f64> {
         let mut rightmost_x_m = None;
+
+        if let Some(solids) = &self.solids {
+            return self.rightmost_solid_x_m(solids, center);
+        }
 
         self.grid.visit_around(center, self.field.body_m, |id| {
             let other = self.centers[id];
@@ -115,6 +177,25 @@ impl Bodies {
                 rightmost_x_m = Some(other.x);
             }
         });
+
+        rightmost_x_m
+    }
+
+    fn rightmost_solid_x_m(&self, solids: &Solids, center: Point) -> Option<f64> {
+        let square = Shape::square(self.field.body_m);
+        let half_m = self.field.body_m * 0.5;
+        let mut rightmost_x_m = solids.rightmost_x_m(center).map(|x_m| x_m - half_m);
+
+        self.grid
+            .visit_around(center, solids.reach_m(square), |id| {
+                let shape = solids.shape(id);
+                let at = self.centers[id];
+                if square.overlaps(center, shape, at) {
+                    let x_m = at.x + shape.half_m().0 - half_m;
+                    rightmost_x_m =
+                        Some(rightmost_x_m.map_or(x_m, |other_m: f64| other_m.max(x_m)));
+                }
+            });
 
         rightmost_x_m
     }
@@ -134,6 +215,10 @@ impl Bodies {
 
     /// The collision rule of the paper ("Obstacles"): a body that would collide is not advanced.
     fn advance(&mut self, id: usize, to: Point) -> Result<(), Blocker> {
+        if self.solids.is_some() {
+            return self.advance_shaped(id, to);
+        }
+
         if !self.field.contains(to) {
             return Err(Blocker::Edge);
         }
@@ -145,6 +230,60 @@ impl Bodies {
         self.centers[id] = to;
         self.grid.relocate(id, to);
         Ok(())
+    }
+
+    /// The same rule among walls and shapes. The way to the proposed location counts as well, but only for walls and for
+    /// obstacles with a shape of their own.
+    fn advance_shaped(&mut self, id: usize, to: Point) -> Result<(), Blocker> {
+        let shape = self.shape_of(id);
+        if !shape.is_inside(to, self.field.size_m) {
+            return Err(Blocker::Edge);
+        }
+
+        if let Some(by) = self.first_blocker(shape, self.centers[id], to, id) {
+            return Err(by);
+        }
+
+        self.centers[id] = to;
+        self.grid.relocate(id, to);
+        Ok(())
+    }
+
+    /// What is in the way of a body of this shape, other than `except`.
+    fn first_blocker(
+        &self,
+        shape: Shape,
+        from: Point,
+        to: Point,
+        except: usize,
+    ) -> Option<Blocker> {
+        let default = Shape::square(self.field.body_m);
+        let mut first = usize::MAX;
+        let mut reach_m = 0.0;
+
+        if let Some(solids) = &self.solids {
+            match solids.blocker(shape, from, to) {
+                Some(SolidBlocker::Wall(index)) => return Some(Blocker::Wall(index)),
+                Some(SolidBlocker::Obstacle(id)) => first = id,
+                None => {}
+            }
+            reach_m = solids.reach_m(shape);
+        } else {
+            let (half_x_m, half_y_m) = shape.half_m();
+            reach_m += half_x_m.max(half_y_m) + self.field.body_m * 0.5;
+        }
+
+        self.grid.visit_around(to, reach_m, |id| {
+            let other = self
+                .solids
+                .as_ref()
+                .map_or(default, |solids| solids.shape(id));
+            if id < first && id != except && shape.overlaps(to, other, self.centers[id]) {
+                first = id;
+            }
+        });
+
+        (first != usize::MAX).then(|| Blocker::Body(self.body(first)))
     }
 
     /// The smallest number of a body, other than `except`, that a body at this center would overlap.
@@ -195,8 +334,14 @@ impl Bodies {
             }
         });
 
+        // What may be long, such as a wall of a building, is near where any part of it is.
+        if let Some(solids) = &self.solids {
+            ids.extend(solids.obstacles_near(point, range_m));
+        }
+
         // The grid visits bodies in no particular order.
         ids.sort_unstable();
+        ids.dedup();
         ids
     }
 }
@@ -205,6 +350,7 @@ impl Bodies {
 mod tests {
     use crate::hall::{Field, Guests, Hall};
     use crate::placing::place;
+    use crate::shapes::Shapes;
     use crate::triangular::Triangular;
     use rand::SeedableRng;
     use rand_xoshiro::Xoshiro256PlusPlus;
@@ -226,6 +372,7 @@ mod tests {
                 duration_s: still,
             },
             robots: Vec::new(),
+            shapes: Shapes::default(),
             tick_s: 0.1,
             max_speed_mps: 1.0,
         };

@@ -2,6 +2,7 @@
 //!
 //! They carry indices and positions, so that a caller that knows the bodies' names can report them.
 
+use crate::limits::{BODY_MIN_M, SIDE_MAX_M};
 use crate::point::Point;
 use std::fmt;
 
@@ -60,6 +61,43 @@ pub enum HallError {
         /// The limit, [`BODIES_MAX`](crate::BODIES_MAX).
         max: usize,
     },
+    /// More of something than a world supports.
+    TooMany {
+        /// What, in words.
+        name: &'static str,
+        /// How many there are.
+        count: usize,
+        /// The limit, [`WALLS_MAX`](crate::WALLS_MAX).
+        max: usize,
+    },
+    /// An end of a wall is not on the field.
+    WallOffField {
+        /// Index of the wall.
+        index: usize,
+        /// The end.
+        at: Point,
+    },
+    /// A wall is shorter than [`BODY_MIN_M`](crate::BODY_MIN_M).
+    WallTooShort {
+        /// Index of the wall.
+        index: usize,
+        /// One of its ends.
+        at: Point,
+    },
+    /// An obstacle is smaller than [`BODY_MIN_M`](crate::BODY_MIN_M) or larger than [`SIDE_MAX_M`](crate::SIDE_MAX_M).
+    ObstacleSize {
+        /// Index of the obstacle.
+        index: usize,
+        /// Its extent, m.
+        value_m: f64,
+    },
+    /// A robot is smaller than [`BODY_MIN_M`](crate::BODY_MIN_M) or larger than [`SIDE_MAX_M`](crate::SIDE_MAX_M).
+    RobotSize {
+        /// Index of the robot.
+        index: usize,
+        /// Its extent, m.
+        value_m: f64,
+    },
     /// A fixed obstacle is not entirely inside the field.
     ObstacleOffField {
         /// Index of the obstacle.
@@ -82,6 +120,15 @@ pub enum HallError {
         at: Point,
         /// Index of the obstacle; the first one if there are several.
         obstacle: usize,
+    },
+    /// A robot stands on a wall.
+    RobotOnWall {
+        /// Index of the robot.
+        index: usize,
+        /// Its center.
+        at: Point,
+        /// Index of the wall; the first one if there are several.
+        wall: usize,
     },
     /// A robot overlaps another one that precedes it in the list.
     RobotOnRobot {
@@ -130,6 +177,26 @@ impl fmt::Display for HallError {
                     "{count} bodies are too many; at most {max} are supported"
                 )
             }
+            Self::TooMany { name, count, max } => {
+                write!(
+                    f,
+                    "{count} {name} are too many; at most {max} are supported"
+                )
+            }
+            Self::WallOffField { index, at } => {
+                write!(
+                    f,
+                    "wall {index} has an end at {at} m, which is not on the field"
+                )
+            }
+            Self::WallTooShort { index, at } => {
+                write!(f, "wall {index} at {at} m is shorter than {BODY_MIN_M} m")
+            }
+            Self::ObstacleSize { index, value_m } => size(f, "obstacle", index, value_m),
+            Self::RobotSize { index, value_m } => size(f, "robot", index, value_m),
+            Self::RobotOnWall { index, at, wall } => {
+                write!(f, "robot {index} at {at} m stands on wall {wall}")
+            }
             Self::ObstacleOffField { index, at } => off_field(f, "obstacle", index, at),
             Self::RobotOffField { index, at } => off_field(f, "robot", index, at),
             Self::RobotOnObstacle {
@@ -150,6 +217,13 @@ impl fmt::Display for HallError {
             }
         }
     }
+}
+
+fn size(f: &mut fmt::Formatter<'_>, kind: &str, index: usize, value_m: f64) -> fmt::Result {
+    write!(
+        f,
+        "{kind} {index} is {value_m:?} m wide or high; must be a number from {BODY_MIN_M:?} to {SIDE_MAX_M:?}"
+    )
 }
 
 fn off_field(f: &mut fmt::Formatter<'_>, kind: &str, index: usize, at: Point) -> fmt::Result {

@@ -1,36 +1,15 @@
-//! The description from which a world is built, and the limits within which its arithmetic is valid.
+//! The description from which a world is built.
 
 use crate::error::HallError;
+use crate::limits::{
+    BODIES_MAX, BODY_MIN_M, SIDE_MAX_M, SPEED_MAX_MPS, TICK_MAX_S, TICK_MIN_S, TOLERANCE_M,
+};
 use crate::point::Point;
+use crate::shapes::Shapes;
 use crate::triangular::Triangular;
 
-/// How far two bodies may overlap, or a body extend beyond the field, and still count as touching: 1 nm \[chosen
-/// here\].
-///
-/// Positions are converted from feet, parsed from JSON and summed from steps, so squares that are meant to touch
-/// are off by a few units in the last place. On fields up to [`SIDE_MAX_M`] these errors stay below the tolerance.
-/// The tolerance does not accumulate, because each test uses the bodies' actual positions.
-pub const TOLERANCE_M: f64 = 1e-9;
-
-/// Maximum side of a field, 1,000 km; beyond that, the spacing of `f64` approaches [`TOLERANCE_M`] \[chosen here\].
-pub const SIDE_MAX_M: f64 = 1e6;
-
-/// Minimum side of a body, 1 mm, a million times [`TOLERANCE_M`] \[chosen here\].
-pub const BODY_MIN_M: f64 = 1e-3;
-
-/// Maximum number of obstacles, robots and guests together \[chosen here\]. A world of that size takes up to 2.5 GB.
-pub const BODIES_MAX: usize = 1 << 24;
-
-/// Minimum length of a tick, 1 µs \[chosen here\].
-const TICK_MIN_S: f64 = 1e-6;
-
-/// Maximum length of a tick, 11 days \[chosen here\].
-const TICK_MAX_S: f64 = 1e6;
-
-/// Maximum speed limit of robots, which crosses the largest field in one second \[chosen here\].
-const SPEED_MAX_MPS: f64 = 1e6;
-
-/// The plane `[0, width] x [0, height]`, on which every body is an axis-aligned square given by its center.
+/// The plane `[0, width] x [0, height]`, on which a body is an axis-aligned square given by its center, unless
+/// [`Hall::shapes`] gives it another shape.
 ///
 /// In the paper all objects occupy 2 ft by 2 ft ("Obstacles"). Making that size configurable is a choice of this
 /// crate.
@@ -38,7 +17,7 @@ const SPEED_MAX_MPS: f64 = 1e6;
 pub struct Field {
     /// Width and height, m; at most [`SIDE_MAX_M`].
     pub size_m: (f64, f64),
-    /// Side of every body, m; at least [`BODY_MIN_M`].
+    /// Side of every body without a shape of its own, m; at least [`BODY_MIN_M`].
     pub body_m: f64,
 }
 
@@ -120,6 +99,8 @@ pub struct Hall {
     pub guests: Guests,
     /// Initial centers of the robots, m. Robots move in the order of this list.
     pub robots: Vec<Point>,
+    /// Walls, and the bodies that are not squares of [`Field::body_m`].
+    pub shapes: Shapes,
     /// Length of a tick, simulated seconds; from 1e-6 to 1e6.
     pub tick_s: f64,
     /// Speed limit of robots, m/s, from 0 (robots cannot move) to 1e6. It does not apply to guests.
@@ -142,6 +123,8 @@ impl Hall {
         self.field.check()?;
         in_range("tick_s", self.tick_s, TICK_MIN_S, TICK_MAX_S)?;
         in_range("max_speed_mps", self.max_speed_mps, 0.0, SPEED_MAX_MPS)?;
+
+        self.shapes.check(self.field.size_m)?;
 
         let count = self.body_count();
         if count > BODIES_MAX {

@@ -5,7 +5,7 @@
 //! the proposals passed to [`World::advance`]. The same three inputs give bit-identical positions on every machine.
 //!
 //! The rules are those of the paper (CARS, 2002, section "Obstacles"). Every body occupies a square of the same
-//! size. Guests walk in a straight line for a while, then choose a new one, unless they react to a robot
+//! size, unless the hall gives it another [`Shape`] (chosen here, as are walls). Guests walk in a straight line for a while, then choose a new one, unless they react to a robot
 //! ([`Reaction`], chosen here). A body whose proposed location collides is not advanced. How a robot reacts to a collision is up to the robot and not part of this crate.
 //!
 //! # One tick
@@ -13,7 +13,8 @@
 //! Robots move first, in index order, followed by the guests, in index order. Each body's proposed location is
 //! tested against the *current* positions of all other bodies; the body then either moves there or stays in place.
 //! Because bodies move one at a time in this fixed order, no two bodies ever overlap and no body leaves the field.
-//! As in the paper, only the proposed location is tested, and not the path to it.
+//! As in the paper, only the proposed location is tested, and not the path to it. Walls, and obstacles with a shape of their
+//! own, are tested against the straight path: no body passes through one, however fast it is.
 //!
 //! # Random draws
 //!
@@ -31,7 +32,7 @@
 //! ```
 //! use rand::SeedableRng;
 //! use rand_xoshiro::Xoshiro256PlusPlus;
-//! use world::{Field, Guests, Hall, MoveOutcome, Point, Triangular, World};
+//! use world::{Field, Guests, Hall, MoveOutcome, Point, Shapes, Triangular, World};
 //!
 //! const FT: f64 = 0.3048;
 //! let hall = Hall {
@@ -43,6 +44,7 @@
 //!         duration_s: Triangular::new(1.0, 3.0, 8.0)?,
 //!     },
 //!     robots: vec![Point::new(25.0 * FT, 25.0 * FT)],
+//!     shapes: Shapes::default(),
 //!     tick_s: 0.1,
 //!     max_speed_mps: 2.0 * FT,
 //! };
@@ -61,20 +63,29 @@ mod error;
 mod grid;
 mod guests;
 mod hall;
+mod limits;
 mod motion;
 mod placing;
 mod point;
 mod reactions;
+mod shape;
+mod shapes;
 mod sight;
+mod solids;
 mod triangular;
+mod wheels;
 
 pub use bodies::{Blocker, Body, Near};
 pub use error::{HallError, TriangularError};
 pub use guests::Course;
-pub use hall::{BODIES_MAX, BODY_MIN_M, Field, Guests, Hall, SIDE_MAX_M, TOLERANCE_M};
+pub use hall::{Field, Guests, Hall};
+pub use limits::{BODIES_MAX, BODY_MIN_M, SIDE_MAX_M, TOLERANCE_M, WALLS_MAX};
 pub use motion::{MoveOutcome, World};
-pub use placing::RobotPlacer;
+pub use placing::{Placer, Region};
 pub use point::Point;
 pub use reactions::{Reaction, Response};
-pub use sight::{Rectangle, is_hidden};
+pub use shape::{Shape, Wall};
+pub use shapes::Shapes;
+pub use sight::{Opaque, is_hidden};
 pub use triangular::Triangular;
+pub use wheels::{Pose, Velocity, Wheels};

@@ -1,12 +1,14 @@
 //! The world and its step function.
 
-use crate::bodies::{Blocker, Bodies, Near};
+use crate::bodies::{Blocker, Bodies, Body, Near};
 use crate::error::HallError;
 use crate::guests::{Course, Crowd};
-use crate::hall::{Field, Hall, TOLERANCE_M};
+use crate::hall::{Field, Hall};
+use crate::limits::TOLERANCE_M;
 use crate::placing::place;
 use crate::point::Point;
 use crate::reactions::{Reaction, directions};
+use crate::shape::{Shape, Wall};
 use rand::Rng;
 
 /// The outcome of a robot's proposal.
@@ -182,6 +184,23 @@ impl<R> World<R> {
         self.bodies.guests()
     }
 
+    /// The walls, in the hall's order.
+    #[must_use]
+    pub fn walls(&self) -> &[Wall] {
+        self.bodies.walls()
+    }
+
+    /// The shape of a body. One that does not exist is a square of the field.
+    #[must_use]
+    pub fn shape(&self, body: Body) -> Shape {
+        self.bodies.shape(body)
+    }
+
+    /// The largest half extent of a body that moves, or of an obstacle without a shape of its own, m.
+    pub(crate) fn half_max_m(&self) -> f64 {
+        self.bodies.half_max_m()
+    }
+
     /// The guests' courses, by index.
     #[must_use]
     pub fn courses(&self) -> &[Course] {
@@ -198,6 +217,8 @@ impl<R> World<R> {
 
     /// All bodies whose center is at most `range_m` from `point`, in the order of [`Body`](crate::Body): by kind,
     /// then by index.
+    ///
+    /// An obstacle with a shape of its own is near where any part of it is.
     ///
     /// The result includes a body centered at `point` itself. It is empty if `point` is not finite or if `range_m`
     /// is negative or NaN. An infinite range returns every body.

@@ -1,9 +1,12 @@
 //! Initial placement of the bodies.
 
-use crate::bodies::{Bodies, Body};
+use crate::bodies::{Blocker, Bodies, Body};
 use crate::error::HallError;
-use crate::hall::{Field, Hall, TOLERANCE_M};
+use crate::hall::{Field, Hall};
+use crate::limits::TOLERANCE_M;
 use crate::point::Point;
+use crate::shape::Shape;
+use crate::solids::Solids;
 use rand::{Rng, RngExt};
 
 /// Number of attempts to place a body at random before giving up on rejection sampling.
@@ -12,14 +15,30 @@ use rand::{Rng, RngExt};
 /// of so many misses is 1 %. Beyond that point, arranging the guests in rows is much faster.
 const TRIES: usize = 1000;
 
-/// Places robots at random in a hall before it becomes a [`World`](crate::World), each from a random stream of its own.
+/// Where the center of a body is drawn, uniformly.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Region {
+    /// Anywhere on the field where the body is inside.
+    Field,
+    /// A rectangle with sides along the axes, between two of its corners, m.
+    Rectangle(Point, Point),
+    /// A disc.
+    Disc {
+        /// Its center, m.
+        center: Point,
+        /// Its radius, m.
+        radius_m: f64,
+    },
+}
+
+/// Places bodies at random in a hall before it becomes a [`World`](crate::World), each from a random stream of its own.
 #[derive(Clone, Debug)]
-pub struct RobotPlacer {
+pub struct Placer {
     bodies: Bodies,
 }
 
-impl RobotPlacer {
-    /// How often a place is drawn before a robot has none.
+impl Placer {
+    /// How often a place is drawn before a body has none.
     pub const TRIES: usize = TRIES;
 
     /// The obstacles of a hall and its robots, which are those with a given place; its guests are placed later.
@@ -30,73 +49,90 @@ impl RobotPlacer {
     pub fn new(hall: &Hall) -> Result<Self, HallError> {
         hall.check()?;
 
-        let mut bodies = Bodies::new(hall.field, hall.obstacles.len(), hall.robots.len(), 0);
-        place_obstacles(&mut bodies, &hall.obstacles)?;
-        place_robots(&mut bodies, &hall.robots)?;
-        Ok(Self { bodies })
+        Ok(Self {
+            bodies: place_given(hall, 0)?,
+        })
     }
 
-    /// Places one more robot, uniformly where it overlaps no other body: draws x, then y, for each attempt. `None` if all
-    /// [`Self::TRIES`] attempts overlap one.
-    pub fn place(&mut self, rng: &mut impl Rng) -> Option<Point> {
-        let at = random_free_place(&self.bodies, rng)?;
-        self.bodies.push(at);
+    /// Places one more body, uniformly in a region where it overlaps no other body: draws x, then y, for each attempt. `None` if
+    /// all [`Self::TRIES`] attempts overlap one, or the edge. Without a shape it is a square of the field.
+    pub fn place(
+        &mut self,
+        shape: Option<Shape>,
+        region: Region,
+        rng: &mut impl Rng,
+    ) -> Option<Point> {
+        let at = random_free_place(&self.bodies, shape, region, rng)?;
+        self.bodies.push_shaped(at, shape);
         Some(at)
     }
 }
 
 /// Places all bodies of the hall. The guests' positions are drawn from `rng`.
 pub(crate) fn place(hall: &Hall, rng: &mut impl Rng) -> Result<Bodies, HallError> {
-    let mut bodies = Bodies::new(
-        hall.field,
-        hall.obstacles.len(),
-        hall.robots.len(),
-        hall.guests.count,
-    );
-
-    place_obstacles(&mut bodies, &hall.obstacles)?;
-    place_robots(&mut bodies, &hall.robots)?;
+    let mut bodies = place_given(hall, hall.guests.count)?;
     place_guests(&mut bodies, hall.guests.count, rng)?;
 
     Ok(bodies)
 }
 
-fn place_obstacles(bodies: &mut Bodies, obstacles: &[Point]) -> Result<(), HallError> {
-    for (index, &at) in obstacles.iter().enumerate() {
-        if !bodies.field().contains(at) {
+/// Places the obstacles and robots of the hall, with room for guests.
+fn place_given(hall: &Hall, guests: usize) -> Result<Bodies, HallError> {
+    let (obstacles, robots) = (hall.obstacles.len(), hall.robots.len());
+    let mut bodies = Bodies::new(hall.field, obstacles, robots, guests);
+
+    for (index, &at) in hall.obstacles.iter().enumerate() {
+        let shape = hall.shapes.obstacles.get(&index).copied();
+        if !is_inside(&hall.field, shape, at) {
             return Err(HallError::ObstacleOffField { index, at });
         }
 
         bodies.push(at);
     }
-
-    Ok(())
-}
-
-fn place_robots(bodies: &mut Bodies, robots: &[Point]) -> Result<(), HallError> {
-    for (index, &at) in robots.iter().enumerate() {
-        check_robot(bodies, index, at)?;
-        bodies.push(at);
+    if !hall.shapes.is_empty() {
+        bodies.set_solids(Solids::new(hall.field, &hall.shapes, &hall.obstacles));
     }
 
-    Ok(())
+    for (index, &at) in hall.robots.iter().enumerate() {
+        let shape = hall.shapes.robots.get(&index).copied();
+        check_robot(&bodies, index, shape, at)?;
+        bodies.push(at);
+    }
+    Ok(bodies)
+}
+
+fn is_inside(field: &Field, shape: Option<Shape>, at: Point) -> bool {
+    match shape {
+        Some(shape) => shape.is_inside(at, field.size_m),
+        None => field.contains(at),
+    }
 }
 
 /// Checks that a robot can be placed at `at`.
-fn check_robot(bodies: &Bodies, index: usize, at: Point) -> Result<(), HallError> {
-    if !bodies.field().contains(at) {
+fn check_robot(
+    bodies: &Bodies,
+    index: usize,
+    shape: Option<Shape>,
+    at: Point,
+) -> Result<(), HallError> {
+    if !is_inside(bodies.field(), shape, at) {
         return Err(HallError::RobotOffField { index, at });
     }
 
-    match bodies.hit(at) {
+    match bodies.hit(at, shape) {
         None => Ok(()),
-        Some(Body::Obstacle(obstacle)) => Err(HallError::RobotOnObstacle {
+        Some(Blocker::Wall(wall)) => Err(HallError::RobotOnWall { index, at, wall }),
+        Some(Blocker::Body(Body::Obstacle(obstacle))) => Err(HallError::RobotOnObstacle {
             index,
             at,
             obstacle,
         }),
-        Some(Body::Robot(other)) => Err(HallError::RobotOnRobot { index, at, other }),
-        Some(Body::Guest(_)) => unreachable!("guests are placed after the robots"),
+        Some(Blocker::Body(Body::Robot(other))) => {
+            Err(HallError::RobotOnRobot { index, at, other })
+        }
+        Some(Blocker::Edge | Blocker::Body(Body::Guest(_))) => {
+            unreachable!("the edge is tested before, and guests are placed after the robots")
+        }
     }
 }
 
@@ -119,7 +155,7 @@ fn place_guests(bodies: &mut Bodies, count: usize, rng: &mut impl Rng) -> Result
 /// for one of them.
 fn scatter(bodies: &mut Bodies, guests: usize, rng: &mut impl Rng) -> bool {
     for _ in 0..guests {
-        let Some(at) = random_free_place(bodies, rng) else {
+        let Some(at) = random_free_place(bodies, None, Region::Field, rng) else {
             return false;
         };
         bodies.push(at);
@@ -128,10 +164,22 @@ fn scatter(bodies: &mut Bodies, guests: usize, rng: &mut impl Rng) -> bool {
     true
 }
 
-fn random_free_place(bodies: &Bodies, rng: &mut impl Rng) -> Option<Point> {
+fn random_free_place(
+    bodies: &Bodies,
+    shape: Option<Shape>,
+    region: Region,
+    rng: &mut impl Rng,
+) -> Option<Point> {
     for _ in 0..TRIES {
-        let at = random_place(bodies.field(), rng);
-        if bodies.hit(at).is_none() {
+        let at = match region {
+            Region::Field => random_place(bodies.field(), shape, rng),
+            Region::Rectangle(from, to) => random_between(from, to, rng),
+            Region::Disc { center, radius_m } => random_in_disc(center, radius_m, rng),
+        };
+
+        // On the field a place is inside by itself, and the first bodies of the paper's hall are drawn often.
+        let is_on_field = region == Region::Field || is_inside(bodies.field(), shape, at);
+        if is_on_field && bodies.hit(at, shape).is_none() {
             return Some(at);
         }
     }
@@ -139,14 +187,35 @@ fn random_free_place(bodies: &Bodies, rng: &mut impl Rng) -> Option<Point> {
     None
 }
 
-fn random_place(field: &Field, rng: &mut impl Rng) -> Point {
+fn random_place(field: &Field, shape: Option<Shape>, rng: &mut impl Rng) -> Point {
     let (width_m, height_m) = field.size_m;
     let body_m = field.body_m;
+    let (half_x_m, half_y_m) = shape.map_or((body_m * 0.5, body_m * 0.5), Shape::half_m);
+    let (x_m, y_m) = shape.map_or((body_m, body_m), |_| (half_x_m * 2.0, half_y_m * 2.0));
 
-    let x = body_m * 0.5 + rng.random::<f64>() * (width_m - body_m);
-    let y = body_m * 0.5 + rng.random::<f64>() * (height_m - body_m);
+    let x = half_x_m + rng.random::<f64>() * (width_m - x_m);
+    let y = half_y_m + rng.random::<f64>() * (height_m - y_m);
 
     Point::new(x, y)
+}
+
+fn random_between(from: Point, to: Point, rng: &mut impl Rng) -> Point {
+    let x = from.x + rng.random::<f64>() * (to.x - from.x);
+    let y = from.y + rng.random::<f64>() * (to.y - from.y);
+
+    Point::new(x, y)
+}
+
+/// A place in the square around the disc, or its center if that place is outside the disc 64 times in a row.
+fn random_in_disc(center: Point, radius_m: f64, rng: &mut impl Rng) -> Point {
+    let half = Point::new(radius_m, radius_m);
+    for _ in 0..64 {
+        let at = random_between(center - half, center + half, rng);
+        if (at - center).length_squared_m2() <= radius_m * radius_m {
+            return at;
+        }
+    }
+    center
 }
 
 /// Assigns each guest a random position of the layout in rows.

@@ -4,7 +4,7 @@
 //! course: the course goes on underneath and its duration counts down, so that the guests' draws do not depend on robots.
 
 use crate::bodies::{Bodies, Body};
-use crate::hall::TOLERANCE_M;
+use crate::limits::TOLERANCE_M;
 use crate::point::Point;
 
 /// What guests near a robot do in one tick.

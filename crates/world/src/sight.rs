@@ -1,32 +1,79 @@
-//! What is seen from a place: what hides what, and how far it is to the next body in a direction.
+//! What is seen from a place: what hides what, and how far it is to the next thing in a direction.
 
 use crate::bodies::Body;
 use crate::motion::World;
 use crate::point::Point;
+use crate::shape::{Shape, Wall};
 
-/// A rectangle whose sides are parallel to the field's.
+/// Something that is not looked through.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rectangle {
-    /// Its center, m.
-    pub center: Point,
-    /// Half of its width and half of its height, m.
-    pub half_m: (f64, f64),
+pub enum Opaque {
+    /// A body.
+    Body {
+        /// Its shape.
+        shape: Shape,
+        /// Its center, m.
+        at: Point,
+    },
+    /// A wall.
+    Wall(Wall),
 }
 
-impl Rectangle {
-    /// The share of the way from `from` to `to` after which the way enters the rectangle: 0 if it begins inside. `None` if it
-    /// passes by, or only touches an edge.
+impl Opaque {
+    /// The share of the way from `from` to `to` after which the way enters it: 0 if it begins inside. `None` if it passes by, or
+    /// only touches it, or ends at it.
     #[must_use]
     pub fn entered_after(&self, from: Point, to: Point) -> Option<f64> {
-        let along = [
-            crossed(from.x, to.x, self.center.x, self.half_m.0),
-            crossed(from.y, to.y, self.center.y, self.half_m.1),
-        ];
-        let [(enter_x, leave_x), (enter_y, leave_y)] = along;
-        let enter = enter_x.max(enter_y).max(0.0);
-        let leave = leave_x.min(leave_y).min(1.0);
-        (enter < leave).then_some(enter)
+        let (enter, leave) = match *self {
+            Self::Body { shape, at } => match shape {
+                Shape::Rectangle { .. } => crossed_rectangle(from, to, at, shape.half_m()),
+                Shape::Disc { radius_m } => crossed_disc(from, to, at, radius_m)?,
+            },
+            Self::Wall(wall) => return crossed_wall(from, to, &wall),
+        };
+        let enter = enter.max(0.0);
+        (enter < leave.min(1.0)).then_some(enter)
     }
+}
+
+/// The shares of a way between which it is in a rectangle; the first is not below the second if it never is.
+fn crossed_rectangle(from: Point, to: Point, center: Point, half_m: (f64, f64)) -> (f64, f64) {
+    let (enter_x, leave_x) = crossed(from.x, to.x, center.x, half_m.0);
+    let (enter_y, leave_y) = crossed(from.y, to.y, center.y, half_m.1);
+    (enter_x.max(enter_y), leave_x.min(leave_y))
+}
+
+/// The shares of a way between which it is in a disc; `None` if it never is.
+fn crossed_disc(from: Point, to: Point, center: Point, radius_m: f64) -> Option<(f64, f64)> {
+    let (step, offset) = (to - from, from - center);
+    // |offset + share step| = radius is a quadratic equation in the share.
+    let step_m2 = step.length_squared_m2();
+    let outside_m2 = offset.length_squared_m2() - radius_m * radius_m;
+    if step_m2 == 0.0 {
+        return (outside_m2 < 0.0).then_some((f64::NEG_INFINITY, f64::INFINITY));
+    }
+    let half_b = offset.x * step.x + offset.y * step.y;
+    let discriminant = half_b * half_b - step_m2 * outside_m2;
+    if discriminant <= 0.0 {
+        return None;
+    }
+    let root = discriminant.sqrt();
+    Some(((-half_b - root) / step_m2, (-half_b + root) / step_m2))
+}
+
+/// The share of a way at which it crosses a wall, both ends of the wall included.
+fn crossed_wall(from: Point, to: Point, wall: &Wall) -> Option<f64> {
+    let cross = |one: Point, other: Point| one.x * other.y - one.y * other.x;
+    let (step, along, offset) = (to - from, wall.to - wall.from, wall.from - from);
+    let area = cross(step, along);
+    if area == 0.0 {
+        // A wall has no thickness: nobody sees it from its end.
+        return None;
+    }
+    let share = cross(offset, along) / area;
+    let share_of_wall = cross(offset, step) / area;
+    let is_crossed = (0.0..1.0).contains(&share) && (0.0..=1.0).contains(&share_of_wall);
+    is_crossed.then_some(share)
 }
 
 /// The shares of a way between which one of its coordinates is within `half` of `center`; they are equal if it never is.
@@ -45,52 +92,50 @@ fn crossed(from: f64, to: f64, center: f64, half: f64) -> (f64, f64) {
     (one.min(other), one.max(other))
 }
 
-/// Whether one of these rectangles lies on the way from `from` to `to`.
+/// Whether one of these lies on the way from `from` to `to`.
 #[must_use]
-pub fn is_hidden<'a>(
-    from: Point,
-    to: Point,
-    walls: impl IntoIterator<Item = &'a Rectangle>,
-) -> bool {
-    let mut walls = walls.into_iter();
-    walls.any(|wall| wall.entered_after(from, to).is_some())
+pub fn is_hidden<'a>(from: Point, to: Point, opaque: impl IntoIterator<Item = &'a Opaque>) -> bool {
+    let mut opaque = opaque.into_iter();
+    opaque.any(|opaque| opaque.entered_after(from, to).is_some())
 }
 
 impl<R> World<R> {
-    /// The fixed obstacles that may hide something within `range_m` of a place, by index.
+    /// The walls and the fixed obstacles that may hide something within `range_m` of a place; obstacles with their index.
     #[must_use]
-    pub fn walls_near(&self, from: Point, range_m: f64) -> Vec<(usize, Rectangle)> {
-        let mut walls = Vec::new();
-        for (body, rectangle) in self.rectangles_near(from, range_m) {
-            if let Body::Obstacle(index) = body {
-                walls.push((index, rectangle));
-            }
-        }
-        walls
+    pub fn opaque_near(&self, from: Point, range_m: f64) -> Vec<(Option<usize>, Opaque)> {
+        let walls = self.walls_near(from, range_m).map(|wall| (None, wall));
+        let bodies = self.bodies_near(from, range_m).into_iter();
+        let obstacles = bodies.filter_map(|(body, opaque)| match body {
+            Body::Obstacle(index) => Some((Some(index), opaque)),
+            Body::Robot(_) | Body::Guest(_) => None,
+        });
+        walls.chain(obstacles).collect()
     }
 
-    /// The distance from a robot's center in each of these directions to the next body or the edge of the field, m; at most
+    /// The distance from a robot's center in each of these directions to the next body, wall or edge of the field, m; at most
     /// `range_m`. Directions are vectors of length 1.
     #[must_use]
     pub fn ranges_m(&self, robot: usize, directions: &[Point], range_m: f64) -> Vec<f64> {
         let from = self.robots()[robot];
-        let bodies = self.rectangles_near(from, range_m);
+        let bodies = self.bodies_near(from, range_m).into_iter();
+        let others = bodies.filter(|(body, _)| *body != Body::Robot(robot));
+        let opaque: Vec<Opaque> = others
+            .map(|(_, opaque)| opaque)
+            .chain(self.walls_near(from, range_m))
+            .collect();
         let (width_m, height_m) = self.field().size_m;
-        let field = Rectangle {
-            center: Point::new(width_m * 0.5, height_m * 0.5),
-            half_m: (width_m * 0.5, height_m * 0.5),
-        };
+        let (center, half_m) = (
+            Point::new(width_m * 0.5, height_m * 0.5),
+            (width_m * 0.5, height_m * 0.5),
+        );
 
         let mut ranges = Vec::with_capacity(directions.len());
         for direction in directions {
             let to = from + *direction * range_m;
-            let (_, leave_x) = crossed(from.x, to.x, field.center.x, field.half_m.0);
-            let (_, leave_y) = crossed(from.y, to.y, field.center.y, field.half_m.1);
-            let mut nearest = leave_x.min(leave_y).clamp(0.0, 1.0);
-            for (body, rectangle) in &bodies {
-                if *body != Body::Robot(robot)
-                    && let Some(share) = rectangle.entered_after(from, to)
-                {
+            let (_, edge) = crossed_rectangle(from, to, center, half_m);
+            let mut nearest = edge.clamp(0.0, 1.0);
+            for opaque in &opaque {
+                if let Some(share) = opaque.entered_after(from, to) {
                     nearest = nearest.min(share);
                 }
             }
@@ -99,17 +144,28 @@ impl<R> World<R> {
         ranges
     }
 
+    /// The walls of which a part may be within `range_m` of a place.
+    fn walls_near(&self, from: Point, range_m: f64) -> impl Iterator<Item = Opaque> {
+        let is_near = move |one_m: f64, other_m: f64, at_m: f64| {
+            one_m.min(other_m) <= at_m + range_m && at_m - range_m <= one_m.max(other_m)
+        };
+        let walls = self.walls().iter().filter(move |wall| {
+            is_near(wall.from.x, wall.to.x, from.x) && is_near(wall.from.y, wall.to.y, from.y)
+        });
+        walls.map(|wall| Opaque::Wall(*wall))
+    }
+
     /// The bodies of which a part may be within `range_m` of a place.
-    fn rectangles_near(&self, from: Point, range_m: f64) -> Vec<(Body, Rectangle)> {
-        // The center of a square is less than a side from its corners.
-        let half_m = self.field().body_m * 0.5;
-        let near = self.near(from, range_m + 2.0 * half_m).into_iter();
+    fn bodies_near(&self, from: Point, range_m: f64) -> Vec<(Body, Opaque)> {
+        // No corner of a body is farther from its center than one and a half times its larger half.
+        let reach_m = range_m + 1.5 * self.half_max_m();
+        let near = self.near(from, reach_m).into_iter();
         near.map(|near| {
-            let rectangle = Rectangle {
-                center: near.center,
-                half_m: (half_m, half_m),
+            let opaque = Opaque::Body {
+                shape: self.shape(near.body),
+                at: near.center,
             };
-            (near.body, rectangle)
+            (near.body, opaque)
         })
         .collect()
     }

@@ -128,7 +128,7 @@ fn t01_the_hall_is_that_of_the_paper() {
     assert_eq!(scenario.field_m, [50.0 * FT_M, 50.0 * FT_M]);
     assert_eq!((scenario.guests.count, scenario.body_m), (100, 2.0 * FT_M));
 
-    let table = scenario.obstacles[0];
+    let table = scenario.obstacles[0].at;
     let hall = Hall::new(scenario);
     assert!(
         hall.at("Leguin").distance_m(table) <= 4.0 * FT_M,

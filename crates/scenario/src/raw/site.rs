@@ -5,12 +5,13 @@ use std::ops::Range as Span;
 
 use config::bulk::member;
 use config::units::Length;
-use config::{FileError, FixedList, Source};
+use config::{FileError, Source};
 use protocol::RobotName;
-use protocol::messages::{MAX_SITE_TEXT_BYTES, MAX_SITE_VARIABLES, MAX_SITES, Variable};
+use protocol::messages::{MAX_SITE_TEXT_BYTES, MAX_SITE_VARIABLES, MAX_SITES, Point, Variable};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
+use super::super::checked::{to_wire, to_world};
 use super::super::sites::{OnConflict, SiteSpec, SiteVariable};
 use super::numbers::positive;
 use super::place::StartPlace;
@@ -61,7 +62,7 @@ pub(super) fn check(
         let span = entry.span();
         let refuse = |reason: &str| FileError::at(source, Some(span.clone()), reason);
         let table = entry.into_inner();
-        let spec = table.check(field_m, sensing_range, source)?;
+        let spec = table.check(sensing_range, source)?;
         let count = table.count.unwrap_or(1);
         if count > MAX_SITES - sites.len() {
             return Err(refuse(&format!("more than {MAX_SITES} sites")));
@@ -76,7 +77,14 @@ pub(super) fn check(
             if robots.contains(&name) {
                 return Err(refuse(&format!("a robot is called {name} as well")));
             }
-            if sites.insert(name.to_string(), spec.clone()).is_some() {
+            let place = match table.count {
+                Some(_) => table.at.get_ref().member(number, count),
+                None => table.at.get_ref().clone(),
+            };
+            let spec = spec.clone().placed(&place, field_m);
+            let spec =
+                spec.map_err(|reason| FileError::at(source, Some(table.at.span()), &reason))?;
+            if sites.insert(name.to_string(), spec).is_some() {
                 return Err(refuse(&format!("a second site called {name}")));
             }
             spans.insert(name.to_string(), span.clone());
@@ -86,12 +94,7 @@ pub(super) fn check(
 }
 
 impl SiteTable {
-    fn check(
-        &self,
-        [width_m, height_m]: [f64; 2],
-        sensing_range: Length,
-        source: &Source,
-    ) -> Result<SiteSpec, FileError> {
+    fn check(&self, sensing_range: Length, source: &Source) -> Result<SiteSpec, FileError> {
         if let Some(solid) = self.solid.as_ref().filter(|solid| *solid.get_ref()) {
             let reason = "a site is never solid: write an [[obstacle]] at the same place";
             return Err(FileError::at(source, Some(solid.span()), reason));
@@ -101,24 +104,12 @@ impl SiteTable {
                 .map_err(|reason| FileError::at(source, Some(kind.span()), &reason))?;
         }
 
-        let place = *self.at.get_ref();
-        let at = place.point();
-        let is_at_random = place == StartPlace::Random;
-        let is_inside = (0.0..=width_m).contains(&at.x) && (0.0..=height_m).contains(&at.y);
-        if !is_inside {
-            let reason = format!(
-                "{} m, {} m is outside the field, which is {width_m} m by {height_m} m",
-                at.x, at.y
-            );
-            return Err(FileError::at(source, Some(self.at.span()), &reason));
-        }
-
         let kind = self.kind.as_ref().map(Spanned::get_ref);
         let range = positive(source, self.range.as_ref(), sensing_range, "the range")?;
         Ok(SiteSpec {
             kind: kind.map_or_else(|| KIND.to_owned(), Clone::clone),
-            at,
-            is_at_random,
+            at: Point::default(),
+            drawn: None,
             range_m: range.0,
             on_conflict: self.on_conflict.unwrap_or_default(),
             state: self.check_state(source)?,
@@ -152,10 +143,7 @@ impl SiteTable {
             name: RobotName::new(name).ok()?,
             count: None,
             kind: Some(unplaced(spec.kind.clone())),
-            at: unplaced(StartPlace::Given {
-                at: FixedList([Length(spec.at.x), Length(spec.at.y)]),
-                is_drawn: spec.is_at_random,
-            }),
+            at: unplaced(StartPlace::of(to_world(spec.at), spec.drawn)),
             range: Some(unplaced(Length(spec.range_m))),
             on_conflict: Some(spec.on_conflict),
             solid: None,
@@ -166,6 +154,24 @@ impl SiteTable {
     /// Makes a place that follows from the seed any place again.
     pub(super) fn forget_place(&mut self) {
         self.at.as_mut().forget();
+    }
+}
+
+impl SiteSpec {
+    /// The site at a place, which is inside the field.
+    fn placed(mut self, place: &StartPlace, field_m: [f64; 2]) -> Result<Self, String> {
+        let [width_m, height_m] = field_m;
+        let (at, drawn) = place.resolve();
+        self.at = to_wire(at);
+        self.drawn = drawn;
+        let is_inside = (0.0..=width_m).contains(&at.x) && (0.0..=height_m).contains(&at.y);
+        if is_inside || drawn.is_some() {
+            return Ok(self);
+        }
+        Err(format!(
+            "{} m, {} m is outside the field, which is {width_m} m by {height_m} m",
+            at.x, at.y
+        ))
     }
 }
 

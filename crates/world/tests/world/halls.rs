@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
-use world::{Field, Guests, Hall, HallError, Point, Triangular, World};
+use world::{Field, Guests, Hall, HallError, Point, Shapes, Triangular, World};
 
 pub(crate) const FT: f64 = 0.3048;
 
@@ -32,6 +32,7 @@ pub(crate) fn reception(count: usize) -> Hall {
         },
         robots: Vec::new(),
         tick_s: 0.1,
+        shapes: Shapes::default(),
         max_speed_mps: 2.0 * FT,
     }
 }
@@ -149,6 +150,7 @@ prop_compose! {
             },
             robots: apart,
             tick_s,
+            shapes: Shapes::default(),
             max_speed_mps: fastest_mps,
         }
     }

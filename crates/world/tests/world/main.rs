@@ -11,4 +11,5 @@ mod motion;
 mod near;
 mod placing;
 mod reactions;
+mod shapes;
 mod sight;

@@ -5,7 +5,7 @@ use crate::halls::{
 };
 use proptest::prelude::*;
 use rand::{Rng, RngExt};
-use world::{Blocker, Body, Hall, MoveOutcome, Point, World};
+use world::{Blocker, Body, Hall, MoveOutcome, Point, Shapes, World};
 
 /// The rules of a tick in their simplest form: every body is compared with every other.
 struct Plain {
@@ -218,6 +218,7 @@ fn quiet(obstacles: &[(f64, f64)], robots: &[(f64, f64)]) -> TestWorld {
         },
         obstacles: points(obstacles),
         robots: points(robots),
+        shapes: Shapes::default(),
         max_speed_mps: 10.0,
         ..reception(0)
     };
@@ -264,6 +265,7 @@ fn robots_move_before_guests() {
 
     for seed in 0..50 {
         let mut hall = Hall {
+            shapes: Shapes::default(),
             max_speed_mps: 1000.0,
             ..reception(1)
         };

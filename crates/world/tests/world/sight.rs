@@ -3,18 +3,30 @@
 use proptest::prelude::*;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
-use world::{Field, Guests, Hall, Point, Rectangle, Triangular, World, is_hidden};
+use world::{
+    Field, Guests, Hall, Opaque, Point, Shape, Shapes, Triangular, Wall, World, is_hidden,
+};
 
-fn wall(x: f64, y: f64, half_x: f64, half_y: f64) -> Rectangle {
-    Rectangle {
-        center: Point::new(x, y),
-        half_m: (half_x, half_y),
+fn block(x: f64, y: f64, half_x: f64, half_y: f64) -> Opaque {
+    Opaque::Body {
+        shape: Shape::Rectangle {
+            width_m: 2.0 * half_x,
+            height_m: 2.0 * half_y,
+        },
+        at: Point::new(x, y),
+    }
+}
+
+fn disc(x: f64, y: f64, radius_m: f64) -> Opaque {
+    Opaque::Body {
+        shape: Shape::Disc { radius_m },
+        at: Point::new(x, y),
     }
 }
 
 #[test]
 fn a_wall_hides_what_is_behind_it_and_nothing_beside_it() {
-    let wall = [wall(5.0, 5.0, 0.5, 2.0)];
+    let wall = [block(5.0, 5.0, 0.5, 2.0)];
     let eye = Point::new(1.0, 5.0);
     for (x, y, hidden) in [
         (9.0, 5.0, true),
@@ -39,6 +51,10 @@ fn a_wall_hides_what_is_behind_it_and_nothing_beside_it() {
 
 /// A field of 10 m by 10 m with bodies of 1 m.
 fn world(obstacles: &[Point], robots: &[Point]) -> World<Xoshiro256PlusPlus> {
+    shaped(obstacles, robots, Shapes::default())
+}
+
+fn shaped(obstacles: &[Point], robots: &[Point], shapes: Shapes) -> World<Xoshiro256PlusPlus> {
     let still = Triangular::new(0.0, 0.0, 0.0).unwrap();
     let hall = Hall {
         field: Field {
@@ -54,6 +70,7 @@ fn world(obstacles: &[Point], robots: &[Point]) -> World<Xoshiro256PlusPlus> {
         robots: robots.to_vec(),
         tick_s: 1.0,
         max_speed_mps: 1.0,
+        shapes,
     };
     World::new(&hall, Xoshiro256PlusPlus::seed_from_u64(1)).unwrap()
 }
@@ -76,13 +93,80 @@ fn a_ray_ends_at_the_next_body_at_the_edge_or_at_its_range() {
     assert_eq!(ranges, [2.5, 2.5, 3.0, 4.0, 4.0]);
     assert_eq!(world.ranges_m(0, &directions, 2.0), [2.0; 5]);
     assert_eq!(
-        world.walls_near(robots[0], 4.9),
-        [(0, wall(6.0, 5.0, 0.5, 0.5)), (1, wall(8.0, 5.0, 0.5, 0.5))]
+        world.opaque_near(robots[0], 4.9),
+        [
+            (Some(0), block(6.0, 5.0, 0.5, 0.5)),
+            (Some(1), block(8.0, 5.0, 0.5, 0.5))
+        ]
     );
-    assert_eq!(world.walls_near(robots[0], 3.9).len(), 1);
+    assert_eq!(world.opaque_near(robots[0], 3.9).len(), 1);
+}
+
+#[test]
+fn discs_and_walls_hide_and_end_rays_where_they_are() {
+    let eye = Point::new(1.0, 5.0);
+    let all = [
+        disc(5.0, 5.0, 1.0),
+        Opaque::Wall(Wall {
+            from: Point::new(4.0, 7.0),
+            to: Point::new(6.0, 9.0),
+        }),
+    ];
+    for (x, y, hidden) in [
+        (9.0, 5.0, true),
+        // On the rim, and past the disc on a tangent.
+        (4.0, 5.0, false),
+        (9.0, 6.0, true),
+        (9.0, 8.0, false),
+        (5.0, 8.0, false),
+        (4.0, 9.5, false),
+        // Beyond the wall, and past its end.
+        (9.0, 11.0, true),
+        (9.0, 11.6, false),
+    ] {
+        assert_eq!(is_hidden(eye, Point::new(x, y), &all), hidden, "{x}, {y}");
+    }
+
+    let shapes = Shapes {
+        walls: vec![Wall {
+            from: Point::new(0.0, 8.0),
+            to: Point::new(9.0, 8.0),
+        }],
+        obstacles: [(0, Shape::Disc { radius_m: 1.5 })].into(),
+        robots: [(0, Shape::Disc { radius_m: 0.25 })].into(),
+    };
+    let world = shaped(&[Point::new(6.0, 5.0)], &[Point::new(3.0, 5.0)], shapes);
+    let directions = [(1.0, 0.0), (0.0, 1.0), (0.6, 0.8)].map(|(x, y)| Point::new(x, y));
+    let ranges = world.ranges_m(0, &directions, 5.0);
+    let expected = [1.5, 3.0, 3.75];
+    for (range, expected) in ranges.iter().zip(expected) {
+        assert!((range - expected).abs() < 1e-12, "{ranges:?}");
+    }
 }
 
 proptest! {
+    #[test]
+    fn a_ray_enters_a_disc_on_its_rim(
+        from in (0.0..10.0, 0.0..10.0_f64),
+        to in (0.0..10.0, 0.0..10.0_f64),
+        at in (2.0..8.0, 2.0..8.0_f64),
+        radius_m in 0.1..2.0_f64,
+    ) {
+        let (from, to) = (Point::new(from.0, from.1), Point::new(to.0, to.1));
+        let center = Point::new(at.0, at.1);
+        let disc = disc(at.0, at.1, radius_m);
+        if let Some(share) = disc.entered_after(from, to) {
+            let rim_m = (from + (to - from) * share).distance_m(center) - radius_m;
+            prop_assert!(rim_m <= 1e-6);
+            prop_assert!(share == 0.0 || rim_m >= -1e-6);
+        } else {
+            for step in 0..=100 {
+                let point = from + (to - from) * (f64::from(step) / 100.0);
+                prop_assert!(point.distance_m(center) > radius_m - 1e-6);
+            }
+        }
+    }
+
     #[test]
     fn hiding_is_mutual(
         from in (0.0..10.0, 0.0..10.0_f64),
@@ -91,7 +175,7 @@ proptest! {
         half in (0.1..2.0, 0.1..2.0_f64),
     ) {
         let (from, to) = (Point::new(from.0, from.1), Point::new(to.0, to.1));
-        let walls = [wall(at.0, at.1, half.0, half.1)];
+        let walls = [block(at.0, at.1, half.0, half.1)];
         prop_assert_eq!(is_hidden(from, to, &walls), is_hidden(to, from, &walls));
     }
 
@@ -103,7 +187,7 @@ proptest! {
         half in (0.1..2.0, 0.1..2.0_f64),
     ) {
         let (from, to) = (Point::new(from.0, from.1), Point::new(to.0, to.1));
-        let wall = wall(at.0, at.1, half.0, half.1);
+        let wall = block(at.0, at.1, half.0, half.1);
         if let Some(share) = wall.entered_after(from, to) {
             let point = from + (to - from) * share;
             let (x, y) = ((point.x - at.0).abs() - half.0, (point.y - at.1).abs() - half.1);

@@ -1,0 +1,208 @@
+//! What a hall has beside squares of one size: walls, and bodies of a shape of their own.
+//!
+//! A hall without any has no [`Solids`], and its bodies are tested by their centers alone.
+
+use std::collections::BTreeMap;
+
+use crate::hall::Field;
+use crate::point::Point;
+use crate::shape::{Shape, Wall};
+use crate::shapes::Shapes;
+
+/// Cells along each side of the index of what stands still.
+const CELLS: usize = 64;
+
+/// Walls and shapes, indexed for a hall whose bodies are numbered as in [`Bodies`](crate::bodies::Bodies).
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Solids {
+    field: Field,
+    walls: Vec<Wall>,
+    /// Shapes by number of the body; all others are squares.
+    shapes: BTreeMap<usize, Shape>,
+    /// The obstacles with a shape of their own.
+    obstacles: Vec<(usize, Shape, Point)>,
+    /// The largest half extent of a body that is not among [`Self::obstacles`], m.
+    half_max_m: f64,
+    /// For each cell, row by row: walls, then obstacles, by their index in one sequence.
+    cells: Vec<Vec<u32>>,
+}
+
+impl Solids {
+    /// `obstacles` are the centers of all obstacles; robots are numbered after them.
+    pub(crate) fn new(field: Field, shapes: &Shapes, obstacles: &[Point]) -> Self {
+        let mut solids = Self {
+            field,
+            walls: shapes.walls.clone(),
+            shapes: BTreeMap::new(),
+            obstacles: Vec::new(),
+            half_max_m: field.body_m * 0.5,
+            cells: vec![Vec::new(); CELLS * CELLS],
+        };
+        for (&index, &shape) in &shapes.obstacles {
+            solids.shapes.insert(index, shape);
+            let at = obstacles.get(index).copied().unwrap_or_default();
+            solids.obstacles.push((index, shape, at));
+        }
+        for (&index, &shape) in &shapes.robots {
+            solids.set_shape(obstacles.len() + index, shape);
+        }
+        solids.fill_cells();
+        solids
+    }
+
+    /// Gives a body that is no obstacle a shape.
+    pub(crate) fn set_shape(&mut self, id: usize, shape: Shape) {
+        let (half_x_m, half_y_m) = shape.half_m();
+        self.half_max_m = self.half_max_m.max(half_x_m).max(half_y_m);
+        self.shapes.insert(id, shape);
+    }
+
+    fn fill_cells(&mut self) {
+        let cell_m = (
+            self.field.size_m.0 / CELLS as f64,
+            self.field.size_m.1 / CELLS as f64,
+        );
+        let half_m = (cell_m.0 * 0.5, cell_m.1 * 0.5);
+
+        for (index, wall) in self.walls.iter().enumerate() {
+            for cell in cells_between(&self.field, wall.from, wall.to) {
+                let column = (cell % CELLS) as f64;
+                let row = (cell / CELLS) as f64;
+                let center = Point::new((column + 0.5) * cell_m.0, (row + 0.5) * cell_m.1);
+                if wall.is_in(center, half_m) {
+                    self.cells[cell].push(index as u32);
+                }
+            }
+        }
+
+        for (index, (_, shape, at)) in self.obstacles.iter().enumerate() {
+            let (half_x_m, half_y_m) = shape.half_m();
+            let half = Point::new(half_x_m, half_y_m);
+            for cell in cells_between(&self.field, *at - half, *at + half) {
+                self.cells[cell].push((self.walls.len() + index) as u32);
+            }
+        }
+    }
+
+    pub(crate) fn walls(&self) -> &[Wall] {
+        &self.walls
+    }
+
+    pub(crate) fn half_max_m(&self) -> f64 {
+        self.half_max_m
+    }
+
+    /// The shape of a body.
+    pub(crate) fn shape(&self, id: usize) -> Shape {
+        let shape = self.shapes.get(&id).copied();
+        shape.unwrap_or(Shape::square(self.field.body_m))
+    }
+
+    /// How far the center of a body that moves can be from that of a body of this shape that it overlaps, m.
+    pub(crate) fn reach_m(&self, shape: Shape) -> f64 {
+        let (half_x_m, half_y_m) = shape.half_m();
+        half_x_m.max(half_y_m) + self.half_max_m
+    }
+
+    /// The first wall, or else the first obstacle of a shape of its own, that a body meets on its way.
+    pub(crate) fn blocker(&self, shape: Shape, from: Point, to: Point) -> Option<SolidBlocker> {
+        let (half_x_m, half_y_m) = shape.half_m();
+        let half = Point::new(half_x_m, half_y_m);
+        let low = Point::new(from.x.min(to.x), from.y.min(to.y)) - half;
+        let high = Point::new(from.x.max(to.x), from.y.max(to.y)) + half;
+
+        let mut first = usize::MAX;
+        for cell in cells_between(&self.field, low, high) {
+            for &index in &self.cells[cell] {
+                let index = index as usize;
+                if index < first && self.is_met(index, shape, from, to) {
+                    first = index;
+                }
+            }
+        }
+
+        if first == usize::MAX {
+            None
+        } else if first < self.walls.len() {
+            Some(SolidBlocker::Wall(first))
+        } else {
+            Some(SolidBlocker::Obstacle(
+                self.obstacles[first - self.walls.len()].0,
+            ))
+        }
+    }
+
+    fn is_met(&self, index: usize, shape: Shape, from: Point, to: Point) -> bool {
+        if let Some(wall) = self.walls.get(index) {
+            return shape.meets(from, to, wall);
+        }
+        let (_, other, at) = self.obstacles[index - self.walls.len()];
+        shape.overlaps(to, other, at) || shape.sweeps(from, to, other, at)
+    }
+
+    /// The largest x of the walls and of the obstacles of a shape of their own that a square of the field at this center
+    /// overlaps, m.
+    pub(crate) fn rightmost_x_m(&self, center: Point) -> Option<f64> {
+        let square = Shape::square(self.field.body_m);
+        let half_m = self.field.body_m * 0.5;
+        let half = Point::new(half_m, half_m);
+        let mut rightmost_x_m: Option<f64> = None;
+
+        for cell in cells_between(&self.field, center - half, center + half) {
+            for &index in &self.cells[cell] {
+                let index = index as usize;
+                if !self.is_met(index, square, center, center) {
+                    continue;
+                }
+
+                let x_m = match self.walls.get(index) {
+                    Some(wall) => wall.rightmost_x_m(center.y - half_m, center.y + half_m),
+                    None => {
+                        let (_, shape, at) = self.obstacles[index - self.walls.len()];
+                        Some(at.x + shape.half_m().0)
+                    }
+                };
+                // `None` is less than any number.
+                if rightmost_x_m < x_m {
+                    rightmost_x_m = x_m;
+                }
+            }
+        }
+        rightmost_x_m
+    }
+
+    /// The numbers of the obstacles of a shape of their own whose bodies are within `range_m` of a point.
+    pub(crate) fn obstacles_near(&self, point: Point, range_m: f64) -> Vec<usize> {
+        let near = self
+            .obstacles
+            .iter()
+            .filter(|(_, shape, at)| shape.distance_m(*at, point) <= range_m);
+        near.map(|(id, ..)| *id).collect()
+    }
+}
+
+/// What [`Solids::blocker`] found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum SolidBlocker {
+    /// A wall, by index.
+    Wall(usize),
+    /// An obstacle, by the number of its body.
+    Obstacle(usize),
+}
+
+/// The cells of a rectangle between two of its corners.
+fn cells_between(field: &Field, one: Point, other: Point) -> impl Iterator<Item = usize> {
+    let cell = |at_m: f64, side_m: f64| ((at_m / side_m * CELLS as f64) as usize).min(CELLS - 1);
+    let (width_m, height_m) = field.size_m;
+    let columns = (
+        cell(one.x.min(other.x), width_m),
+        cell(one.x.max(other.x), width_m),
+    );
+    let rows = (
+        cell(one.y.min(other.y), height_m),
+        cell(one.y.max(other.y), height_m),
+    );
+
+    (rows.0..=rows.1)
+        .flat_map(move |row| (columns.0..=columns.1).map(move |column| row * CELLS + column))
+}
