@@ -181,6 +181,8 @@ impl Bodies {
         rightmost_x_m
     }
 
+    #[cold]
+    #[inline(never)]
     fn rightmost_solid_x_m(&self, solids: &Solids, center: Point) -> Option<f64> {
         let square = Shape::square(self.field.body_m);
         let half_m = self.field.body_m * 0.5;
@@ -234,6 +236,10 @@ impl Bodies {
 
     /// The same rule among walls and shapes. The way to the proposed location counts as well, but only for walls and for
     /// obstacles with a shape of their own.
+    ///
+    /// Kept out of [`Self::advance`], whose speed is that of a hall without walls.
+    #[cold]
+    #[inline(never)]
     fn advance_shaped(&mut self, id: usize, to: Point) -> Result<(), Blocker> {
         let shape = self.shape_of(id);
         if !shape.is_inside(to, self.field.size_m) {

@@ -1,6 +1,6 @@
 //! Robots that drive like wheels: a unicycle has a heading, and moves forward and turns within its limits.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 use crate::point::Point;
 
@@ -27,7 +27,7 @@ pub struct Velocity {
 pub struct Pose {
     /// Its center, m.
     pub center: Point,
-    /// Its heading, counter-clockwise from +x, rad, in (-π, π] before it is rounded to
+    /// Its heading, counter-clockwise from +x, rad, in [-π, π] before it is rounded to
     /// whole millionths.
     pub heading_rad: f64,
     /// Its speed along the heading, m/s.
@@ -83,17 +83,16 @@ fn finite(number: f64) -> f64 {
     if number.is_finite() { number } else { 0.0 }
 }
 
-/// A heading in (-π, π], in whole millionths of a radian.
+/// A heading in [-π, π], in whole millionths of a radian.
 fn whole_heading(heading_rad: f64) -> f64 {
-    let turns = ((heading_rad - PI) / TAU).ceil();
-    let heading_rad = finite(heading_rad - turns * TAU);
+    let within_rad = libm::remainder(finite(heading_rad), TAU);
 
-    (heading_rad * HEADING_STEPS).round() / HEADING_STEPS
+    (within_rad * HEADING_STEPS).round() / HEADING_STEPS
 }
 
 #[cfg(test)]
 mod tests {
-    use std::f64::consts::{FRAC_PI_2, PI};
+    use std::f64::consts::PI;
 
     use super::{Pose, Velocity, Wheels};
     use crate::point::Point;
@@ -131,10 +130,11 @@ mod tests {
     fn headings_are_whole_millionths_within_half_a_turn() {
         for (given, heading_rad) in [
             (0.0, 0.0),
-            (FRAC_PI_2, 1.570_796),
-            (-FRAC_PI_2, -1.570_796),
+            (1.0, 1.0),
+            (-2.000_000_4, -2.0),
             (PI + 0.1, -3.041_593),
-            (7.0 * PI, 3.141_593),
+            (6.0 * PI, 0.0),
+            (-13.0, -0.433_629),
             (f64::NAN, 0.0),
         ] {
             let pose = Pose::at_rest(Point::default(), given);
