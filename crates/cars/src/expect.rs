@@ -39,7 +39,7 @@ pub(crate) fn expect(args: &ExpectArgs) -> Result<ExitCode> {
     let files = recorded_epoch(&folder, args.epoch)?;
     let scenario = Scenario::load(&files.scenario, &Changes::default())?;
     let expected = match &args.expectations {
-        Some(file) => expectations(&Source::read(file)?, &scenario.roster())?,
+        Some(file) => expectations(&Source::read(file)?, &scenario.setting())?,
         None => scenario.expectations.clone(),
     };
     if expected.is_empty() {

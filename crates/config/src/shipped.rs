@@ -35,6 +35,7 @@ const FILES: &[(&str, &str)] = &texts![
     "configs/experiments/partition.toml",
     "configs/experiments/recruitment.toml",
     "configs/experiments/signals.toml",
+    "configs/experiments/teams.toml",
     "configs/experiments/tune_thresholds.toml",
     "configs/experiments/tune_timer.toml",
     "configs/hors_doeuvres.toml",

@@ -243,7 +243,7 @@ impl Experiment {
 
         let own = scenario.expectations.len();
         scenario.expectations.extend_from_slice(&self.expectations);
-        check_all(&scenario.expectations, &scenario.roster()).map_err(|wrong| {
+        check_all(&scenario.expectations, &scenario.setting()).map_err(|wrong| {
             let index = wrong.index.checked_sub(own);
             let span = index.and_then(|index| self.expectation_spans.get(index).cloned());
             FileError::at(&self.source, span, &wrong.to_string())
@@ -293,6 +293,9 @@ impl Experiment {
                     return Err(FileError::at(&self.source, Some(measure.span()), &reason));
                 }
             }
+            measure
+                .check(&scenario.setting())
+                .map_err(|error| refuse(&self.source, measure.span(), error))?;
         }
 
         Ok(())
@@ -763,6 +766,9 @@ fn check_measures(
                 .add(&format!("{name}{ending}"))
                 .map_err(|reason| refuse(source, measure.span(), reason))?;
         }
+        measure
+            .check_after(&measures[..index])
+            .map_err(|error| refuse(source, measure.span(), error))?;
         check_head(measure, &measures[..index], conditions)
             .map_err(|reason| refuse(source, measure.span(), reason))?;
     }

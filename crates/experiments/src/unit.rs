@@ -205,16 +205,17 @@ impl Plan {
             words: Words::of(&experiment.measures, &experiment.expectations),
         };
         let scenario = self.scenario_of(unit, launches)?;
-        let roster = scenario.roster();
+        let setting = scenario.setting();
         for measure in &experiment.measures {
-            let probe = Probe::new(measure, &roster, condition_s);
+            let probe = Probe::new(measure, &setting, condition_s);
             gauge.probes.push((&measure.name, probe));
         }
 
         let ended = self.follow(scenario, launches, &mut gauge)?;
         let mut measures = BTreeMap::new();
         for (name, probe) in gauge.probes {
-            measures.insert(name.to_owned(), probe.measured(&ended.summary));
+            let measured = probe.measured(&ended.summary, &measures);
+            measures.insert(name.to_owned(), measured);
         }
         Ok(Played {
             digest: ended.digest,

@@ -1,13 +1,18 @@
 //! What holds in a tick, or happens in it.
 
 use config::units::Time;
-use protocol::messages::{Point, Variable};
+use protocol::messages::Point;
+use protocol::pattern::overlap as overlap_of_names;
 use protocol::time::tick_seconds;
-use protocol::{Event, RobotName, Tick};
+use protocol::{Event, RobotName, RobotPattern, Tick};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::pattern::{Pattern, PatternError};
+use crate::quantity::{
+    By, Gauge, OfRobot, PlaceKind, PlaceTable, Quantity, QuantityError, StateNames, Team,
+    ValueBounds, number,
+};
 use crate::words::{self, Word};
 use crate::{Observation, RobotState, Setting};
 
@@ -15,6 +20,9 @@ use crate::{Observation, RobotState, Setting};
 const AFTER_THE_TICK: [&str; 2] = ["tick", "end"];
 /// Most alternatives of a condition.
 const MAX_ALTERNATIVES: usize = 64;
+/// Most conditions of a condition, and how deep they may be in each other.
+const MAX_PARTS: usize = 256;
+const MAX_DEPTH: usize = 8;
 /// How far two bodies may overlap and still count as touching, as in the environment.
 const TOLERANCE_M: f64 = 1e-9;
 /// Longest text of an event in a reason, characters.
@@ -33,10 +41,26 @@ pub enum TickConditionError {
     Pattern(#[from] PatternError),
     /// It is not one of the conditions that there are.
     #[error(
-        "a condition is an event (`event = …`), a state of a robot (`robot = …` with `behavior`, `emotion` or `variable`), \
-         `overlap` or `stalled`"
+        "a condition is an event (`event = …`), a state of a robot or of several (`robot = …` or `robots = …` with `behavior`, \
+         `emotion` or `variable`), a number of places (`walked`, `distance`, `inside`, `covered`, `components`), `overlap`, \
+         `stalled`, or several conditions (`all = […]`)"
     )]
     Unknown,
+    /// A number of robots or places that cannot be taken.
+    #[error(transparent)]
+    Quantity(#[from] QuantityError),
+    /// A condition has a number that is taken over the run.
+    #[error("a condition is about each tick: leave `as` out")]
+    OverTheRun,
+    /// There are bounds where nothing is compared.
+    #[error("`{0}` is true or false: leave the bounds out")]
+    Truth(String),
+    /// A number without a bound.
+    #[error("{0} needs `at_least`, `at_most`, `above` or `below`, with a finite number")]
+    Unbound(String),
+    /// Too many conditions in a condition, or too deep in each other.
+    #[error("a condition has at most {MAX_PARTS} conditions, {MAX_DEPTH} deep in each other")]
+    TooMany,
     /// A table that has the wrong fields.
     #[error("{0}")]
     Fields(String),
@@ -73,8 +97,25 @@ pub enum TickConditionError {
 enum Alternative {
     Event(Pattern),
     State(LastingState),
+    Number(LastingNumber),
+    All(LastingAll),
     Overlap(Option<Vec<RobotName>>),
     Stalled(StalledCondition),
+}
+
+/// A number of robots or places within bounds, which may have to last. A truth has no bounds.
+#[derive(Debug, Clone, PartialEq)]
+struct LastingNumber {
+    quantity: Quantity,
+    bounds: ValueBounds,
+    lasting: Option<Time>,
+}
+
+/// Conditions that hold at the same time, which may have to last.
+#[derive(Debug, Clone, PartialEq)]
+struct LastingAll {
+    parts: Vec<TickCondition>,
+    lasting: Option<Time>,
 }
 
 /// A state of a robot, which may have to last.
@@ -90,15 +131,6 @@ enum Is {
     Behavior(Vec<String>),
     Emotion(Vec<String>),
     Variable(String, ValueBounds),
-}
-
-/// The values of a variable; a flag is 1 or 0. All bounds that are given hold.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-struct ValueBounds {
-    at_least: Option<f64>,
-    at_most: Option<f64>,
-    above: Option<f64>,
-    below: Option<f64>,
 }
 
 /// That no state variable of progress has risen for a time.
@@ -122,6 +154,10 @@ struct ConditionTable {
     #[serde(skip_serializing_if = "Option::is_none")]
     robot: Option<RobotName>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    robots: Option<Team>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    by: Option<By>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     behavior: Option<Names>,
     #[serde(skip_serializing_if = "Option::is_none")]
     emotion: Option<Names>,
@@ -137,6 +173,18 @@ struct ConditionTable {
     below: Option<f64>,
     #[serde(rename = "for", skip_serializing_if = "Option::is_none")]
     lasting: Option<Time>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    walked: Option<PlaceTable>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    distance: Option<PlaceTable>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    inside: Option<PlaceTable>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    covered: Option<PlaceTable>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    components: Option<PlaceTable>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    all: Option<Vec<TickCondition>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     overlap: Option<Names>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -201,7 +249,11 @@ impl TryFrom<Value> for TickCondition {
         for entry in entries {
             alternatives.push(Alternative::try_from(entry)?);
         }
-        Ok(Self(alternatives))
+        let condition = Self(alternatives);
+        if condition.parts() > MAX_PARTS || condition.depth() > MAX_DEPTH {
+            return Err(TickConditionError::TooMany);
+        }
+        Ok(condition)
     }
 }
 
@@ -233,49 +285,151 @@ impl TryFrom<Value> for Alternative {
 }
 
 impl ConditionTable {
-    fn check(self) -> Result<Alternative, TickConditionError> {
+    fn check(mut self) -> Result<Alternative, TickConditionError> {
         if self.lasting.is_some_and(|lasting| lasting.0 <= 0.0) {
             return Err(TickConditionError::Lasting);
         }
 
-        let bounds = ValueBounds {
+        let place = self.take_place();
+        let subjects = [
+            self.robot.is_some() || self.robots.is_some(),
+            place.is_some(),
+            self.all.is_some(),
+            self.overlap.is_some(),
+            self.stalled.is_some(),
+        ];
+        let is_one = subjects.iter().filter(|is_given| **is_given).count() == 1;
+        let has_state =
+            self.behavior.is_some() || self.emotion.is_some() || self.variable.is_some();
+        let is_of_robots = subjects[0];
+        if !is_one || (!is_of_robots && (has_state || self.by.is_some())) {
+            return Err(TickConditionError::Unknown);
+        }
+
+        let bounds = self.bounds();
+        let lasting = self.lasting;
+        let is_plain = bounds == ValueBounds::default();
+        if let Some((kind, table)) = place {
+            if table.number.is_some() {
+                return Err(TickConditionError::OverTheRun);
+            }
+            let quantity = table.check(kind)?;
+            return within(format!("`{}`", kind.key()), quantity, bounds, lasting);
+        }
+        match (self.all.take(), self.overlap.take(), self.stalled.take()) {
+            (Some(parts), None, None) if is_plain => {
+                if !(1..=MAX_ALTERNATIVES).contains(&parts.len()) {
+                    return Err(TickConditionError::Count);
+                }
+                Ok(Alternative::All(LastingAll { parts, lasting }))
+            }
+            (None, Some(overlap), None) if is_plain && lasting.is_none() => check_overlap(overlap),
+            (None, None, Some(stalled)) if is_plain && lasting.is_none() => check_stalled(&stalled),
+            (None, None, None) if self.robots.is_some() || self.by.is_some() => self.check_team(),
+            (None, None, None) => self.check_robot(),
+            _ => Err(TickConditionError::Unknown),
+        }
+    }
+
+    fn bounds(&self) -> ValueBounds {
+        ValueBounds {
             at_least: self.at_least,
             at_most: self.at_most,
             above: self.above,
             below: self.below,
-        };
-        let has_state =
-            self.behavior.is_some() || self.emotion.is_some() || self.variable.is_some();
-        let has_rest = has_state || self.lasting.is_some() || bounds != ValueBounds::default();
-        match (self.robot, self.overlap, self.stalled) {
-            (None, Some(overlap), None) if !has_rest => check_overlap(overlap),
-            (None, None, Some(stalled)) if !has_rest => check_stalled(&stalled),
-            (Some(robot), None, None) => {
-                let is = match (self.behavior, self.emotion, self.variable) {
-                    (Some(names), None, None) if bounds == ValueBounds::default() => {
-                        Is::Behavior(at_least_one("behavior", names)?)
-                    }
-                    (None, Some(names), None) if bounds == ValueBounds::default() => {
-                        Is::Emotion(at_least_one("emotion", names)?)
-                    }
-                    (None, None, Some(_)) if bounds == ValueBounds::default() => {
-                        return Err(TickConditionError::Bound);
-                    }
-                    (None, None, Some(_)) if bounds.are_contradictory() => {
-                        return Err(TickConditionError::NoNumber);
-                    }
-                    (None, None, Some(variable)) => Is::Variable(variable, bounds),
-                    _ => return Err(TickConditionError::Unknown),
-                };
-                Ok(Alternative::State(LastingState {
-                    robot,
-                    is,
-                    lasting: self.lasting,
-                }))
-            }
-            _ => Err(TickConditionError::Unknown),
         }
     }
+
+    /// The number of places that it has; `None` if it has none or several.
+    fn take_place(&mut self) -> Option<(PlaceKind, PlaceTable)> {
+        let tables = [
+            self.walked.take(),
+            self.distance.take(),
+            self.inside.take(),
+            self.covered.take(),
+            self.components.take(),
+        ];
+        let mut places = PlaceKind::ALL
+            .into_iter()
+            .zip(tables)
+            .filter_map(|(kind, table)| Some((kind, table?)));
+        let place = places.next();
+        place.filter(|_| places.next().is_none())
+    }
+
+    /// A state of one robot.
+    fn check_robot(self) -> Result<Alternative, TickConditionError> {
+        let bounds = self.bounds();
+        let is_plain = bounds == ValueBounds::default();
+        let Some(robot) = self.robot else {
+            return Err(TickConditionError::Unknown);
+        };
+        let is = match (self.behavior, self.emotion, self.variable) {
+            (Some(names), None, None) if is_plain => Is::Behavior(at_least_one("behavior", names)?),
+            (None, Some(names), None) if is_plain => Is::Emotion(at_least_one("emotion", names)?),
+            (None, None, Some(_)) if is_plain => return Err(TickConditionError::Bound),
+            (None, None, Some(_)) if bounds.are_contradictory() => {
+                return Err(TickConditionError::NoNumber);
+            }
+            (None, None, Some(variable)) => Is::Variable(variable, bounds),
+            _ => return Err(TickConditionError::Unknown),
+        };
+        Ok(Alternative::State(LastingState {
+            robot,
+            is,
+            lasting: self.lasting,
+        }))
+    }
+
+    /// A state of several robots.
+    fn check_team(self) -> Result<Alternative, TickConditionError> {
+        let mut bounds = self.bounds();
+        let (key, of) = match (self.behavior, self.emotion, self.variable) {
+            (Some(names), None, None) => {
+                let names = at_least_one("behavior", names)?;
+                ("behavior", OfRobot::State(StateNames::Behaviors(names)))
+            }
+            (None, Some(names), None) => {
+                let names = at_least_one("emotion", names)?;
+                ("emotion", OfRobot::State(StateNames::Emotions(names)))
+            }
+            (None, None, Some(variable)) => {
+                let mut of_each = ValueBounds::default();
+                // Those of all, or of any, are those of each.
+                if matches!(self.by, Some(By::All | By::Any)) {
+                    std::mem::swap(&mut of_each, &mut bounds);
+                }
+                if of_each.are_contradictory() {
+                    return Err(TickConditionError::NoNumber);
+                }
+                ("variable", OfRobot::Variable(variable, of_each))
+            }
+            _ => return Err(TickConditionError::Unknown),
+        };
+        let quantity = Quantity::each(key, self.robot, self.robots, self.by, of)?;
+        within(format!("`{key}`"), quantity, bounds, self.lasting)
+    }
+}
+
+/// A number within bounds. A truth has none, and any other number some.
+fn within(
+    key: String,
+    quantity: Quantity,
+    bounds: ValueBounds,
+    lasting: Option<Time>,
+) -> Result<Alternative, TickConditionError> {
+    let is_plain = bounds == ValueBounds::default();
+    match quantity.is_truth() {
+        true if !is_plain => return Err(TickConditionError::Truth(key)),
+        false if is_plain => return Err(TickConditionError::Unbound(key)),
+        false if bounds.are_contradictory() => return Err(TickConditionError::NoNumber),
+        _ => {}
+    }
+    Ok(Alternative::Number(LastingNumber {
+        quantity,
+        bounds,
+        lasting,
+    }))
 }
 
 fn at_least_one(key: &'static str, names: Names) -> Result<Vec<String>, TickConditionError> {
@@ -284,21 +438,6 @@ fn at_least_one(key: &'static str, names: Names) -> Result<Vec<String>, TickCond
         return Err(TickConditionError::NoName(key));
     }
     Ok(names)
-}
-
-impl ValueBounds {
-    /// Whether no number is within them.
-    fn are_contradictory(&self) -> bool {
-        let above = |low: f64| {
-            self.at_most.is_some_and(|high| high < low)
-                || self.below.is_some_and(|high| high <= low)
-        };
-        let strictly_above = |low: f64| {
-            self.at_most.is_some_and(|high| high <= low)
-                || self.below.is_some_and(|high| high <= low)
-        };
-        self.at_least.is_some_and(above) || self.above.is_some_and(strictly_above)
-    }
 }
 
 fn check_overlap(names: Names) -> Result<Alternative, TickConditionError> {
@@ -357,12 +496,14 @@ impl Alternative {
                     Is::Emotion(names) => table.emotion = Some(names.into()),
                     Is::Variable(name, bounds) => {
                         table.variable = Some(name.clone());
-                        table.at_least = bounds.at_least;
-                        table.at_most = bounds.at_most;
-                        table.above = bounds.above;
-                        table.below = bounds.below;
+                        table.set_bounds(*bounds);
                     }
                 }
+            }
+            Self::Number(number) => table.set_number(number),
+            Self::All(all) => {
+                table.all = Some(all.parts.clone());
+                table.lasting = all.lasting;
             }
             Self::Overlap(None) => table.overlap = Some(Names::One("any".to_owned())),
             Self::Overlap(Some(robots)) => {
@@ -383,6 +524,48 @@ impl Alternative {
     }
 }
 
+impl ConditionTable {
+    fn set_bounds(&mut self, bounds: ValueBounds) {
+        self.at_least = bounds.at_least;
+        self.at_most = bounds.at_most;
+        self.above = bounds.above;
+        self.below = bounds.below;
+    }
+
+    fn set_number(&mut self, number: &LastingNumber) {
+        self.lasting = number.lasting;
+        self.set_bounds(number.bounds);
+        if let Some((kind, table)) = PlaceTable::of(&number.quantity) {
+            let place = match kind {
+                PlaceKind::Walked => &mut self.walked,
+                PlaceKind::Distance => &mut self.distance,
+                PlaceKind::Inside => &mut self.inside,
+                PlaceKind::Covered => &mut self.covered,
+                PlaceKind::Components => &mut self.components,
+            };
+            *place = Some(table);
+            return;
+        }
+
+        let Quantity::Each { team, by, of } = &number.quantity else {
+            return;
+        };
+        self.robots = Some(team.clone());
+        self.by = *by;
+        match of {
+            OfRobot::State(StateNames::Behaviors(names)) => self.behavior = Some(names.into()),
+            OfRobot::State(StateNames::Emotions(names)) => self.emotion = Some(names.into()),
+            OfRobot::Variable(name, of_each) => {
+                self.variable = Some(name.clone());
+                if *of_each != ValueBounds::default() {
+                    self.set_bounds(*of_each);
+                }
+            }
+            OfRobot::Walked | OfRobot::DistanceTo(_) | OfRobot::Inside(_) => {}
+        }
+    }
+}
+
 impl std::fmt::Display for VariableOfRobot {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}.{}", self.robot, self.variable)
@@ -390,85 +573,155 @@ impl std::fmt::Display for VariableOfRobot {
 }
 
 impl TickCondition {
-    /// Checks that a run of these robots can end when it holds.
+    /// Checks that a run can end when it holds.
     ///
     /// # Errors
-    /// [`TickConditionError::UnknownRobot`], and [`TickConditionError::TooLate`] for events that a tick gets after its end is
-    /// decided.
-    pub fn check_end(&self, roster: &[RobotName]) -> Result<(), TickConditionError> {
-        let mut kinds = self.patterns().map(Pattern::kind);
+    /// As [`Self::check`], and [`TickConditionError::TooLate`] for events that a tick gets after its end is decided.
+    pub fn check_end(&self, setting: &Setting) -> Result<(), TickConditionError> {
+        let mut kinds = self.patterns().into_iter().map(Pattern::kind);
         if let Some(kind) = kinds.find(|kind| AFTER_THE_TICK.contains(kind)) {
             return Err(TickConditionError::TooLate(kind.to_owned()));
         }
-        match self.unknown_robot(roster) {
-            Some(name) => Err(TickConditionError::UnknownRobot(name)),
-            None => Ok(()),
-        }
+        self.check(setting)
     }
 
-    /// The first robot that it names and a run of these robots does not have.
-    pub(crate) fn unknown_robot(&self, roster: &[RobotName]) -> Option<String> {
-        let mut named = self.robots().into_iter();
-        let unknown = named.find(|name| !is_known(name, roster))?;
-        Some(unknown.to_owned())
+    /// Checks that a run has what it names.
+    ///
+    /// # Errors
+    /// [`TickConditionError::UnknownRobot`], or a number of robots or places that the run does not have.
+    pub fn check(&self, setting: &Setting) -> Result<(), TickConditionError> {
+        let mut numbers = Vec::new();
+        self.visit(&mut |alternative| {
+            if let Alternative::Number(number) = alternative {
+                numbers.push(&number.quantity);
+            }
+        });
+        for quantity in numbers {
+            quantity.check(setting)?;
+        }
+
+        for name in self.robots() {
+            if !is_known(name, &setting.roster) {
+                return Err(TickConditionError::UnknownRobot(name.to_owned()));
+            }
+        }
+        Ok(())
     }
 
     /// The patterns of its events.
-    pub(crate) fn patterns(&self) -> impl Iterator<Item = &Pattern> {
-        self.0.iter().filter_map(|alternative| match alternative {
-            Alternative::Event(pattern) => Some(pattern),
-            _ => None,
-        })
+    pub(crate) fn patterns(&self) -> Vec<&Pattern> {
+        let mut patterns = Vec::new();
+        self.visit(&mut |alternative| {
+            if let Alternative::Event(pattern) = alternative {
+                patterns.push(pattern);
+            }
+        });
+        patterns
     }
 
     /// The words that robots choose and that it names.
     pub(crate) fn words(&self) -> Vec<Word> {
         let mut named = Vec::new();
-        for alternative in &self.0 {
-            match alternative {
-                Alternative::Event(pattern) => named.extend(pattern.words()),
-                Alternative::State(state) => named.extend(state.words()),
-                Alternative::Overlap(_) | Alternative::Stalled(_) => {}
-            }
-        }
+        self.visit(&mut |alternative| match alternative {
+            Alternative::Event(pattern) => named.extend(pattern.words()),
+            Alternative::State(state) => named.extend(state.words()),
+            Alternative::Number(number) => named.extend(number.quantity.words()),
+            Alternative::All(_) | Alternative::Overlap(_) | Alternative::Stalled(_) => {}
+        });
         named
     }
 
     /// Whether it depends on anything but events.
     pub(crate) fn needs_states(&self) -> bool {
-        let mut alternatives = self.0.iter();
-        alternatives.any(|alternative| !matches!(alternative, Alternative::Event(_)))
+        let mut needs = false;
+        self.visit(&mut |alternative| {
+            needs |= !matches!(alternative, Alternative::Event(_) | Alternative::All(_));
+        });
+        needs
     }
 
-    /// The robots that it names.
+    /// The robots that it names, or patterns of them.
     pub(crate) fn robots(&self) -> Vec<&str> {
         let mut robots = Vec::new();
-        for alternative in &self.0 {
-            match alternative {
-                Alternative::Event(pattern) => robots.extend(pattern.robots()),
-                Alternative::State(state) => robots.push(state.robot.as_str()),
-                Alternative::Overlap(named) => {
-                    robots.extend(named.iter().flatten().map(RobotName::as_str));
+        self.visit(&mut |alternative| match alternative {
+            Alternative::Event(pattern) => robots.extend(pattern.robots()),
+            Alternative::State(state) => robots.push(state.robot.as_str()),
+            Alternative::Number(number) => {
+                let patterns = number.quantity.team().patterns().iter();
+                robots.extend(patterns.map(RobotPattern::as_str));
+            }
+            Alternative::All(_) => {}
+            Alternative::Overlap(named) => {
+                robots.extend(named.iter().flatten().map(RobotName::as_str));
+            }
+            Alternative::Stalled(stalled) => {
+                let progress = stalled.progress.iter();
+                robots.extend(progress.map(|counter| counter.robot.as_str()));
+            }
+        });
+        robots
+    }
+
+    /// The state variables that it needs: robots, or patterns of them, and names.
+    pub(crate) fn variables(&self) -> Vec<(&str, &str)> {
+        let mut variables = Vec::new();
+        self.visit(&mut |alternative| match alternative {
+            Alternative::State(state) => {
+                if let Is::Variable(name, _) = &state.is {
+                    variables.push((state.robot.as_str(), name.as_str()));
                 }
-                Alternative::Stalled(stalled) => {
-                    robots.extend(
-                        stalled
-                            .progress
-                            .iter()
-                            .map(|counter| counter.robot.as_str()),
-                    );
+            }
+            Alternative::Number(number) => variables.extend(number.quantity.variables()),
+            Alternative::Stalled(stalled) => {
+                for VariableOfRobot { robot, variable } in &stalled.progress {
+                    variables.push((robot.as_str(), variable.as_str()));
+                }
+            }
+            Alternative::Event(_) | Alternative::All(_) | Alternative::Overlap(_) => {}
+        });
+        variables
+    }
+
+    /// Shows each alternative, and those of the conditions in it.
+    fn visit<'a>(&'a self, see: &mut impl FnMut(&'a Alternative)) {
+        let mut open: Vec<&Self> = vec![self];
+        while let Some(condition) = open.pop() {
+            for alternative in &condition.0 {
+                see(alternative);
+                if let Alternative::All(all) = alternative {
+                    open.extend(all.parts.iter().rev());
                 }
             }
         }
+    }
 
-        robots
+    /// Number of all conditions in it.
+    fn parts(&self) -> usize {
+        let mut parts = 0;
+        self.visit(&mut |_| parts += 1);
+        parts
+    }
+
+    /// How deep conditions are in each other.
+    fn depth(&self) -> usize {
+        let mut deepest = 0;
+        for alternative in &self.0 {
+            if let Alternative::All(all) = alternative {
+                let parts = all.parts.iter().map(Self::depth);
+                deepest = parts.fold(deepest, usize::max);
+            }
+        }
+        deepest + 1
     }
 }
 
-/// Whether a run of these robots has the robot, or the operator is meant.
+/// Whether a run of these robots has the robot, or one that matches the pattern, or the operator is meant.
 pub(crate) fn is_known(name: &str, roster: &[RobotName]) -> bool {
     let is_operator = name == RobotName::operator().as_str();
-    is_operator || roster.iter().any(|robot| robot.as_str() == name)
+    is_operator
+        || roster
+            .iter()
+            .any(|robot| overlap_of_names(name, robot.as_str()))
 }
 
 impl LastingState {
@@ -510,6 +763,10 @@ struct Tracked {
     before: Vec<Option<f64>>,
     /// What a robot would have to publish so that the alternative can hold, and has not published yet.
     unknown: Option<String>,
+    /// The number that it compares.
+    gauge: Option<Gauge>,
+    /// The conditions that hold together.
+    parts: Vec<Evaluation>,
 }
 
 impl Evaluation {
@@ -523,6 +780,17 @@ impl Evaluation {
                 since: None,
                 before: Vec::new(),
                 unknown: None,
+                gauge: match alternative {
+                    Alternative::Number(number) => Some(Gauge::new(&number.quantity, setting)),
+                    _ => None,
+                },
+                parts: match alternative {
+                    Alternative::All(all) => {
+                        let parts = all.parts.iter();
+                        parts.map(|part| Self::new(part, setting)).collect()
+                    }
+                    _ => Vec::new(),
+                },
             });
         }
 
@@ -546,6 +814,8 @@ impl Evaluation {
                     overlap(robots, self.body_m, seen)
                 }
                 Alternative::State(_) => tracked.state(self.tick_s, seen),
+                Alternative::Number(_) => tracked.number(self.tick_s, seen),
+                Alternative::All(_) => tracked.all(self.tick_s, seen),
                 Alternative::Stalled(_) => tracked.stalled(self.tick_s, seen),
             };
             reason = reason.or(held);
@@ -617,20 +887,83 @@ impl Tracked {
         }
 
         // The words are made only where they are needed: this runs in every tick.
-        let since = *self.since.get_or_insert(seen.tick);
-        let Some(lasting) = condition.lasting else {
-            return Some(condition.is.in_words(robot, state));
+        let since = self.since_when(condition.lasting, tick_s, seen.tick)?;
+        let Alternative::State(condition) = &self.alternative else {
+            return None;
         };
-        // In the tick in which it begins a state has lasted for no time.
-        if seen.tick - since < ticks_in(lasting, tick_s) {
+        let words = condition.is.in_words(&condition.robot, state);
+        Some(lasting_words(words, condition.lasting, since, tick_s))
+    }
+
+    fn number(&mut self, tick_s: f64, seen: &Observation<'_>) -> Option<String> {
+        let Alternative::Number(condition) = &self.alternative else {
+            return None;
+        };
+        let bounds = condition.bounds;
+        let lasting = condition.lasting;
+        let is_truth = condition.quantity.is_truth();
+        let value = match self.gauge.as_mut()?.value(seen) {
+            Ok(value) => value,
+            Err(undefined) => {
+                self.since = None;
+                self.unknown.get_or_insert_with(|| undefined.to_string());
+                return None;
+            }
+        };
+        self.unknown = None;
+        let holds = if is_truth {
+            value != 0.0
+        } else {
+            bounds.hold(value)
+        };
+        if !holds {
+            self.since = None;
             return None;
         }
-        Some(format!(
-            "{} for {} s, since {}",
-            condition.is.in_words(robot, state),
-            lasting.0,
-            place(since, tick_s)
-        ))
+
+        let since = self.since_when(lasting, tick_s, seen.tick)?;
+        let Alternative::Number(LastingNumber { quantity, .. }) = &self.alternative else {
+            return None;
+        };
+        let words = if is_truth {
+            format!("{quantity} holds")
+        } else {
+            format!("{quantity} is {value}")
+        };
+        Some(lasting_words(words, lasting, since, tick_s))
+    }
+
+    fn all(&mut self, tick_s: f64, seen: &Observation<'_>) -> Option<String> {
+        let Alternative::All(all) = &self.alternative else {
+            return None;
+        };
+        let lasting = all.lasting;
+        let mut reasons = Vec::new();
+        let mut unknown = None;
+        for part in &mut self.parts {
+            // All of them, because some depend on the ticks before.
+            match part.holds(seen) {
+                Some(reason) => reasons.push(reason),
+                None => unknown = unknown.or_else(|| part.unknown().map(str::to_owned)),
+            }
+        }
+        self.unknown = unknown;
+        if reasons.len() < self.parts.len() {
+            self.since = None;
+            return None;
+        }
+
+        let since = self.since_when(lasting, tick_s, seen.tick)?;
+        let words = reasons.join(", and ");
+        Some(lasting_words(words, lasting, since, tick_s))
+    }
+
+    /// Since when a state that holds has held, if it has held for long enough.
+    fn since_when(&mut self, lasting: Option<Time>, tick_s: f64, tick: Tick) -> Option<Tick> {
+        let since = *self.since.get_or_insert(tick);
+        // In the tick in which it begins a state has lasted for no time.
+        let least = lasting.map_or(0, |lasting| ticks_in(lasting, tick_s));
+        (tick - since >= least).then_some(since)
     }
 
     fn stalled(&mut self, tick_s: f64, seen: &Observation<'_>) -> Option<String> {
@@ -678,6 +1011,18 @@ impl Tracked {
     }
 }
 
+/// What has held, with the time for which it had to.
+fn lasting_words(words: String, lasting: Option<Time>, since: Tick, tick_s: f64) -> String {
+    match lasting {
+        Some(lasting) => format!(
+            "{words} for {} s, since {}",
+            lasting.0,
+            place(since, tick_s)
+        ),
+        None => words,
+    }
+}
+
 impl Is {
     /// Whether a robot is in the state; `None` if it publishes no such number.
     fn holds(&self, state: RobotState<'_>) -> Option<bool> {
@@ -715,23 +1060,6 @@ fn unpublished(robot: &RobotName, variable: &str) -> String {
 /// A tick and its time, in words.
 pub(crate) fn place(tick: Tick, tick_s: f64) -> String {
     format!("tick {tick} ({} s)", tick_seconds(tick, tick_s))
-}
-
-fn number(state: RobotState<'_>, variable: &str) -> Option<f64> {
-    match state.state_variables.get(variable)? {
-        Variable::Number(number) => Some(*number),
-        Variable::Flag(flag) => Some(f64::from(*flag)),
-        Variable::Text(_) => None,
-    }
-}
-
-impl ValueBounds {
-    fn hold(&self, value: f64) -> bool {
-        self.at_least.is_none_or(|bound| value >= bound)
-            && self.at_most.is_none_or(|bound| value <= bound)
-            && self.above.is_none_or(|bound| value > bound)
-            && self.below.is_none_or(|bound| value < bound)
-    }
 }
 
 /// Two of these robots that overlap: the first pair from left to right.

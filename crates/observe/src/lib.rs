@@ -2,9 +2,12 @@
 
 mod condition;
 pub mod expect;
+mod expression;
 pub mod measure;
 mod pattern;
+mod places;
 mod probe;
+mod quantity;
 pub mod words;
 
 use protocol::messages::{Point, StateVariables};
@@ -12,9 +15,12 @@ use protocol::{Event, RobotName, Tick};
 
 pub use condition::{Evaluation, TickCondition, TickConditionError};
 pub use expect::{Expectation, Judgment, Monitor, Monitors};
+pub use expression::{Expression, ExpressionError};
 pub use measure::{Measure, MeasureError, MeasureSource, Measured};
 pub use pattern::{Pattern, PatternError};
+pub use places::Region;
 pub use probe::Probe;
+pub use quantity::{By, OfRobot, OfValues, Quantity, QuantityError, StateNames, Team, ValueBounds};
 pub use words::Words;
 
 /// What conditions and measures depend on beside the ticks of a run.

@@ -9,8 +9,15 @@ use serde::de::{MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 use toml::Spanned;
 
+use crate::condition::TickCondition;
+use crate::expression::Expression;
 use crate::pattern::Pattern;
+use crate::quantity::{
+    By, OfRobot, OfValues, PlaceKind, PlaceTable, Quantity, QuantityError, StateNames, Team,
+    ValueBounds,
+};
 use crate::words::{self, Word};
+use crate::{Setting, TickConditionError};
 
 /// Longest name of a measure, bytes.
 const MAX_NAME_BYTES: usize = 100;
@@ -48,16 +55,16 @@ pub enum MeasureSource {
     Time(TimeTo),
     /// Durations between pairs of events.
     Between(Between),
-    /// Share of the simulated time in which a robot has one of these emotions or behaviors, 0 to 1.
-    Share(Share),
-    /// A state variable of a robot.
-    Variable(OfVariable),
+    /// Share of the simulated time in which robots have one of these emotions or behaviors, 0 to 1, or how many of them have.
+    Share(Quantity),
+    /// A number of robots or places.
+    Number(Number),
     /// Time of the last progress before the robots come to a standstill.
     Stalled(Stalled),
-    /// How evenly a number is spread over robots.
-    Jain(Jain),
     /// One number over another one.
     Ratio(Box<Ratio>),
+    /// A number that is made of those of earlier measures.
+    Expression(Expression),
 }
 
 /// A count of events.
@@ -79,14 +86,23 @@ pub enum When {
     After,
 }
 
-/// The time from one event to another, seconds. The events of a tick happen at the same time.
+/// A number of robots or places, which has a value in each tick.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Number {
+    /// What has it.
+    pub quantity: Quantity,
+    /// The number of its values that is taken.
+    pub taken: OfValues,
+}
+
+/// The time from one condition to another, seconds. The events of a tick happen at the same time.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TimeTo {
-    /// The first of these events, in the tick of `after` or later, ends the time.
-    pub to: Pattern,
-    /// The first of these events begins the time; without it the time begins with the run.
-    pub after: Option<Pattern>,
+    /// The first tick in which this holds, that of `after` or a later one, ends the time.
+    pub to: TickCondition,
+    /// The first tick in which this holds begins the time; without it the time begins with the run.
+    pub after: Option<TickCondition>,
 }
 
 /// Durations between pairs of events, seconds. Events of a tick are taken in the order of the record, and an event that is both
@@ -120,52 +136,6 @@ pub enum OfDurations {
     Count,
 }
 
-/// The states of a robot whose share of the time of the run is measured. While it takes no part, it is in none.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(try_from = "RawShare")]
-pub struct Share {
-    /// The robot.
-    pub robot: RobotName,
-    /// The states.
-    pub states: StateNames,
-}
-
-/// Emotions or behaviors.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum StateNames {
-    /// Emotions.
-    Emotions(Vec<String>),
-    /// Behaviors.
-    Behaviors(Vec<String>),
-}
-
-/// A number of a robot's state variable, which keeps its value from one report to the next. A flag is 1 or 0.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct OfVariable {
-    /// The robot.
-    pub robot: RobotName,
-    /// Name of the variable.
-    pub name: String,
-    /// The number of its values that is taken.
-    #[serde(rename = "as")]
-    pub number: OfValues,
-}
-
-/// A number of the values that a variable has during a run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum OfValues {
-    /// The last one.
-    End,
-    /// The largest one.
-    Max,
-    /// Their mean over time.
-    Mean,
-    /// Their integral over time, in the unit of the variable times seconds.
-    Area,
-}
-
 /// A standstill: none of these numbers rises for a time that lasts until the end of the run.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(try_from = "RawStalled")]
@@ -174,17 +144,6 @@ pub struct Stalled {
     pub progress: Vec<Counter>,
     /// Shortest time without progress that counts, seconds.
     pub lasting_s: f64,
-}
-
-/// Jain's index of fairness of a state variable's last values: (Σx)² / (n Σx²), from 1/n, where one of the robots has all, to 1,
-/// where all have the same (Jain, Chiu and Hawe 1984).
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Jain {
-    /// The robots.
-    pub robot: RobotPattern,
-    /// Name of the variable, whose values are 0 or more.
-    pub name: String,
 }
 
 /// One number over another one.
@@ -354,8 +313,8 @@ impl From<f64> for Measured {
 pub enum MeasureError {
     /// It has no kind, or several.
     #[error(
-        "a measure has exactly one of `summary`, `count`, `time`, `between`, `share`, `variable`, `stalled`, `jain` and `ratio`; a \
-         part of a ratio is no ratio"
+        "a measure has exactly one of `summary`, `count`, `time`, `between`, `share`, `variable`, `walked`, `distance`, `inside`, \
+         `covered`, `components`, `stalled`, `jain`, `ratio` and `expression`; a part of a ratio is neither ratio nor expression"
     )]
     NotOne,
     /// It names a part of the run and counts no events.
@@ -378,6 +337,20 @@ pub enum MeasureError {
     /// A variable of a robot that is not `ROBOT.VARIABLE`.
     #[error("\"{0}\" is not a state variable of a robot, such as \"Butler.served\"")]
     NoVariable(String),
+    /// A number of robots or places that cannot be taken.
+    #[error(transparent)]
+    Quantity(#[from] QuantityError),
+    /// A condition that no tick can have.
+    #[error(transparent)]
+    Condition(#[from] TickConditionError),
+    /// An expression names what is no earlier measure.
+    #[error("`expression` names \"{name}\", and {earlier}")]
+    NotEarlier {
+        /// The name.
+        name: String,
+        /// The measures that there are.
+        earlier: String,
+    },
     /// A standstill without a duration or variables.
     #[error("`stalled` names the variables of progress, and a time that is more than zero")]
     NoProgress,
@@ -398,11 +371,17 @@ struct RawMeasure {
     count: Option<Spanned<Pattern>>,
     time: Option<Spanned<TimeTo>>,
     between: Option<Spanned<Between>>,
-    share: Option<Spanned<Share>>,
-    variable: Option<Spanned<OfVariable>>,
+    share: Option<Spanned<RawShare>>,
+    variable: Option<Spanned<RawVariable>>,
+    walked: Option<Spanned<PlaceTable>>,
+    distance: Option<Spanned<PlaceTable>>,
+    inside: Option<Spanned<PlaceTable>>,
+    covered: Option<Spanned<PlaceTable>>,
+    components: Option<Spanned<PlaceTable>>,
     stalled: Option<Spanned<Stalled>>,
-    jain: Option<Spanned<Jain>>,
+    jain: Option<Spanned<RawJain>>,
     ratio: Option<Spanned<Ratio>>,
+    expression: Option<Spanned<Expression>>,
 }
 
 /// A part of a ratio as written in the file.
@@ -414,18 +393,44 @@ struct RawRatioTerm {
     count: Option<Spanned<Pattern>>,
     time: Option<Spanned<TimeTo>>,
     between: Option<Spanned<Between>>,
-    share: Option<Spanned<Share>>,
-    variable: Option<Spanned<OfVariable>>,
+    share: Option<Spanned<RawShare>>,
+    variable: Option<Spanned<RawVariable>>,
+    walked: Option<Spanned<PlaceTable>>,
+    distance: Option<Spanned<PlaceTable>>,
+    inside: Option<Spanned<PlaceTable>>,
+    covered: Option<Spanned<PlaceTable>>,
+    components: Option<Spanned<PlaceTable>>,
     stalled: Option<Spanned<Stalled>>,
-    jain: Option<Spanned<Jain>>,
+    jain: Option<Spanned<RawJain>>,
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawShare {
-    robot: RobotName,
+    robot: Option<RobotName>,
+    robots: Option<Team>,
+    by: Option<By>,
     emotion: Option<OneOrMoreWords>,
     behavior: Option<OneOrMoreWords>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawVariable {
+    robot: Option<RobotName>,
+    robots: Option<Team>,
+    by: Option<By>,
+    name: String,
+    #[serde(rename = "as")]
+    taken: OfValues,
+}
+
+/// Short for a variable of robots by `jain` at the end.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawJain {
+    robot: RobotPattern,
+    name: String,
 }
 
 /// One word, or several.
@@ -457,12 +462,20 @@ impl TryFrom<RawMeasure> for Measure {
             between: raw.between,
             share: raw.share,
             variable: raw.variable,
+            walked: raw.walked,
+            distance: raw.distance,
+            inside: raw.inside,
+            covered: raw.covered,
+            components: raw.components,
             stalled: raw.stalled,
             jain: raw.jain,
         };
-        let (kind, span) = match (raw.ratio, part.check()?) {
-            (None, Some(kind)) => kind,
-            (Some(ratio), None) => spanned(ratio, |ratio| MeasureSource::Ratio(Box::new(ratio))),
+        let (kind, span) = match (raw.ratio, raw.expression, part.check()?) {
+            (None, None, Some(kind)) => kind,
+            (Some(ratio), None, None) => {
+                spanned(ratio, |ratio| MeasureSource::Ratio(Box::new(ratio)))
+            }
+            (None, Some(expression), None) => spanned(expression, MeasureSource::Expression),
             _ => return Err(MeasureError::NotOne),
         };
 
@@ -497,7 +510,11 @@ impl RawRatioTerm {
         if let Some(time) = &self.time
             && let Some(after) = &time.get_ref().after
         {
-            check_pair(("after", after), ("to", &time.get_ref().to), &["robot"])?;
+            for begin in after.patterns() {
+                for end in time.get_ref().to.patterns() {
+                    check_pair(("after", begin), ("to", end), &["robot"])?;
+                }
+            }
         }
         if let Some(between) = &self.between {
             let Between { begin, end, .. } = between.get_ref();
@@ -516,12 +533,16 @@ impl RawRatioTerm {
             self.time.map(|time| spanned(time, MeasureSource::Time)),
             self.between
                 .map(|between| spanned(between, MeasureSource::Between)),
-            self.share.map(|share| spanned(share, MeasureSource::Share)),
-            self.variable
-                .map(|variable| spanned(variable, MeasureSource::Variable)),
+            checked(self.share, RawShare::check)?,
+            checked(self.variable, RawVariable::check)?,
+            place(PlaceKind::Walked, self.walked)?,
+            place(PlaceKind::Distance, self.distance)?,
+            place(PlaceKind::Inside, self.inside)?,
+            place(PlaceKind::Covered, self.covered)?,
+            place(PlaceKind::Components, self.components)?,
             self.stalled
                 .map(|stalled| spanned(stalled, MeasureSource::Stalled)),
-            self.jain.map(|jain| spanned(jain, MeasureSource::Jain)),
+            self.jain.map(|jain| spanned(jain, RawJain::source)),
         ];
         let mut kinds = kinds.into_iter().flatten();
         let kind = kinds.next();
@@ -554,6 +575,30 @@ fn spanned<T>(
 ) -> (MeasureSource, Range<usize>) {
     let span = raw.span();
     (kind(raw.into_inner()), span)
+}
+
+type Sourced = (MeasureSource, Range<usize>);
+
+fn checked<T>(
+    raw: Option<Spanned<T>>,
+    check: impl FnOnce(T) -> Result<MeasureSource, MeasureError>,
+) -> Result<Option<Sourced>, MeasureError> {
+    let Some(raw) = raw else {
+        return Ok(None);
+    };
+    let span = raw.span();
+    Ok(Some((check(raw.into_inner())?, span)))
+}
+
+fn place(
+    kind: PlaceKind,
+    table: Option<Spanned<PlaceTable>>,
+) -> Result<Option<Sourced>, MeasureError> {
+    checked(table, |table| {
+        let taken = table.number.unwrap_or_default();
+        let quantity = table.check(kind)?;
+        Ok(MeasureSource::Number(Number { quantity, taken }))
+    })
 }
 
 /// Checks the name of a measure, of a factor, of an arm or of a condition: it is printed in tables.
@@ -594,18 +639,37 @@ fn word_of(path: &str) -> Option<Word> {
     })
 }
 
-impl TryFrom<RawShare> for Share {
-    type Error = MeasureError;
-
-    fn try_from(raw: RawShare) -> Result<Self, MeasureError> {
-        let states = match (raw.emotion, raw.behavior) {
+impl RawShare {
+    fn check(self) -> Result<MeasureSource, MeasureError> {
+        let states = match (self.emotion, self.behavior) {
             (Some(emotions), None) => StateNames::Emotions(emotions.list()?),
             (None, Some(behaviors)) => StateNames::Behaviors(behaviors.list()?),
             _ => return Err(MeasureError::NoStates),
         };
-        Ok(Self {
-            robot: raw.robot,
-            states,
+        let of = OfRobot::State(states);
+        let quantity = Quantity::each("share", self.robot, self.robots, self.by, of)?;
+        Ok(MeasureSource::Share(quantity))
+    }
+}
+
+impl RawVariable {
+    fn check(self) -> Result<MeasureSource, MeasureError> {
+        let of = OfRobot::Variable(self.name, ValueBounds::default());
+        let quantity = Quantity::each("variable", self.robot, self.robots, self.by, of)?;
+        let taken = self.taken;
+        Ok(MeasureSource::Number(Number { quantity, taken }))
+    }
+}
+
+impl RawJain {
+    fn source(self) -> MeasureSource {
+        MeasureSource::Number(Number {
+            quantity: Quantity::Each {
+                team: Team::One(self.robot),
+                by: Some(By::Jain),
+                of: OfRobot::Variable(self.name, ValueBounds::default()),
+            },
+            taken: OfValues::End,
         })
     }
 }
@@ -702,6 +766,54 @@ impl Measure {
         self.span.clone()
     }
 
+    /// Checks that a run can have what it measures.
+    ///
+    /// # Errors
+    /// [`MeasureError`].
+    pub fn check(&self, setting: &Setting) -> Result<(), MeasureError> {
+        for source in self.sources() {
+            match source {
+                MeasureSource::Share(quantity) | MeasureSource::Number(Number { quantity, .. }) => {
+                    quantity.check(setting)?;
+                }
+                MeasureSource::Time(time) => {
+                    for condition in time.after.iter().chain([&time.to]) {
+                        condition.check(setting)?;
+                    }
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks it as a measure that follows others in a file: an expression names such ones only.
+    ///
+    /// # Errors
+    /// [`MeasureError::NotEarlier`].
+    pub fn check_after(&self, earlier: &[Self]) -> Result<(), MeasureError> {
+        let MeasureSource::Expression(expression) = &self.kind else {
+            return Ok(());
+        };
+        for name in expression.names() {
+            if earlier.iter().any(|measure| measure.name == name) {
+                continue;
+            }
+            let known: Vec<&str> = earlier
+                .iter()
+                .map(|measure| measure.name.as_str())
+                .collect();
+            return Err(MeasureError::NotEarlier {
+                name: name.to_owned(),
+                earlier: match known.is_empty() {
+                    true => "no measure is before it".to_owned(),
+                    false => format!("before it there are {}", known.join(", ")),
+                },
+            });
+        }
+        Ok(())
+    }
+
     /// The sources that its number is made of: its own, or those of the parts of a ratio.
     #[must_use]
     pub fn sources(&self) -> Vec<&MeasureSource> {
@@ -741,52 +853,38 @@ impl Measure {
 
 impl MeasureSource {
     fn words(&self) -> Vec<Word> {
-        let share = match self {
-            MeasureSource::Count(count) => return count.pattern.words(),
-            MeasureSource::Time(time) => {
+        match self {
+            Self::Count(count) => count.pattern.words(),
+            Self::Time(time) => {
                 let mut named = time.to.words();
-                named.extend(time.after.iter().flat_map(Pattern::words));
-                return named;
+                named.extend(time.after.iter().flat_map(TickCondition::words));
+                named
             }
-            MeasureSource::Between(between) => {
+            Self::Between(between) => {
                 let mut named = between.begin.words();
                 named.extend(between.end.words());
-                return named;
+                named
             }
-            MeasureSource::Share(share) => share,
-            MeasureSource::Summary(path) => return word_of(path).into_iter().collect(),
-            MeasureSource::Variable(_)
-            | MeasureSource::Stalled(_)
-            | MeasureSource::Jain(_)
-            | MeasureSource::Ratio(_) => return Vec::new(),
-        };
-
-        let (kind, states) = match &share.states {
-            StateNames::Emotions(states) => (words::WordKind::Emotion, states),
-            StateNames::Behaviors(states) => (words::WordKind::Behavior, states),
-        };
-        let mut named = Vec::new();
-        for state in states {
-            named.push(Word {
-                kind,
-                robots: vec![share.robot.to_string()],
-                word: state.clone(),
-            });
+            Self::Share(quantity) => quantity.words(),
+            Self::Summary(path) => word_of(path).into_iter().collect(),
+            Self::Number(_) | Self::Stalled(_) | Self::Ratio(_) | Self::Expression(_) => Vec::new(),
         }
-        named
     }
 
     fn expectations(&self) -> Vec<&str> {
         let patterns = match self {
             Self::Count(count) => vec![&count.pattern],
-            Self::Time(time) => time.after.iter().chain([&time.to]).collect(),
+            Self::Time(time) => {
+                let conditions = time.after.iter().chain([&time.to]);
+                conditions.flat_map(TickCondition::patterns).collect()
+            }
             Self::Between(between) => vec![&between.begin, &between.end],
             Self::Summary(_)
             | Self::Share(_)
-            | Self::Variable(_)
+            | Self::Number(_)
             | Self::Stalled(_)
-            | Self::Jain(_)
-            | Self::Ratio(_) => Vec::new(),
+            | Self::Ratio(_)
+            | Self::Expression(_) => Vec::new(),
         };
         let named = patterns.into_iter().flat_map(Pattern::expectations);
         named.collect()
@@ -794,14 +892,17 @@ impl MeasureSource {
 
     fn variables(&self) -> Vec<(&str, &str)> {
         match self {
-            Self::Variable(variable) => vec![(variable.robot.as_str(), variable.name.as_str())],
+            Self::Number(number) => number.quantity.variables(),
+            Self::Time(time) => {
+                let conditions = time.after.iter().chain([&time.to]);
+                conditions.flat_map(TickCondition::variables).collect()
+            }
             Self::Stalled(stalled) => {
                 let progress = stalled.progress.iter();
                 progress
                     .map(|counter| (counter.robot.as_str(), counter.variable.as_str()))
                     .collect()
             }
-            Self::Jain(jain) => vec![(jain.robot.as_str(), jain.name.as_str())],
             _ => Vec::new(),
         }
     }
@@ -816,21 +917,23 @@ impl MeasureSource {
                 .collect(),
             Self::Count(count) => count.pattern.robots().collect(),
             Self::Time(time) => {
-                let after = time.after.iter().flat_map(Pattern::robots);
-                time.to.robots().chain(after).collect()
+                let mut named = time.to.robots();
+                named.extend(time.after.iter().flat_map(TickCondition::robots));
+                named
             }
             Self::Between(between) => {
                 let ends = between.end.robots();
                 between.begin.robots().chain(ends).collect()
             }
-            Self::Share(share) => vec![share.robot.as_str()],
-            Self::Variable(variable) => vec![variable.robot.as_str()],
+            Self::Share(quantity) | Self::Number(Number { quantity, .. }) => {
+                let patterns = quantity.team().patterns().iter();
+                patterns.map(RobotPattern::as_str).collect()
+            }
             Self::Stalled(stalled) => {
                 let progress = stalled.progress.iter();
                 progress.map(|counter| counter.robot.as_str()).collect()
             }
-            Self::Jain(jain) => vec![jain.robot.as_str()],
-            Self::Ratio(_) => Vec::new(),
+            Self::Ratio(_) | Self::Expression(_) => Vec::new(),
         }
     }
 }

@@ -1,15 +1,20 @@
 //! Takes a measure of a run, one observation after the other.
 
-use protocol::time::time_s;
-use protocol::{RobotName, Tick};
-use serde_json::Value;
-use timeline::{Span, StateKind, Timeline};
+use std::collections::BTreeMap;
 
-use crate::Observation;
+use protocol::time::time_s;
+use protocol::{Event, RobotName, Tick};
+use serde_json::Value;
+
+use crate::condition::Evaluation;
+use crate::expression::Expression;
 use crate::measure::{
-    Between, Count, Jain, Measure, MeasureSource, Measured, OfDurations, OfValues, OfVariable,
-    Parts, Share, Stalled, StateNames, TimeTo, When,
+    Between, Count, Measure, MeasureSource, Measured, Number, OfDurations, Parts, Stalled, When,
 };
+use crate::quantity::{
+    By, Gauge, OfRobot, OfValues, Quantity, StateNames, Undefined, number as number_of_state,
+};
+use crate::{Observation, Setting};
 
 /// Tables of a robot's summary that have entries for what occurred.
 const OCCURRED: [&str; 4] = ["emotions_s", "behaviors_s", "entered", "sent"];
@@ -20,31 +25,48 @@ pub struct Probe<'a> {
     /// The last tick. A run begins with 0.
     now: Tick,
     tick_s: f64,
+    /// The last tick that is planned.
+    planned: Tick,
+    /// Whether the run ended before it, because its question was answered.
+    has_ended_early: bool,
     tally: Tally<'a>,
+}
+
+/// When a run ended.
+#[derive(Debug, Clone, Copy)]
+struct Ending {
+    tick_s: f64,
+    /// Its last tick.
+    now: Tick,
+    /// The tick up to which it is known that nothing more happens in it. In a run that `end_when` has ended that is its planned end:
+    /// what it did not reach before will not happen in it. To take it as at risk of happening after the early end would be to
+    /// suppose that runs that end early and others do not differ (Fine and Gray 1999).
+    horizon: Tick,
 }
 
 #[derive(Debug)]
 enum Tally<'a> {
     Summary(&'a str),
     Count(CountTally<'a>),
-    Time(TimeTally<'a>),
+    Time(TimeTally),
     Between(BetweenTally<'a>),
     Share(ShareTally<'a>),
-    Variable(VariableTally<'a>),
+    Number(NumberTally<'a>),
     Stalled(StalledTally<'a>),
-    Jain(JainTally<'a>),
     Ratio(RatioTally<'a>),
+    Expression(&'a Expression),
 }
 
 impl<'a> Probe<'a> {
-    /// A measure of a run of these robots that has not begun. The condition of the run begins and ends at these times, simulated
-    /// seconds.
+    /// A measure of a run that has not begun. The condition of the run begins and ends at these times, simulated seconds.
     #[must_use]
-    pub fn new(measure: &'a Measure, roster: &[RobotName], condition_s: (f64, f64)) -> Self {
+    pub fn new(measure: &'a Measure, setting: &Setting, condition_s: (f64, f64)) -> Self {
         Self {
             now: 0,
             tick_s: 0.0,
-            tally: Tally::new(&measure.kind, roster, condition_s),
+            planned: setting.ticks,
+            has_ended_early: false,
+            tally: Tally::new(&measure.kind, setting, condition_s),
         }
     }
 
@@ -52,18 +74,39 @@ impl<'a> Probe<'a> {
     pub fn observe(&mut self, observation: &Observation<'_>) {
         self.now = observation.tick;
         self.tick_s = observation.tick_s;
+        let is_early = |event: &Event| {
+            matches!(
+                event,
+                Event::End {
+                    because: Some(_),
+                    ..
+                }
+            )
+        };
+        self.has_ended_early |= observation.events.last().is_some_and(is_early);
         self.tally.observe(observation);
     }
 
-    /// What the measure gives at the end of the run, the summary of which is given as JSON.
+    /// What the measure gives at the end of the run, the summary of which is given as JSON, and what the measures before it in the
+    /// file give, by their names.
     #[must_use]
-    pub fn measured(&self, summary: &Value) -> Measured {
-        self.tally.measured(summary, self.now, self.tick_s)
+    pub fn measured(&self, summary: &Value, earlier: &BTreeMap<String, Measured>) -> Measured {
+        let horizon = if self.has_ended_early {
+            self.planned.max(self.now)
+        } else {
+            self.now
+        };
+        let end = Ending {
+            tick_s: self.tick_s,
+            now: self.now,
+            horizon,
+        };
+        self.tally.measured(summary, earlier, end)
     }
 }
 
 impl<'a> Tally<'a> {
-    fn new(source: &'a MeasureSource, roster: &[RobotName], condition_s: (f64, f64)) -> Self {
+    fn new(source: &'a MeasureSource, setting: &Setting, condition_s: (f64, f64)) -> Self {
         match source {
             MeasureSource::Summary(path) => Self::Summary(path),
             MeasureSource::Count(count) => Self::Count(CountTally {
@@ -72,7 +115,11 @@ impl<'a> Tally<'a> {
                 count: 0,
             }),
             MeasureSource::Time(time) => Self::Time(TimeTally {
-                definition: time,
+                after: time
+                    .after
+                    .as_ref()
+                    .map(|after| Evaluation::new(after, setting)),
+                to: Evaluation::new(&time.to, setting),
                 begun: time.after.is_none().then_some(0),
                 reached: None,
             }),
@@ -81,32 +128,23 @@ impl<'a> Tally<'a> {
                 open: None,
                 durations: Durations::default(),
             }),
-            MeasureSource::Share(share) => Self::Share(ShareTally {
-                definition: share,
-                timeline: Timeline::default(),
-                ticks: 0,
-            }),
-            MeasureSource::Variable(variable) => Self::Variable(VariableTally {
-                definition: variable,
+            MeasureSource::Share(quantity) => Self::Share(ShareTally::new(quantity, setting)),
+            MeasureSource::Number(number) => Self::Number(NumberTally {
+                definition: number,
+                gauge: Gauge::new(&number.quantity, setting),
                 values: None,
+                undefined: None,
             }),
             MeasureSource::Stalled(stalled) => Self::Stalled(StalledTally {
                 definition: stalled,
                 values: vec![None; stalled.progress.len()],
                 progress: 0,
             }),
-            MeasureSource::Jain(jain) => {
-                let matching = roster.iter().filter(|robot| jain.robot.matches(robot));
-                Self::Jain(JainTally {
-                    definition: jain,
-                    values: matching.map(|robot| (robot.clone(), None)).collect(),
-                })
-            }
             MeasureSource::Ratio(ratio) => {
                 let tallies = |parts: &'a Parts| {
                     let parts = parts.0.iter();
                     parts
-                        .map(|part| Self::new(part, roster, condition_s))
+                        .map(|part| Self::new(part, setting, condition_s))
                         .collect()
                 };
                 Self::Ratio(RatioTally {
@@ -114,19 +152,19 @@ impl<'a> Tally<'a> {
                     by: tallies(&ratio.by),
                 })
             }
+            MeasureSource::Expression(expression) => Self::Expression(expression),
         }
     }
 
     fn observe(&mut self, observation: &Observation<'_>) {
         match self {
-            Self::Summary(_) => {}
+            Self::Summary(_) | Self::Expression(_) => {}
             Self::Count(tally) => tally.observe(observation),
             Self::Time(tally) => tally.observe(observation),
             Self::Between(tally) => tally.observe(observation),
             Self::Share(tally) => tally.observe(observation),
-            Self::Variable(tally) => tally.observe(observation),
+            Self::Number(tally) => tally.observe(observation),
             Self::Stalled(tally) => tally.observe(observation),
-            Self::Jain(tally) => tally.observe(observation),
             Self::Ratio(tally) => {
                 for part in tally.of.iter_mut().chain(&mut tally.by) {
                     part.observe(observation);
@@ -135,24 +173,42 @@ impl<'a> Tally<'a> {
         }
     }
 
-    fn measured(&self, summary: &Value, now: Tick, tick_s: f64) -> Measured {
+    fn measured(
+        &self,
+        summary: &Value,
+        earlier: &BTreeMap<String, Measured>,
+        end: Ending,
+    ) -> Measured {
         match self {
             Self::Summary(path) => summary_number(summary, path),
             Self::Count(tally) => Measured::from(tally.count as f64),
-            Self::Time(tally) => tally.measured(now, tick_s),
-            Self::Between(tally) => tally.measured(now, tick_s),
-            Self::Share(tally) => tally.measured(now),
-            Self::Variable(tally) => tally.measured(now, tick_s),
-            Self::Stalled(tally) => tally.measured(now, tick_s),
-            Self::Jain(tally) => tally.measured(),
+            Self::Time(tally) => tally.measured(end),
+            Self::Between(tally) => tally.measured(end.now, end.tick_s),
+            Self::Share(tally) => tally.measured(end.now),
+            Self::Number(tally) => tally.measured(end.now, end.tick_s),
+            Self::Stalled(tally) => tally.measured(end),
             Self::Ratio(tally) => {
-                let take = |part: &Tally<'_>| part.measured(summary, now, tick_s);
+                let take = |part: &Tally<'_>| part.measured(summary, earlier, end);
                 ratio(
                     tally.of.iter().map(take).collect(),
                     tally.by.iter().map(take).collect(),
                 )
             }
+            Self::Expression(expression) => {
+                let value = expression.value(&|name| number_of_measure(earlier, name));
+                value.map_or_else(|reason| Measured::Missing { reason }, Measured::from)
+            }
         }
+    }
+}
+
+/// The number of an earlier measure, or why there is none.
+fn number_of_measure(earlier: &BTreeMap<String, Measured>, name: &str) -> Result<f64, String> {
+    match earlier.get(name) {
+        Some(measured) => measured
+            .value()
+            .ok_or_else(|| format!("`{name}` is {measured}")),
+        None => Err(format!("`{name}` was not measured")),
     }
 }
 
@@ -226,10 +282,7 @@ fn sum(value: &Value, path: &[&str]) -> Option<f64> {
 
 /// The last value of a robot's variable, if it is a number or a flag, which is 1 or 0.
 fn number_of(observation: &Observation<'_>, robot: &RobotName, variable: &str) -> Option<f64> {
-    let state = (observation.state)(robot)?;
-    let value = state.state_variables.get(variable)?;
-    let flag = value.as_bool().map(|is_set| f64::from(u8::from(is_set)));
-    value.as_f64().or(flag)
+    number_of_state((observation.state)(robot)?, variable)
 }
 
 #[derive(Debug)]
@@ -261,41 +314,50 @@ impl CountTally<'_> {
 }
 
 #[derive(Debug)]
-struct TimeTally<'a> {
-    definition: &'a TimeTo,
+struct TimeTally {
+    after: Option<Evaluation>,
+    to: Evaluation,
     /// In which tick the time began, and in which it ended.
     begun: Option<Tick>,
     reached: Option<Tick>,
 }
 
-impl TimeTally<'_> {
+impl TimeTally {
     fn observe(&mut self, observation: &Observation<'_>) {
         if self.reached.is_some() {
             return;
         }
 
-        let events = observation.events;
-        if let Some(after) = &self.definition.after
+        // In every tick, also before the time begins: some conditions depend on the ticks before.
+        let is_there = self.to.holds(observation).is_some();
+        if let Some(after) = &mut self.after
             && self.begun.is_none()
-            && events.iter().any(|event| after.matches(event))
+            && after.holds(observation).is_some()
         {
             self.begun = Some(observation.tick);
         }
-
-        let to = &self.definition.to;
-        if self.begun.is_some() && events.iter().any(|event| to.matches(event)) {
+        if self.begun.is_some() && is_there {
             self.reached = Some(observation.tick);
         }
     }
 
-    fn measured(&self, now: Tick, tick_s: f64) -> Measured {
+    fn measured(&self, end: Ending) -> Measured {
+        let unknown = match (self.begun, self.reached, &self.after) {
+            (None, _, Some(after)) => after.unknown(),
+            (_, None, _) => self.to.unknown(),
+            _ => None,
+        };
+        if let Some(unknown) = unknown {
+            let reason = unknown.to_owned();
+            return Measured::Missing { reason };
+        }
         match (self.begun, self.reached) {
             (None, _) => Measured::NotAtRisk,
             (Some(begun), Some(reached)) => Measured::Reached {
-                time_s: time_s(reached - begun, tick_s),
+                time_s: time_s(reached - begun, end.tick_s),
             },
             (Some(begun), None) => Measured::NotReached {
-                waited_s: time_s(now - begun, tick_s),
+                waited_s: time_s(end.horizon - begun, end.tick_s),
             },
         }
     }
@@ -371,39 +433,95 @@ impl BetweenTally<'_> {
     }
 }
 
+/// Robots in one of some states, by events: one that is lost is in none of them until it takes part again.
 #[derive(Debug)]
 struct ShareTally<'a> {
-    definition: &'a Share,
-    timeline: Timeline,
-    /// Ticks in the states before.
-    ticks: Tick,
+    states: &'a StateNames,
+    by: By,
+    /// The robots, in the order of their names.
+    robots: Vec<RobotName>,
+    is_in: Vec<bool>,
+    is_lost: Vec<bool>,
+    /// The number of the robots since this tick.
+    value: f64,
+    since: Tick,
+    /// Its sum over the ticks before.
+    sum: f64,
 }
 
-impl ShareTally<'_> {
-    fn observe(&mut self, observation: &Observation<'_>) {
-        for event in observation.events {
-            for span in self.timeline.apply(observation.tick, event) {
-                self.ticks += self.counted(&span, observation.tick);
-            }
+impl<'a> ShareTally<'a> {
+    fn new(quantity: &'a Quantity, setting: &Setting) -> Self {
+        let Quantity::Each {
+            of: OfRobot::State(states),
+            by,
+            ..
+        } = quantity
+        else {
+            unreachable!("a share is one of states");
+        };
+        let robots = quantity.robots(setting);
+        Self {
+            states,
+            // Of one robot it is the same whichever way.
+            by: by.unwrap_or(By::Mean),
+            is_in: vec![false; robots.len()],
+            is_lost: vec![false; robots.len()],
+            robots,
+            value: 0.0,
+            since: 0,
+            sum: 0.0,
         }
     }
 
-    /// How many ticks of a span count, up to this tick.
-    fn counted(&self, span: &Span, now: Tick) -> Tick {
-        let (kind, states) = match &self.definition.states {
-            StateNames::Emotions(states) => (StateKind::Emotion, states),
-            StateNames::Behaviors(states) => (StateKind::Behavior, states),
-        };
-        match span {
-            Span::Stay(stay)
-                if stay.robot == self.definition.robot
-                    && stay.kind == kind
-                    && states.contains(&stay.name) =>
-            {
-                stay.period.ticks(now)
-            }
-            _ => 0,
+    fn observe(&mut self, observation: &Observation<'_>) {
+        let mut has_changed = false;
+        for event in observation.events {
+            has_changed |= self.note(event);
         }
+        if !has_changed {
+            return;
+        }
+
+        self.sum = self.sum_at(observation.tick);
+        self.since = observation.tick;
+        let states = self.is_in.iter().zip(&self.is_lost);
+        let values: Vec<f64> = states
+            .map(|(is_in, is_lost)| f64::from(u8::from(*is_in && !is_lost)))
+            .collect();
+        // A team without a robot is refused before the run.
+        self.value = self.by.combine(&values, &self.robots).unwrap_or(0.0);
+    }
+
+    /// Takes an event into account. Returns whether a robot of the team may be in another state.
+    fn note(&mut self, event: &Event) -> bool {
+        let index = |robot| self.robots.binary_search(robot).ok();
+        match (event, self.states) {
+            (Event::Emotion { robot, to, .. }, StateNames::Emotions(names))
+            | (Event::Behavior { robot, to, .. }, StateNames::Behaviors(names)) => {
+                let Some(index) = index(robot) else {
+                    return false;
+                };
+                self.is_in[index] = names.contains(to);
+            }
+            (Event::Lost { robot }, _) => {
+                let Some(index) = index(robot) else {
+                    return false;
+                };
+                self.is_lost[index] = true;
+            }
+            (Event::Joined { robot, .. }, _) => {
+                let Some(index) = index(robot) else {
+                    return false;
+                };
+                self.is_lost[index] = false;
+            }
+            _ => return false,
+        }
+        true
+    }
+
+    fn sum_at(&self, now: Tick) -> f64 {
+        self.sum + self.value * (now - self.since) as f64
     }
 
     fn measured(&self, now: Tick) -> Measured {
@@ -411,18 +529,18 @@ impl ShareTally<'_> {
             let reason = "a run that ends with tick 0 lasts for no time".to_owned();
             return Measured::Missing { reason };
         }
-
-        let lasting = self.timeline.in_progress();
-        let lasting: Tick = lasting.iter().map(|span| self.counted(span, now)).sum();
-        Measured::from((self.ticks + lasting) as f64 / now as f64)
+        Measured::from(self.sum_at(now) / now as f64)
     }
 }
 
 #[derive(Debug)]
-struct VariableTally<'a> {
-    definition: &'a OfVariable,
-    /// `None` before the variable has a value.
+struct NumberTally<'a> {
+    definition: &'a Number,
+    gauge: Gauge,
+    /// `None` before the number has a value.
     values: Option<Values>,
+    /// Why it has no value in the last tick.
+    undefined: Option<Undefined>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -433,6 +551,7 @@ struct Values {
     /// The tick in which it got its last value.
     since: Tick,
     max: f64,
+    min: f64,
     /// Sum over the ticks before `since`.
     sum: f64,
 }
@@ -443,19 +562,24 @@ impl Values {
     }
 }
 
-impl VariableTally<'_> {
+impl NumberTally<'_> {
     fn observe(&mut self, observation: &Observation<'_>) {
-        let definition = self.definition;
-        let Some(value) = number_of(observation, &definition.robot, &definition.name) else {
-            return;
+        let value = match self.gauge.value(observation) {
+            Ok(value) => value,
+            Err(undefined) => {
+                self.undefined = Some(undefined);
+                return;
+            }
         };
 
+        self.undefined = None;
         let now = observation.tick;
         let values = self.values.get_or_insert(Values {
             begun: now,
             last: value,
             since: now,
             max: value,
+            min: value,
             sum: 0.0,
         });
         if value.to_bits() != values.last.to_bits() {
@@ -463,20 +587,32 @@ impl VariableTally<'_> {
             values.last = value;
             values.since = now;
             values.max = values.max.max(value);
+            values.min = values.min.min(value);
         }
     }
 
     fn measured(&self, now: Tick, tick_s: f64) -> Measured {
-        let definition = self.definition;
+        let taken = self.definition.taken;
+        let missing = |undefined: &Undefined| Measured::Missing {
+            reason: undefined.to_string(),
+        };
+        // A variable keeps its value until the next report. A share of nothing has none.
+        let undefined = self.undefined.as_ref();
+        if let Some(undefined) = undefined.filter(|undefined| undefined.is_of_values())
+            && taken == OfValues::End
+        {
+            return missing(undefined);
+        }
         let Some(values) = self.values else {
-            return no_variable(&definition.robot, &definition.name);
+            return missing(undefined.unwrap_or(&Undefined::NoRobot));
         };
 
         let ticks = now - values.begun;
-        Measured::from(match definition.number {
+        Measured::from(match taken {
             OfValues::Mean if ticks > 0 => values.sum(now) / ticks as f64,
             OfValues::End | OfValues::Mean => values.last,
             OfValues::Max => values.max,
+            OfValues::Min => values.min,
             OfValues::Area => values.sum(now) * tick_s,
         })
     }
@@ -504,68 +640,27 @@ impl StalledTally<'_> {
         }
     }
 
-    fn measured(&self, now: Tick, tick_s: f64) -> Measured {
+    fn measured(&self, end: Ending) -> Measured {
         for (counter, value) in self.definition.progress.iter().zip(&self.values) {
             if value.is_none() {
                 return no_variable(&counter.robot, &counter.variable);
             }
         }
 
-        if time_s(now - self.progress, tick_s) < self.definition.lasting_s {
+        if time_s(end.now - self.progress, end.tick_s) < self.definition.lasting_s {
             return Measured::NotReached {
-                waited_s: time_s(now, tick_s),
+                waited_s: time_s(end.horizon, end.tick_s),
             };
         }
         Measured::Reached {
-            time_s: time_s(self.progress, tick_s),
+            time_s: time_s(self.progress, end.tick_s),
         }
-    }
-}
-
-#[derive(Debug)]
-struct JainTally<'a> {
-    definition: &'a Jain,
-    /// The robots that match, and the last value of each.
-    values: Vec<(RobotName, Option<f64>)>,
-}
-
-impl JainTally<'_> {
-    fn observe(&mut self, observation: &Observation<'_>) {
-        for (robot, value) in &mut self.values {
-            *value = number_of(observation, robot, &self.definition.name).or(*value);
-        }
-    }
-
-    fn measured(&self) -> Measured {
-        let mut sum = 0.0;
-        let mut squares = 0.0;
-        for (robot, value) in &self.values {
-            let Some(value) = *value else {
-                return no_variable(robot, &self.definition.name);
-            };
-            if value < 0.0 {
-                let name = &self.definition.name;
-                let reason = format!("`{name}` of {robot} is {value}, and shares are 0 or more");
-                return Measured::Missing { reason };
-            }
-            sum += value;
-            squares += value * value;
-        }
-
-        if squares == 0.0 {
-            let reason = "there is nothing that could be spread: every robot has 0".to_owned();
-            return Measured::Missing { reason };
-        }
-        Measured::from(sum * sum / (self.values.len() as f64 * squares))
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeMap;
-
     use proptest::prelude::*;
-    use protocol::Event;
     use protocol::messages::{Point, StateVariables, Variable};
     use serde_json::json;
 
@@ -592,6 +687,16 @@ mod tests {
             robot: name(robot),
             from: None,
             to: to.to_owned(),
+        }
+    }
+
+    fn setting(roster: &[RobotName]) -> Setting {
+        Setting {
+            tick_s: TICK_S,
+            ticks: 100,
+            field_m: [10.0, 10.0],
+            body_m: 0.5,
+            roster: roster.to_vec(),
         }
     }
 
@@ -629,7 +734,7 @@ mod tests {
     /// The same with ticks of another length.
     fn take_at(tick_s: f64, text: &str, ticks: &[Tick]) -> Measured {
         let measure = measure(text);
-        let mut probe = Probe::new(&measure, &[name("A")], (1.0, 2.0));
+        let mut probe = Probe::new(&measure, &setting(&[name("A")]), (1.0, 2.0));
         let mut variables = BTreeMap::new();
         for (tick, happening) in ticks.iter().enumerate() {
             let mut state_variables = StateVariables::new();
@@ -642,7 +747,7 @@ mod tests {
         }
 
         observe(&mut probe, tick_s, ticks.len() - 1, &[], &variables);
-        probe.measured(&Value::Null)
+        probe.measured(&Value::Null, &BTreeMap::new())
     }
 
     fn observe(
@@ -693,9 +798,9 @@ mod tests {
             state_variables.insert("v", Variable::Number(*value));
             variables.insert(name(robot), state_variables);
         }
-        let mut probe = Probe::new(&measure, &roster, (0.0, 1.0));
+        let mut probe = Probe::new(&measure, &setting(&roster), (0.0, 1.0));
         observe(&mut probe, TICK_S, 0, &[], &variables);
-        probe.measured(&Value::Null)
+        probe.measured(&Value::Null, &BTreeMap::new())
     }
 
     #[test]
@@ -714,7 +819,7 @@ mod tests {
         assert_eq!(jain(&others), Measured::from(1.0), "of those that match");
 
         assert!(reason_of(of(&[0.0, 0.0])).contains("every robot has 0"));
-        assert!(reason_of(of(&[1.0, -1.0])).contains("`v` of S2 is -1"));
+        assert!(reason_of(of(&[1.0, -1.0])).contains("the number of S2 is -1"));
         let missing = "jain = { robot = 'A', name = 'w' }";
         assert!(reason_of(take(missing, &[has(1.0)])).contains("A has no number `w`"));
     }
@@ -753,8 +858,8 @@ mod tests {
             json!({ "robots": { "A": { "sent": { "x": 2, "y": 3 } }, "B": { "sent": {} } } });
         let at = |path: &str| {
             let measure = measure(&format!("summary = '{path}'"));
-            let probe = Probe::new(&measure, &[], (0.0, 1.0));
-            probe.measured(&summary)
+            let probe = Probe::new(&measure, &setting(&[]), (0.0, 1.0));
+            probe.measured(&summary, &BTreeMap::new())
         };
         assert_eq!(at("robots.A.sent.x"), Measured::from(2.0));
         assert_eq!(at("robots.*.sent.*"), Measured::from(5.0));

@@ -3,6 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use protocol::pattern::overlap;
 use protocol::{Event, RobotName};
 use serde::{Deserialize, Serialize};
 
@@ -28,7 +29,7 @@ pub enum WordKind {
 pub struct Word {
     /// What it is.
     pub kind: WordKind,
-    /// The robots one of which may say it; empty for any robot.
+    /// The robots one of which may say it, or patterns of them; empty for any robot.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub robots: Vec<String>,
     /// The word.
@@ -121,8 +122,8 @@ impl Words {
     fn heard_of(&self, word: &Word) -> BTreeSet<&str> {
         let mut all = BTreeSet::new();
         for ((kind, robot), heard) in &self.heard {
-            let may_say =
-                word.robots.is_empty() || word.robots.iter().any(|one| robot.as_str() == one);
+            let may_say = word.robots.is_empty()
+                || word.robots.iter().any(|one| overlap(one, robot.as_str()));
             if *kind == word.kind && may_say {
                 all.extend(heard.iter().map(String::as_str));
             }

@@ -68,7 +68,7 @@ struct Run {
 impl Run {
     fn of(entry: &str) -> Self {
         let expectation = read(entry).unwrap();
-        expectation.check(&roster()).unwrap();
+        expectation.check(&setting()).unwrap();
         Self {
             watch: Monitor::new(&expectation, &setting()),
             tick: 0,
@@ -674,14 +674,14 @@ fn names_and_numbers_have_limits() {
             ..read("never = { event = 'say' }").unwrap()
         });
     }
-    assert_eq!(check_all(&expectations, &roster()), Ok(()));
+    assert_eq!(check_all(&expectations, &setting()), Ok(()));
     expectations.push(expectations[0].clone());
-    let wrong = check_all(&expectations, &roster()).unwrap_err();
+    let wrong = check_all(&expectations, &setting()).unwrap_err();
     assert_eq!(wrong.index, MAX_EXPECTATIONS);
     assert_eq!(wrong.to_string(), "more than 64 expectations");
 
     expectations[1] = expectations[0].clone();
-    let wrong = check_all(&expectations[..2], &roster()).unwrap_err();
+    let wrong = check_all(&expectations[..2], &setting()).unwrap_err();
     assert_eq!(wrong.index, 1);
     assert_eq!(wrong.to_string(), "a second expectation called \"0\"");
 }
@@ -696,9 +696,9 @@ fn robots_that_the_run_does_not_have_are_refused() {
         "after = { event = 'lost', robot = 'C' }\neventually = { event = 'say' }\nwithin = '1 s'",
         "after = { event = 'lost' }\nunless = { event = 'lost', robot = 'C' }\neventually = { event = 'say' }\nwithin = '1 s'",
     ] {
-        let error = read(entry).unwrap().check(&roster()).unwrap_err();
+        let error = read(entry).unwrap().check(&setting()).unwrap_err();
         assert_eq!(error.to_string(), "no robot of this scenario is called C");
     }
     let of_operator = read("never = { event = 'command_sent', from = 'operator' }").unwrap();
-    of_operator.check(&roster()).unwrap();
+    of_operator.check(&setting()).unwrap();
 }

@@ -23,8 +23,7 @@ use std::path::Path;
 pub use config::diagnostic;
 pub use config::{Changes, Override};
 use config::{FileError, Source};
-use observe::Expectation;
-use protocol::RobotName;
+use observe::{Expectation, Setting};
 pub use protocol::messages::OnLate;
 
 pub use by_hand::kind_in_words;
@@ -40,13 +39,13 @@ pub use network::Network;
 pub use sensing::Sensing;
 pub use sites::{OnConflict, SiteSpec, SiteVariable};
 
-/// Reads the expectations of a file, for a run with these robots. Other tables of the file are of no concern.
+/// Reads the expectations of a file, for a run. Other tables of the file are of no concern.
 ///
 /// # Errors
 /// [`FileError`] with file, line and caret; if there are none.
-pub fn expectations(source: &Source, roster: &[RobotName]) -> Result<Vec<Expectation>, FileError> {
+pub fn expectations(source: &Source, setting: &Setting) -> Result<Vec<Expectation>, FileError> {
     let file: raw::Expectations = source.parse()?;
-    let expectations = file.check(source, roster)?;
+    let expectations = file.check(source, setting)?;
     if expectations.is_empty() {
         return Err(FileError::new(format!("{} has no [[expect]]", source.name)));
     }

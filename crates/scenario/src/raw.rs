@@ -23,7 +23,7 @@ use config::bulk::member;
 use config::overrides::merge;
 use config::units::{Length, Speed, Time, quantity};
 use config::{FileError, FixedList, Source, seed, shipped};
-use observe::{Expectation, TickCondition};
+use observe::{Expectation, Setting, TickCondition};
 use protocol::messages::{DisplayUnit, OnLate, Parameters};
 use protocol::{RobotName, Tick};
 use serde::{Deserialize, Serialize};
@@ -229,9 +229,15 @@ impl ScenarioFile {
         let record = record(self.record, source)?;
         let network = network::check(self.network, &robots, tick_s, source)?;
         let faults = fault::check(self.faults, &robots, &lateness, tick_s, settled, source)?;
-        let roster: Vec<RobotName> = robots.keys().cloned().collect();
-        let expectations = expect::check(self.expectations, &roster, source)?;
-        let end_when = expect::check_end(self.end_when, &roster, source)?;
+        let setting = Setting {
+            tick_s,
+            ticks,
+            field_m: size.0.map(|length| length.0),
+            body_m: body.0,
+            roster: robots.keys().cloned().collect(),
+        };
+        let expectations = expect::check(self.expectations, &setting, source)?;
+        let end_when = expect::check_end(self.end_when, &setting, source)?;
         let mut scenario = checked::Scenario {
             seed,
             tick_s,

@@ -2,6 +2,7 @@
 //! interrupted.
 
 mod folder;
+mod kinds;
 mod numbers;
 mod refused;
 mod states;

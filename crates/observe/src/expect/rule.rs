@@ -1,9 +1,9 @@
 //! An entry of `[[expect]]`, and whether it can be checked in a run.
 
 use config::units::Time;
-use protocol::RobotName;
 use serde::{Deserialize, Serialize};
 
+use crate::Setting;
 use crate::condition::{self, TickCondition};
 use crate::pattern::Pattern;
 use crate::words::Word;
@@ -106,6 +106,9 @@ pub enum ExpectError {
     /// A list of patterns is empty or too long.
     #[error("`{0}` has 1 to {MAX_EXPECTATIONS} patterns")]
     Patterns(&'static str),
+    /// A condition about what the run does not have.
+    #[error(transparent)]
+    Condition(#[from] condition::TickConditionError),
     /// A robot that the run does not have.
     #[error("no robot of this scenario is called {0}")]
     UnknownRobot(String),
@@ -229,7 +232,7 @@ impl RuleTable {
                 until: observed(self.until.ok_or(ExpectError::NoUntil)?)?,
             }),
             (None, Some(condition), None, None) => {
-                if condition.patterns().next().is_some() {
+                if !condition.patterns().is_empty() {
                     return Err(ExpectError::AlwaysEvent);
                 }
                 Ok(Rule::Always(condition))
@@ -325,13 +328,17 @@ impl From<Expectation> for RuleTable {
 }
 
 impl Expectation {
-    /// Checks that a run with these robots can have what the expectation names.
+    /// Checks that a run can have what the expectation names.
     ///
     /// # Errors
-    /// [`ExpectError::UnknownRobot`].
-    pub fn check(&self, roster: &[RobotName]) -> Result<(), ExpectError> {
-        for name in self.robots() {
-            if !condition::is_known(name, roster) {
+    /// [`ExpectError::UnknownRobot`] and [`ExpectError::Condition`].
+    pub fn check(&self, setting: &Setting) -> Result<(), ExpectError> {
+        let (conditions, patterns) = self.parts();
+        for condition in conditions {
+            condition.check(setting)?;
+        }
+        for name in patterns.into_iter().flat_map(Pattern::robots) {
+            if !condition::is_known(name, &setting.roster) {
                 return Err(ExpectError::UnknownRobot(name.to_owned()));
             }
         }
@@ -346,14 +353,14 @@ impl Expectation {
     }
 
     /// Checks it as an entry that follows others.
-    fn check_beside(&self, before: &[Self], roster: &[RobotName]) -> Result<(), ExpectError> {
+    fn check_beside(&self, before: &[Self], setting: &Setting) -> Result<(), ExpectError> {
         if before.len() >= MAX_EXPECTATIONS {
             return Err(ExpectError::TooMany);
         }
         if before.iter().any(|other| other.name == self.name) {
             return Err(ExpectError::Twice(self.name.clone()));
         }
-        self.check(roster)
+        self.check(setting)
     }
 
     /// Its conditions and its patterns.
@@ -387,19 +394,6 @@ impl Expectation {
         }
         named
     }
-
-    /// The robots that it names.
-    fn robots(&self) -> Vec<&str> {
-        let (conditions, patterns) = self.parts();
-        let mut robots = Vec::new();
-        for pattern in patterns {
-            robots.extend(pattern.robots());
-        }
-        for condition in conditions {
-            robots.extend(condition.robots());
-        }
-        robots
-    }
 }
 
 /// Which expectation of a file is wrong, and why.
@@ -412,15 +406,15 @@ pub struct WrongEntry {
     pub error: ExpectError,
 }
 
-/// Checks the expectations of a file together, for a run with these robots.
+/// Checks the expectations of a file together, for a run.
 ///
 /// # Errors
 /// [`WrongEntry`], the first one.
-pub fn check_all(expectations: &[Expectation], roster: &[RobotName]) -> Result<(), WrongEntry> {
+pub fn check_all(expectations: &[Expectation], setting: &Setting) -> Result<(), WrongEntry> {
     for (index, expectation) in expectations.iter().enumerate() {
         let before = &expectations[..index];
         expectation
-            .check_beside(before, roster)
+            .check_beside(before, setting)
             .map_err(|error| WrongEntry { index, error })?;
     }
     Ok(())

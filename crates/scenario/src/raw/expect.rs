@@ -2,15 +2,14 @@
 
 use config::{FileError, Source};
 use observe::expect::check_all;
-use observe::{Expectation, TickCondition};
-use protocol::RobotName;
+use observe::{Expectation, Setting, TickCondition};
 use serde::Deserialize;
 use toml::Spanned;
 
-/// Checks the expectations of a scenario with these robots.
+/// Checks the expectations of a scenario.
 pub(super) fn check(
     raw: Vec<Spanned<Expectation>>,
-    roster: &[RobotName],
+    setting: &Setting,
     source: &Source,
 ) -> Result<Vec<Expectation>, FileError> {
     let mut expectations = Vec::new();
@@ -20,24 +19,24 @@ pub(super) fn check(
         expectations.push(entry.into_inner());
     }
 
-    check_all(&expectations, roster).map_err(|error| {
+    check_all(&expectations, setting).map_err(|error| {
         let span = spans.get(error.index).cloned();
         FileError::at(source, span, &error.error.to_string())
     })?;
     Ok(expectations)
 }
 
-/// Checks when the run of a scenario with these robots ends.
+/// Checks when the run of a scenario ends.
 pub(super) fn check_end(
     raw: Option<Spanned<TickCondition>>,
-    roster: &[RobotName],
+    setting: &Setting,
     source: &Source,
 ) -> Result<Option<TickCondition>, FileError> {
     let Some(raw) = raw else {
         return Ok(None);
     };
     raw.get_ref()
-        .check_end(roster)
+        .check_end(setting)
         .map_err(|error| FileError::at(source, Some(raw.span()), &error.to_string()))?;
     Ok(Some(raw.into_inner()))
 }
@@ -53,8 +52,8 @@ impl Expectations {
     pub(crate) fn check(
         self,
         source: &Source,
-        roster: &[RobotName],
+        setting: &Setting,
     ) -> Result<Vec<Expectation>, FileError> {
-        check(self.entries, roster, source)
+        check(self.entries, setting, source)
     }
 }

@@ -1,0 +1,923 @@
+//! Numbers of robots, teams and places, one in each tick: a condition compares it, and a measure takes it over a run.
+//!
+//! [`Quantity`] is what there is to look at: what comes with another kind of subject is added there.
+
+use std::fmt;
+
+use config::FixedList;
+use config::units::Length;
+use protocol::messages::{Point, Variable};
+use protocol::{RobotName, RobotPattern};
+use serde::{Deserialize, Serialize};
+
+use crate::places::{Coverage, Region, components, least_distance_m};
+use crate::words::{Word, WordKind};
+use crate::{Observation, RobotState, Setting};
+
+/// Most names and patterns of a team.
+const MAX_PATTERNS: usize = 64;
+
+/// One number of a run in each tick.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Quantity {
+    /// A number of each robot, combined to one.
+    Each {
+        /// The robots.
+        team: Team,
+        /// How the numbers are combined; `None` for a single robot.
+        by: Option<By>,
+        /// The number of each.
+        of: OfRobot,
+    },
+    /// Distance between the robots of all pairs, meters.
+    Between {
+        /// The robots.
+        team: Team,
+        /// The number of the distances: the least, their mean, or the largest.
+        by: By,
+    },
+    /// Share of the field that was within sensing range of a robot up to the tick, 0 to 1.
+    Covered {
+        /// The robots.
+        team: Team,
+        /// Sensing radius, meters.
+        radius_m: f64,
+        /// Side of the cells that are counted, meters.
+        cell_m: f64,
+    },
+    /// Number of groups whose robots reach each other over robots that are within range of the next one.
+    Components {
+        /// The robots.
+        team: Team,
+        /// Range, meters.
+        range_m: f64,
+    },
+}
+
+/// A number of a robot.
+#[derive(Debug, Clone, PartialEq)]
+pub enum OfRobot {
+    /// Whether it is in one of these states.
+    State(StateNames),
+    /// A state variable. A flag is 1 or 0. With bounds: whether it is within them.
+    Variable(String, ValueBounds),
+    /// Distance that it has walked, meters.
+    Walked,
+    /// Distance to a point, meters.
+    DistanceTo(Point),
+    /// Whether it is within a region.
+    Inside(Region),
+}
+
+/// Emotions or behaviors.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum StateNames {
+    /// Emotions.
+    Emotions(Vec<String>),
+    /// Behaviors.
+    Behaviors(Vec<String>),
+}
+
+/// Robots by a name, a pattern of names, or a list of them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(
+    untagged,
+    expecting = "a name, a pattern such as \"S*\", or a list of them"
+)]
+pub enum Team {
+    /// Those that match.
+    One(RobotPattern),
+    /// Those that match one of these.
+    Several(Vec<RobotPattern>),
+}
+
+/// How the numbers of several robots become one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum By {
+    /// Their sum, in the order of the robots' names.
+    Sum,
+    /// Their mean.
+    Mean,
+    /// The largest.
+    Max,
+    /// The least.
+    Min,
+    /// The largest less the least.
+    Spread,
+    /// Jain's index of fairness: (Σx)² / (n Σx²) (Jain, Chiu and Hawe 1984).
+    Jain,
+    /// 1 if none of them is 0, otherwise 0.
+    All,
+    /// 1 if one of them is not 0, otherwise 0.
+    Any,
+    /// How many of them are not 0.
+    Count,
+}
+
+/// The number that is taken of the values that a quantity has during a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum OfValues {
+    /// The last one.
+    #[default]
+    End,
+    /// The largest one.
+    Max,
+    /// The least one.
+    Min,
+    /// Their mean over time.
+    Mean,
+    /// Their integral over time, in the unit of the quantity times seconds.
+    Area,
+}
+
+/// The values of a number; all bounds that are given hold.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ValueBounds {
+    pub(crate) at_least: Option<f64>,
+    pub(crate) at_most: Option<f64>,
+    pub(crate) above: Option<f64>,
+    pub(crate) below: Option<f64>,
+}
+
+/// Why a quantity has no value in a tick.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub(crate) enum Undefined {
+    /// A robot has not reported.
+    #[error("{0} has not reported")]
+    NotReported(RobotName),
+    /// A robot does not have the variable, or it is a text.
+    #[error("{0} has no number `{1}` among its state variables")]
+    NoNumber(RobotName, String),
+    /// A share is negative.
+    #[error("the number of {0} is {1}, and shares are 0 or more")]
+    Negative(RobotName, f64),
+    /// All shares are 0.
+    #[error("there is nothing that could be spread: every robot has 0")]
+    NothingToSpread,
+    /// There is no robot.
+    #[error("the team has no robot")]
+    NoRobot,
+}
+
+impl Undefined {
+    /// Whether it follows from the values of this tick, and not from what robots do not report.
+    pub(crate) fn is_of_values(&self) -> bool {
+        matches!(self, Self::Negative(..) | Self::NothingToSpread)
+    }
+}
+
+/// A number that cannot be taken.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum QuantityError {
+    /// Neither one robot nor several, or both.
+    #[error(
+        "`{0}` is of `robot = NAME`, or of `robots`: a pattern such as \"S*\", or a list of names"
+    )]
+    Who(&'static str),
+    /// Only several robots have such a number.
+    #[error("`{0}` is of `robots`: a pattern such as \"S*\", or a list of names")]
+    Several(&'static str),
+    /// Too few or too many names and patterns.
+    #[error("a list of robots has 1 to {MAX_PATTERNS} names and patterns")]
+    Patterns,
+    /// How the numbers of robots become one is missing, or there is one robot only.
+    #[error("`by` belongs to `robots`, and `robots` needs it: {0}")]
+    By(&'static str),
+    /// The numbers cannot be combined in this way.
+    #[error("`{0}` of robots is taken by {1}")]
+    WrongBy(&'static str, &'static str),
+    /// A key that belongs to another number.
+    #[error("`{0}` has no `{1}`")]
+    Foreign(&'static str, &'static str),
+    /// A key is missing.
+    #[error("`{0}` needs {1}")]
+    Lacks(&'static str, &'static str),
+    /// A length is not more than zero.
+    #[error("`{0}` is more than zero")]
+    NotPositive(&'static str),
+    /// A robot, or a pattern of robots, that the run does not have.
+    #[error("no robot of this scenario is called {0}")]
+    UnknownRobot(String),
+    /// There is no pair.
+    #[error("`distance` between robots needs two of them at least")]
+    NoPair,
+    /// The field would have too many cells, or none.
+    #[error("{0}")]
+    Cells(String),
+}
+
+/// What is taken of places.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum PlaceKind {
+    Walked,
+    Distance,
+    Inside,
+    Covered,
+    Components,
+}
+
+/// A number of places as written.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(crate) struct PlaceTable {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    robot: Option<RobotName>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    robots: Option<Team>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    by: Option<By>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    to: Option<Place>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rectangle: Option<FixedList<Place, 2>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    disc: Option<DiscTable>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    radius: Option<Length>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cell: Option<Length>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    range: Option<Length>,
+    /// In measures only: a condition is about each tick.
+    #[serde(rename = "as", skip_serializing_if = "Option::is_none")]
+    pub(crate) number: Option<OfValues>,
+}
+
+type Place = FixedList<Length, 2>;
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DiscTable {
+    center: Place,
+    radius: Length,
+}
+
+impl PlaceKind {
+    pub(crate) const ALL: [Self; 5] = [
+        Self::Walked,
+        Self::Distance,
+        Self::Inside,
+        Self::Covered,
+        Self::Components,
+    ];
+
+    /// Its key in files.
+    pub(crate) fn key(self) -> &'static str {
+        match self {
+            Self::Walked => "walked",
+            Self::Distance => "distance",
+            Self::Inside => "inside",
+            Self::Covered => "covered",
+            Self::Components => "components",
+        }
+    }
+
+    /// The keys beside `robot`, `robots`, `by` and `as` that its table may have.
+    fn keys(self) -> &'static [&'static str] {
+        match self {
+            Self::Walked => &[],
+            Self::Distance => &["to"],
+            Self::Inside => &["rectangle", "disc"],
+            Self::Covered => &["radius", "cell"],
+            Self::Components => &["range"],
+        }
+    }
+}
+
+impl PlaceTable {
+    pub(crate) fn check(self, kind: PlaceKind) -> Result<Quantity, QuantityError> {
+        let key = kind.key();
+        for (name, is_given) in [
+            ("to", self.to.is_some()),
+            ("rectangle", self.rectangle.is_some()),
+            ("disc", self.disc.is_some()),
+            ("radius", self.radius.is_some()),
+            ("cell", self.cell.is_some()),
+            ("range", self.range.is_some()),
+        ] {
+            if is_given && !kind.keys().contains(&name) {
+                return Err(QuantityError::Foreign(key, name));
+            }
+        }
+
+        match kind {
+            PlaceKind::Walked => {
+                Quantity::each(key, self.robot, self.robots, self.by, OfRobot::Walked)
+            }
+            PlaceKind::Distance => {
+                if let Some(to) = self.to {
+                    let of = OfRobot::DistanceTo(point(to));
+                    return Quantity::each(key, self.robot, self.robots, self.by, of);
+                }
+                let by = match self.by {
+                    Some(by @ (By::Min | By::Mean | By::Max)) => by,
+                    _ => {
+                        let these = "\"min\", \"mean\" or \"max\" of all pairs, or `to` a point";
+                        return Err(QuantityError::WrongBy(key, these));
+                    }
+                };
+                let team = several(key, self.robot.as_ref(), self.robots)?;
+                Ok(Quantity::Between { team, by })
+            }
+            PlaceKind::Inside => {
+                let region = match (self.rectangle, self.disc) {
+                    (Some(FixedList([one, other])), None) => {
+                        Region::rectangle(point(one), point(other))
+                    }
+                    (None, Some(disc)) => Region::Disc {
+                        center: point(disc.center),
+                        radius_m: positive("radius", Some(disc.radius))?,
+                    },
+                    _ => return Err(QuantityError::Lacks(key, "a `rectangle` or a `disc`")),
+                };
+                let of = OfRobot::Inside(region);
+                Quantity::each(key, self.robot, self.robots, self.by, of)
+            }
+            PlaceKind::Covered => Ok(Quantity::Covered {
+                radius_m: positive("radius", self.radius)?,
+                cell_m: positive("cell", self.cell)?,
+                team: whole(key, self.robot.as_ref(), self.robots, self.by)?,
+            }),
+            PlaceKind::Components => Ok(Quantity::Components {
+                range_m: positive("range", self.range)?,
+                team: whole(key, self.robot.as_ref(), self.robots, self.by)?,
+            }),
+        }
+    }
+
+    /// The table of a number of places; `None` for another one.
+    pub(crate) fn of(quantity: &Quantity) -> Option<(PlaceKind, Self)> {
+        let mut table = Self::default();
+        let kind = match quantity {
+            Quantity::Each { team, by, of } => {
+                match (by, team) {
+                    (None, Team::One(name)) => table.robot = RobotName::new(name.as_str()).ok(),
+                    _ => table.robots = Some(team.clone()),
+                }
+                table.by = *by;
+                match of {
+                    OfRobot::State(_) | OfRobot::Variable(..) => return None,
+                    OfRobot::Walked => PlaceKind::Walked,
+                    OfRobot::DistanceTo(to) => {
+                        table.to = Some(lengths(*to));
+                        PlaceKind::Distance
+                    }
+                    OfRobot::Inside(Region::Rectangle { least, most }) => {
+                        table.rectangle = Some(FixedList([lengths(*least), lengths(*most)]));
+                        PlaceKind::Inside
+                    }
+                    OfRobot::Inside(Region::Disc { center, radius_m }) => {
+                        table.disc = Some(DiscTable {
+                            center: lengths(*center),
+                            radius: Length(*radius_m),
+                        });
+                        PlaceKind::Inside
+                    }
+                }
+            }
+            Quantity::Between { team, by } => {
+                table.robots = Some(team.clone());
+                table.by = Some(*by);
+                PlaceKind::Distance
+            }
+            Quantity::Covered {
+                team,
+                radius_m,
+                cell_m,
+            } => {
+                table.robots = Some(team.clone());
+                table.radius = Some(Length(*radius_m));
+                table.cell = Some(Length(*cell_m));
+                PlaceKind::Covered
+            }
+            Quantity::Components { team, range_m } => {
+                table.robots = Some(team.clone());
+                table.range = Some(Length(*range_m));
+                PlaceKind::Components
+            }
+        };
+        Some((kind, table))
+    }
+}
+
+/// The robots of a number that only several have together, without `by`.
+fn whole(
+    key: &'static str,
+    robot: Option<&RobotName>,
+    robots: Option<Team>,
+    by: Option<By>,
+) -> Result<Team, QuantityError> {
+    if by.is_some() {
+        return Err(QuantityError::Foreign(key, "by"));
+    }
+    several(key, robot, robots)
+}
+
+fn several(
+    key: &'static str,
+    robot: Option<&RobotName>,
+    robots: Option<Team>,
+) -> Result<Team, QuantityError> {
+    match (robot, robots) {
+        (None, Some(team)) => team.check(),
+        _ => Err(QuantityError::Several(key)),
+    }
+}
+
+fn positive(key: &'static str, length: Option<Length>) -> Result<f64, QuantityError> {
+    match length {
+        Some(length) if length.0 > 0.0 => Ok(length.0),
+        _ => Err(QuantityError::NotPositive(key)),
+    }
+}
+
+fn point(FixedList([x, y]): Place) -> Point {
+    Point::new(x.0, y.0)
+}
+
+fn lengths(at: Point) -> Place {
+    FixedList([Length(at.x), Length(at.y)])
+}
+
+impl Team {
+    /// One robot.
+    #[must_use]
+    pub fn one(robot: RobotName) -> Self {
+        Self::One(robot.into())
+    }
+
+    fn check(self) -> Result<Self, QuantityError> {
+        match (1..=MAX_PATTERNS).contains(&self.patterns().len()) {
+            true => Ok(self),
+            false => Err(QuantityError::Patterns),
+        }
+    }
+
+    /// Its names and patterns.
+    #[must_use]
+    pub fn patterns(&self) -> &[RobotPattern] {
+        match self {
+            Self::One(pattern) => std::slice::from_ref(pattern),
+            Self::Several(patterns) => patterns,
+        }
+    }
+
+    /// Those of the roster that belong to it, in the order of their names.
+    #[must_use]
+    pub fn of(&self, roster: &[RobotName]) -> Vec<RobotName> {
+        let patterns = self.patterns();
+        let matches = |robot: &&RobotName| patterns.iter().any(|pattern| pattern.matches(robot));
+        let mut robots: Vec<RobotName> = roster.iter().filter(matches).cloned().collect();
+        robots.sort();
+        robots
+    }
+}
+
+impl fmt::Display for Team {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (place, pattern) in self.patterns().iter().enumerate() {
+            let comma = if place > 0 { ", " } else { "" };
+            write!(f, "{comma}{pattern}")?;
+        }
+        Ok(())
+    }
+}
+
+impl StateNames {
+    /// The names.
+    #[must_use]
+    pub fn names(&self) -> &[String] {
+        match self {
+            Self::Emotions(names) | Self::Behaviors(names) => names,
+        }
+    }
+
+    /// The names as words of these robots.
+    pub(crate) fn words(&self, team: &Team) -> Vec<Word> {
+        let kind = match self {
+            Self::Emotions(_) => WordKind::Emotion,
+            Self::Behaviors(_) => WordKind::Behavior,
+        };
+        let robots: Vec<String> = team.patterns().iter().map(ToString::to_string).collect();
+        let mut words = Vec::new();
+        for word in self.names() {
+            words.push(Word {
+                kind,
+                robots: robots.clone(),
+                word: word.clone(),
+            });
+        }
+        words
+    }
+
+    pub(crate) fn hold(&self, state: RobotState<'_>) -> bool {
+        match self {
+            Self::Emotions(names) => names.iter().any(|name| name == state.emotion_state),
+            Self::Behaviors(names) => names.iter().any(|name| name == state.behavior_state),
+        }
+    }
+}
+
+impl ValueBounds {
+    /// Whether no number is within them.
+    pub(crate) fn are_contradictory(&self) -> bool {
+        let above = |low: f64| {
+            self.at_most.is_some_and(|high| high < low)
+                || self.below.is_some_and(|high| high <= low)
+        };
+        let strictly_above = |low: f64| {
+            self.at_most.is_some_and(|high| high <= low)
+                || self.below.is_some_and(|high| high <= low)
+        };
+        self.at_least.is_some_and(above) || self.above.is_some_and(strictly_above)
+    }
+
+    pub(crate) fn hold(&self, value: f64) -> bool {
+        self.at_least.is_none_or(|bound| value >= bound)
+            && self.at_most.is_none_or(|bound| value <= bound)
+            && self.above.is_none_or(|bound| value > bound)
+            && self.below.is_none_or(|bound| value < bound)
+    }
+}
+
+impl Quantity {
+    /// A number of one robot, or of several combined; `key` names it in errors.
+    pub(crate) fn each(
+        key: &'static str,
+        robot: Option<RobotName>,
+        robots: Option<Team>,
+        by: Option<By>,
+        of: OfRobot,
+    ) -> Result<Self, QuantityError> {
+        let (ways, is_way) = of.ways();
+        let team = match (robot, robots, by) {
+            (Some(robot), None, None) => Team::one(robot),
+            (None, Some(team), Some(by)) if is_way(by) => team.check()?,
+            (None, Some(_), Some(_)) => return Err(QuantityError::WrongBy(key, ways)),
+            (Some(_), None, Some(_)) | (None, Some(_), None) => {
+                return Err(QuantityError::By(ways));
+            }
+            _ => return Err(QuantityError::Who(key)),
+        };
+        Ok(Self::Each { team, by, of })
+    }
+
+    /// Whether its only values are 0 and 1, which stand for false and true.
+    pub(crate) fn is_truth(&self) -> bool {
+        match self {
+            Self::Each {
+                by: Some(By::All | By::Any),
+                ..
+            } => true,
+            Self::Each { by: None, of, .. } => {
+                matches!(of, OfRobot::State(_) | OfRobot::Inside(_))
+            }
+            _ => false,
+        }
+    }
+
+    /// The robots of a run, in the order of their names. One that is named is there whatever the roster is.
+    pub(crate) fn robots(&self, setting: &Setting) -> Vec<RobotName> {
+        if let Self::Each {
+            team: Team::One(name),
+            by: None,
+            ..
+        } = self
+        {
+            return RobotName::new(name.as_str()).into_iter().collect();
+        }
+        self.team().of(&setting.roster)
+    }
+
+    /// The robots.
+    #[must_use]
+    pub fn team(&self) -> &Team {
+        match self {
+            Self::Each { team, .. }
+            | Self::Between { team, .. }
+            | Self::Covered { team, .. }
+            | Self::Components { team, .. } => team,
+        }
+    }
+
+    /// The state variables that it needs: patterns of robots, and the name.
+    pub(crate) fn variables(&self) -> Vec<(&str, &str)> {
+        let Self::Each {
+            of: OfRobot::Variable(name, _),
+            team,
+            ..
+        } = self
+        else {
+            return Vec::new();
+        };
+        let patterns = team.patterns().iter();
+        patterns
+            .map(|pattern| (pattern.as_str(), name.as_str()))
+            .collect()
+    }
+
+    /// The words that robots choose and that it names.
+    pub(crate) fn words(&self) -> Vec<Word> {
+        match self {
+            Self::Each {
+                of: OfRobot::State(states),
+                team,
+                ..
+            } => states.words(team),
+            _ => Vec::new(),
+        }
+    }
+
+    /// Checks that a run of a scenario can have it.
+    ///
+    /// # Errors
+    /// [`QuantityError`].
+    pub fn check(&self, setting: &Setting) -> Result<(), QuantityError> {
+        for pattern in self.team().patterns() {
+            if !setting.roster.iter().any(|robot| pattern.matches(robot)) {
+                return Err(QuantityError::UnknownRobot(pattern.to_string()));
+            }
+        }
+        match self {
+            Self::Between { team, .. } if team.of(&setting.roster).len() < 2 => {
+                Err(QuantityError::NoPair)
+            }
+            Self::Covered { cell_m, .. } => {
+                Coverage::check(setting.field_m, *cell_m).map_err(QuantityError::Cells)
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+impl OfRobot {
+    /// How it is combined over robots, in words and as a rule.
+    fn ways(&self) -> (&'static str, fn(By) -> bool) {
+        match self {
+            Self::State(_) | Self::Inside(_) => ("\"all\", \"any\", \"count\" or \"mean\"", |by| {
+                matches!(by, By::All | By::Any | By::Count | By::Mean)
+            }),
+            Self::Walked | Self::DistanceTo(_) => (
+                "\"sum\", \"mean\", \"max\", \"min\", \"spread\" or \"jain\"",
+                |by| !matches!(by, By::All | By::Any | By::Count),
+            ),
+            Self::Variable(..) => (
+                "\"sum\", \"mean\", \"max\", \"min\", \"spread\", \"jain\", \"all\", \"any\" or \"count\"",
+                |_| true,
+            ),
+        }
+    }
+}
+
+impl fmt::Display for Quantity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Each { team, by, of } => {
+                match of {
+                    OfRobot::State(StateNames::Emotions(names)) => {
+                        write!(f, "emotion {} of {team}", names.join(" or "))
+                    }
+                    OfRobot::State(StateNames::Behaviors(names)) => {
+                        write!(f, "behavior {} of {team}", names.join(" or "))
+                    }
+                    OfRobot::Variable(name, _) => write!(f, "`{name}` of {team}"),
+                    OfRobot::Walked => write!(f, "the distance walked by {team}"),
+                    OfRobot::DistanceTo(to) => {
+                        write!(f, "the distance of {team} to {} m, {} m", to.x, to.y)
+                    }
+                    OfRobot::Inside(_) => write!(f, "{team} within the region"),
+                }?;
+                match by {
+                    Some(by) => write!(f, " ({by})"),
+                    None => Ok(()),
+                }
+            }
+            Self::Between { team, by } => write!(f, "the distance between {team} ({by})"),
+            Self::Covered { team, .. } => write!(f, "the share of the field covered by {team}"),
+            Self::Components { team, range_m } => {
+                write!(f, "the number of components of {team} within {range_m} m")
+            }
+        }
+    }
+}
+
+impl fmt::Display for By {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Sum => "sum",
+            Self::Mean => "mean",
+            Self::Max => "max",
+            Self::Min => "min",
+            Self::Spread => "spread",
+            Self::Jain => "jain",
+            Self::All => "all",
+            Self::Any => "any",
+            Self::Count => "count",
+        })
+    }
+}
+
+/// A quantity while a run is observed.
+#[derive(Debug, Clone)]
+pub(crate) struct Gauge {
+    quantity: Quantity,
+    /// The robots, in the order of their names.
+    robots: Vec<RobotName>,
+    walked: Vec<Walk>,
+    coverage: Option<Coverage>,
+}
+
+/// How far a robot has walked.
+#[derive(Debug, Clone, Copy, Default)]
+struct Walk {
+    at: Option<Point>,
+    walked_m: f64,
+}
+
+impl Gauge {
+    pub(crate) fn new(quantity: &Quantity, setting: &Setting) -> Self {
+        let robots = quantity.robots(setting);
+        let coverage = match quantity {
+            Quantity::Covered {
+                radius_m, cell_m, ..
+            } => Some(Coverage::new(setting.field_m, *cell_m, *radius_m)),
+            _ => None,
+        };
+        Self {
+            quantity: quantity.clone(),
+            walked: vec![Walk::default(); robots.len()],
+            coverage,
+            robots,
+        }
+    }
+
+    /// The value in a tick. Each tick is given once and in its order; the end of the run gives the last one again.
+    pub(crate) fn value(&mut self, seen: &Observation<'_>) -> Result<f64, Undefined> {
+        match &self.quantity {
+            Quantity::Each { by, of, .. } => {
+                let mut values = Vec::with_capacity(self.robots.len());
+                for (robot, walk) in self.robots.iter().zip(&mut self.walked) {
+                    values.push(of.value(robot, walk, seen)?);
+                }
+                match by {
+                    Some(by) => by.combine(&values, &self.robots),
+                    None => values.first().copied().ok_or(Undefined::NoRobot),
+                }
+            }
+            Quantity::Between { by, .. } => {
+                let places = places(&self.robots, seen)?;
+                match by {
+                    By::Min => least_distance_m(&places).ok_or(Undefined::NoRobot),
+                    _ => between(&places, *by).ok_or(Undefined::NoRobot),
+                }
+            }
+            Quantity::Covered { .. } => {
+                let Some(coverage) = &mut self.coverage else {
+                    return Err(Undefined::NoRobot);
+                };
+                for (robot, walk) in self.robots.iter().zip(&mut self.walked) {
+                    let state = (seen.state)(robot);
+                    let Some(at) = state.map(|state| state.location) else {
+                        continue;
+                    };
+                    // One that stands still covers nothing more.
+                    if walk.at != Some(at) {
+                        coverage.cover(at);
+                        walk.at = Some(at);
+                    }
+                }
+                Ok(coverage.share())
+            }
+            Quantity::Components { range_m, .. } => {
+                Ok(components(&places(&self.robots, seen)?, *range_m) as f64)
+            }
+        }
+    }
+}
+
+fn places(robots: &[RobotName], seen: &Observation<'_>) -> Result<Vec<Point>, Undefined> {
+    let mut places = Vec::with_capacity(robots.len());
+    for robot in robots {
+        let state = (seen.state)(robot).ok_or_else(|| Undefined::NotReported(robot.clone()))?;
+        places.push(state.location);
+    }
+    Ok(places)
+}
+
+/// The mean or the largest distance of all pairs; `None` without a pair.
+fn between(places: &[Point], by: By) -> Option<f64> {
+    let mut sum_m = 0.0;
+    let mut max_m = 0.0_f64;
+    let mut pairs = 0_u64;
+    for (index, one) in places.iter().enumerate() {
+        for other in &places[index + 1..] {
+            let distance_m = one.distance_m(*other);
+            sum_m += distance_m;
+            max_m = max_m.max(distance_m);
+            pairs += 1;
+        }
+    }
+
+    let number_m = if by == By::Max {
+        max_m
+    } else {
+        sum_m / pairs as f64
+    };
+    (pairs > 0).then_some(number_m)
+}
+
+impl OfRobot {
+    fn value(
+        &self,
+        robot: &RobotName,
+        walk: &mut Walk,
+        seen: &Observation<'_>,
+    ) -> Result<f64, Undefined> {
+        let state = (seen.state)(robot);
+        if let Self::Walked = self {
+            if let Some(state) = state {
+                let before = walk.at.replace(state.location);
+                walk.walked_m += before.map_or(0.0, |before| before.distance_m(state.location));
+            }
+            return Ok(walk.walked_m);
+        }
+        if let (Self::Variable(name, bounds), Some(state)) = (self, state) {
+            let value = number(state, name)
+                .ok_or_else(|| Undefined::NoNumber(robot.clone(), name.clone()))?;
+            let is_compared = *bounds != ValueBounds::default();
+            return Ok(if is_compared {
+                truth(bounds.hold(value))
+            } else {
+                value
+            });
+        }
+
+        let state = state.ok_or_else(|| match self {
+            Self::Variable(name, _) => Undefined::NoNumber(robot.clone(), name.clone()),
+            _ => Undefined::NotReported(robot.clone()),
+        })?;
+        Ok(match self {
+            Self::State(names) => truth(names.hold(state)),
+            Self::Inside(region) => truth(region.contains(state.location)),
+            Self::DistanceTo(to) => state.location.distance_m(*to),
+            Self::Walked | Self::Variable(..) => walk.walked_m,
+        })
+    }
+}
+
+fn truth(holds: bool) -> f64 {
+    f64::from(u8::from(holds))
+}
+
+/// A state variable as a number; a flag is 1 or 0.
+pub(crate) fn number(state: RobotState<'_>, variable: &str) -> Option<f64> {
+    match state.state_variables.get(variable)? {
+        Variable::Number(number) => Some(*number),
+        Variable::Flag(flag) => Some(f64::from(*flag)),
+        Variable::Text(_) => None,
+    }
+}
+
+impl By {
+    /// The number of the numbers of robots, which are in the order of their names.
+    pub(crate) fn combine(self, values: &[f64], robots: &[RobotName]) -> Result<f64, Undefined> {
+        let Some(first) = values.first() else {
+            return Err(Undefined::NoRobot);
+        };
+
+        let sum: f64 = values.iter().sum();
+        let max = values.iter().fold(*first, |one, other| one.max(*other));
+        let min = values.iter().fold(*first, |one, other| one.min(*other));
+        let count = values.iter().filter(|value| **value != 0.0).count();
+        Ok(match self {
+            Self::Sum => sum,
+            Self::Mean => sum / values.len() as f64,
+            Self::Max => max,
+            Self::Min => min,
+            Self::Spread => max - min,
+            Self::All => truth(count == values.len()),
+            Self::Any => truth(count > 0),
+            Self::Count => count as f64,
+            Self::Jain => return jain(values, robots),
+        })
+    }
+}
+
+fn jain(values: &[f64], robots: &[RobotName]) -> Result<f64, Undefined> {
+    let mut sum = 0.0;
+    let mut squares = 0.0;
+    for (value, robot) in values.iter().zip(robots) {
+        if *value < 0.0 {
+            return Err(Undefined::Negative(robot.clone(), *value));
+        }
+        sum += value;
+        squares += value * value;
+    }
+
+    if squares == 0.0 {
+        return Err(Undefined::NothingToSpread);
+    }
+    Ok(sum * sum / (values.len() as f64 * squares))
+}
