@@ -193,6 +193,7 @@ mod tests {
             "partition",
             "recruitment",
             "signals",
+            "teams",
             "tune_thresholds",
             "tune_timer",
         ];
