@@ -178,6 +178,10 @@ pub(crate) fn components(places: &[Point], range_m: f64) -> usize {
                     if is_near && groups.join(one, other) {
                         count -= 1;
                     }
+                    // Where the range is long, most pairs say nothing more.
+                    if count == 1 {
+                        return count;
+                    }
                 }
             }
         }
