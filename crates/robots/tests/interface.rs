@@ -48,6 +48,7 @@ impl<R: CarsRobotInterface + Send> Robot for CalledOneByOne<R> {
             emotion_state: robot.emotion_state().to_owned(),
             behavior_state: robot.behavior_state().to_owned(),
             state_variables: robot.state_variables(),
+            ..Action::default()
         }
     }
 

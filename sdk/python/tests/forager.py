@@ -1,3 +1,4 @@
+#!/usr/bin/env python3
 """A robot that takes from every site that it senses, and goes to the right as far as its first ray allows. `forager` is the same in
 Rust."""
 
