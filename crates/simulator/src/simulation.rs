@@ -9,7 +9,7 @@ use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::event::{Blocker, Cause, WaitedFor};
 use protocol::messages::{
     CommandText, Correction, Cut, Delivery, End, FaultKind, GuestMood, HeldProcess, Intervention,
-    NEWS_FLAGS, OnLate, Parameters, ParametersOffer, Performative, Point, ProcessOrder,
+    NEWS_FLAGS, OnLate, Parameters, ParametersOffer, Point, ProcessOrder,
     PublicState, Report, SensedBody, SensedKind, SensedRobot, SensedSite, Standing, StateVariables,
     Target, TickUpdate, Welcome,
 };
