@@ -91,7 +91,7 @@ fn simulation(robots: &[&str], network: &str) -> Simulation {
     for (index, name) in robots.iter().enumerate() {
         text += &format!(
             "[[robot]]\nname = \"{name}\"\nat = [\"{} m\", \"2 m\"]\n",
-            2 + 2 * index
+            1 + index
         );
     }
     let source = Source {
