@@ -5,6 +5,7 @@
 //! ([`Barrier::repeat`]), and what a tick comes to depends on who reported what, never on when.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Bound;
 
 use protocol::messages::{Clock, End, FaultKind, NEWS_FLAGS, OnLate, Presence, Reason};
 use protocol::{Epoch, Generation, RobotName, Tick};
@@ -44,6 +45,22 @@ pub struct Barrier<R, C> {
     /// Who takes part in the tick, where it is executed again: then neither tokens nor time decide.
     attendance: Option<Attendance>,
     is_announced: bool,
+    straggler: Straggler,
+}
+
+/// A robot for which the open tick may still wait: where the search for one begins, so that the reports of a tick do not cost the square
+/// of the roster. It decides nothing, so barriers that differ in nothing else are equal.
+#[derive(Debug, Clone, Eq, Default)]
+struct Straggler(Option<RobotName>);
+
+impl PartialEq for Straggler {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+impl std::hash::Hash for Straggler {
+    fn hash<H: std::hash::Hasher>(&self, _: &mut H) {}
 }
 
 impl<R, C> Barrier<R, C> {
@@ -72,6 +89,7 @@ impl<R, C> Barrier<R, C> {
             membership: Vec::new(),
             attendance: None,
             is_announced: false,
+            straggler: Straggler::default(),
         }
     }
 
@@ -709,10 +727,25 @@ impl<R, C> Barrier<R, C> {
         }
     }
 
+    /// Whether the open tick still waits for a robot.
+    fn is_any_awaited(&mut self) -> bool {
+        // From the last one that was found: robots before it have mostly answered, and mostly robots answer in the order of names.
+        let later = self.straggler.0.as_ref().and_then(|last| {
+            let from_last = (Bound::Included(last), Bound::Unbounded);
+            let mut from_last = self.members.range::<RobotName, _>(from_last);
+            from_last.find(|(_, member)| member.is_awaited())
+        });
+        let mut all = self.members.iter();
+        let found = later.or_else(|| all.find(|(_, member)| member.is_awaited()));
+
+        self.straggler = Straggler(found.map(|(name, _)| name.clone()));
+        self.straggler.0.is_some()
+    }
+
     /// Completes the open tick if no robot is awaited any more. Whatever may have been the last thing that it waited
     /// for calls this.
     fn settle(&mut self, out: &mut Vec<BarrierOutput<R, C>>) {
-        if self.phase != BarrierPhase::Open || self.members.values().any(Member::is_awaited) {
+        if self.phase != BarrierPhase::Open || self.is_any_awaited() {
             return;
         }
 

@@ -9,9 +9,9 @@ use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::event::{Blocker, Cause, WaitedFor};
 use protocol::messages::{
     CommandText, Correction, Cut, Delivery, End, FaultKind, GuestMood, HeldProcess, Intervention,
-    NEWS_FLAGS, OnLate, Parameters, ParametersOffer, Point, ProcessOrder,
-    PublicState, Report, SensedBody, SensedKind, SensedRobot, SensedSite, Standing, StateVariables,
-    Target, TickUpdate, Welcome,
+    NEWS_FLAGS, OnLate, Parameters, ParametersOffer, Point, ProcessOrder, PublicState, Report,
+    SensedBody, SensedKind, SensedRobot, SensedSite, Standing, StateVariables, Target, TickUpdate,
+    Welcome,
 };
 use protocol::random::{Stream, stream};
 use protocol::{
@@ -31,6 +31,9 @@ const MAX_BODIES: usize = 4096;
 
 /// Most bytes of sites in the news of a robot, which also have commands and bodies.
 const MAX_SITE_BYTES: usize = MAX_MESSAGE_BYTES / 16;
+
+/// Most robots that are all compared with each other to find those within sensing range.
+const MAX_COMPARED: usize = 64;
 
 /// Most bytes of parameters of one kind of other times in a welcome, so that it fits into a message.
 const MAX_OTHER_PARAMETERS: usize = MAX_MESSAGE_BYTES / 4;
@@ -1175,11 +1178,29 @@ impl Simulation {
         observer.senses(what, self.world.robots()[other], None)
     }
 
+    /// Robots among which are all that one senses, in the order of names. Of many robots these are those around it, so that a tick does
+    /// not cost the square of their number.
+    fn robots_around(&self, of: usize) -> Vec<usize> {
+        let robots = self.world.robots();
+        if robots.len() <= MAX_COMPARED {
+            return (0..robots.len()).collect();
+        }
+
+        // A little more, because it measures distances with other roundings.
+        let range_m = self.scenario.sensing.range_m * 1.001;
+        let near = self.world.near(robots[of], range_m).into_iter();
+        let robot = |near: world::Near| match near.body {
+            Body::Robot(index) => Some(index),
+            Body::Obstacle(_) | Body::Guest(_) => None,
+        };
+        near.filter_map(robot).collect()
+    }
+
     fn sensed_robots(&self, of: usize, observer: &Observer<'_>) -> Vec<SensedRobot> {
         let robots = self.world.robots();
         let mut sensed = Vec::new();
-        for (other, center) in robots.iter().enumerate() {
-            let is_near = robots[of].distance_m(*center) <= self.scenario.sensing.range_m;
+        for other in self.robots_around(of) {
+            let is_near = robots[of].distance_m(robots[other]) <= self.scenario.sensing.range_m;
             if other == of || !is_near {
                 continue;
             }

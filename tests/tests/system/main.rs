@@ -50,6 +50,7 @@ mod replay;
 mod replayed;
 mod report;
 mod returns;
+mod scale;
 mod secure;
 mod shell;
 mod statistics;
