@@ -194,7 +194,12 @@ impl Override {
             && is_bulk(list)
             && let Some(elements) = root.get_mut(list).and_then(toml::Value::as_array_mut)
         {
-            bulk::separate(elements, list == ROBOTS, names);
+            if self.is_count() {
+                bulk::count_ranges(elements, names)
+                    .map_err(|reason| format!("{}: {reason}", self.path.join(".")))?;
+            } else {
+                bulk::separate(elements, list == ROBOTS, names);
+            }
         }
         set(&mut root, &self.path, &self.value, self.merges())
             .map_err(|reason| format!("{}: {reason}", self.path.join(".")))?;

@@ -26,6 +26,8 @@ const CONSOLE_PROGRAM: &str = "cars-console";
 const SIMULATOR_PROGRAM: &str = "cars-sim";
 /// Class of a robot that is played from its record.
 const REPLAYED: &str = "Replayed";
+/// Most robots of a process, those of the largest scenario.
+const MAX_PER_PROCESS: usize = 1024;
 /// First wait before a restart, unless the file has another one.
 const BACKOFF: Duration = Duration::from_secs(1);
 
@@ -90,6 +92,8 @@ pub struct Process {
     robots_span: Option<Range<usize>>,
     /// Environment in addition to the launcher's.
     pub env: BTreeMap<String, String>,
+    /// Most robots of one process, where the entry of the file is as many processes as it takes.
+    per_process: Option<usize>,
     /// Whether it is restarted when it exits before the end of the run.
     pub restart: Restart,
     /// Wait before the first restart; each further wait is twice as long.
@@ -167,7 +171,8 @@ impl Default for RawConsole {
 struct RawProcess {
     name: Spanned<String>,
     command: Spanned<Vec<String>>,
-    robots: Option<Spanned<Vec<RobotPattern>>>,
+    robots: Option<Spanned<RawRobots>>,
+    per_process: Option<Spanned<usize>>,
     #[serde(default)]
     env: BTreeMap<String, String>,
     #[serde(default)]
@@ -176,6 +181,17 @@ struct RawProcess {
     required: Option<Spanned<bool>>,
     #[serde(default)]
     r#extern: bool,
+}
+
+/// The robots of a process as written in the file.
+#[derive(Debug, Deserialize)]
+#[serde(
+    untagged,
+    expecting = "robots are a name or a pattern such as \"S*\", or a list of them"
+)]
+enum RawRobots {
+    One(RobotPattern),
+    Several(Vec<RobotPattern>),
 }
 
 fn yes() -> bool {
@@ -359,7 +375,7 @@ impl LaunchFile {
                 for pattern in patterns.iter().filter(|pattern| pattern.is_open()) {
                     process.robots.extend(matching(pattern)?);
                 }
-                Ok(vec![process])
+                Ok(divided(process))
             }
         }
     }
@@ -378,6 +394,15 @@ impl LaunchFile {
                     let help = "every robot is run by exactly one process";
                     return Err(self.refuse(process, &text, help));
                 }
+            }
+        }
+
+        let mut names = BTreeSet::from([SIMULATOR, CONSOLE]);
+        for process in &self.processes {
+            if !names.insert(&process.name) {
+                let text = format!("a second process called {}", process.name);
+                let help = "with `per_process` the name and a number are those of its processes: give one of them another name";
+                return Err(self.refuse(process, &text, help));
             }
         }
 
@@ -446,6 +471,7 @@ impl Process {
             robots: Vec::new(),
             written: WrittenRobots::Together(Vec::new()),
             robots_span: None,
+            per_process: None,
             env: BTreeMap::new(),
             restart: Restart::Never,
             backoff: BACKOFF,
@@ -454,6 +480,25 @@ impl Process {
             is_extern: false,
         }
     }
+}
+
+/// The processes that share the robots of one entry, called as the entry and a number from 1.
+fn divided(process: Process) -> Vec<Process> {
+    let Some(per_process) = process.per_process else {
+        return vec![process];
+    };
+    let mut processes = Vec::new();
+    for (index, robots) in process.robots.chunks(per_process).enumerate() {
+        let names = robots.iter().cloned().map(RobotPattern::from);
+        processes.push(Process {
+            name: format!("{}{}", process.name, index + 1),
+            written: WrittenRobots::Together(names.collect()),
+            robots: robots.to_vec(),
+            per_process: None,
+            ..process.clone()
+        });
+    }
+    processes
 }
 
 /// The robots among these patterns that are called by their names.
@@ -544,13 +589,20 @@ fn check_process(source: &Source, raw: RawProcess) -> Result<Process, FileError>
             let help = "name the process, or leave `robots` out";
             return Err(FileError::at(source, Some(name_span), text).with_help(help));
         }
-        Some(robots) => WrittenRobots::Together(robots.into_inner()),
+        Some(robots) => WrittenRobots::Together(match robots.into_inner() {
+            RawRobots::One(pattern) => vec![pattern],
+            RawRobots::Several(patterns) => patterns,
+        }),
         None if name.is_open() => WrittenRobots::Each(name.clone()),
         None => WrittenRobots::Together(vec![name.clone()]),
     };
     let robots = match &written {
         WrittenRobots::Together(patterns) => named(patterns),
         WrittenRobots::Each(_) => Vec::new(),
+    };
+    let per_process = match &raw.per_process {
+        Some(per_process) => Some(check_per_process(source, per_process, &written)?),
+        None => None,
     };
     let backoff = match raw.backoff {
         Some(backoff) => check_backoff(source, &backoff)?,
@@ -562,6 +614,7 @@ fn check_process(source: &Source, raw: RawProcess) -> Result<Process, FileError>
         robots,
         written,
         robots_span: Some(robots_span),
+        per_process,
         env: raw.env,
         restart: raw.restart,
         backoff,
@@ -570,6 +623,27 @@ fn check_process(source: &Source, raw: RawProcess) -> Result<Process, FileError>
         is_extern: raw.r#extern,
         ..Process::new(name.as_str(), check_command(source, raw.command)?)
     })
+}
+
+fn check_per_process(
+    source: &Source,
+    per_process: &Spanned<usize>,
+    written: &WrittenRobots,
+) -> Result<usize, FileError> {
+    let refuse = |text: &str, help: &str| {
+        FileError::at(source, Some(per_process.span()), text).with_help(help)
+    };
+    if matches!(written, WrittenRobots::Each(_)) {
+        let text = "a process whose name is a pattern has one robot";
+        let help = "name the process, and give it `robots` as a pattern";
+        return Err(refuse(text, help));
+    }
+    let count = *per_process.get_ref();
+    if !(1..=MAX_PER_PROCESS).contains(&count) {
+        let text = format!("a process has 1 to {MAX_PER_PROCESS} robots");
+        return Err(refuse(&text, "for example: per_process = 64"));
+    }
+    Ok(count)
 }
 
 fn check_command(source: &Source, command: Spanned<Vec<String>>) -> Result<Vec<String>, FileError> {

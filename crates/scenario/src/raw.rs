@@ -8,6 +8,7 @@ pub(super) mod mood;
 mod network;
 mod numbers;
 mod place;
+mod robot_names;
 mod sensing;
 mod site;
 mod solids;
@@ -35,6 +36,7 @@ use guests::GuestsTable;
 use network::NetworkTable;
 use numbers::positive;
 use place::StartPlace;
+use robot_names::RobotNames;
 use sensing::SensingTable;
 use site::SiteTable;
 use solids::{Fixed, FloorPlanTable, ObstacleTable, Size, WallTable};
@@ -111,7 +113,7 @@ struct RecordTable {
 #[derive(Debug, Clone, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct RawRobot {
-    name: RobotName,
+    name: RobotNames,
     /// So many robots, whose names are this one and a number.
     count: Option<usize>,
     class: Option<String>,
@@ -325,7 +327,7 @@ impl ScenarioFile {
         for robot in &self.robots {
             let robot = robot.get_ref();
             if let Some(on_late) = robot.on_late {
-                own.insert(robot.name.clone(), on_late);
+                own.insert(robot.name.name.clone(), on_late);
             }
         }
 
@@ -368,27 +370,37 @@ fn single_robots(
     for entry in raw {
         let span = entry.span();
         let refuse = |reason: &str| FileError::at(source, Some(span.clone()), reason);
-        let Some(count) = entry.get_ref().count else {
+        let written = entry.get_ref();
+        let numbers = match (&written.name.numbers, written.count) {
+            (Some(_), Some(_)) => {
+                return Err(refuse("the name has a range of numbers: leave `count` out"));
+            }
+            (Some(numbers), None) => Some(numbers.clone()),
+            (None, count) => count.map(|count| 1..=count),
+        };
+        let Some(numbers) = numbers else {
             if robots.len() == MAX_ROBOTS {
                 return Err(refuse(&too_many_robots()));
             }
             robots.push(entry);
             continue;
         };
+        let count = numbers.clone().count();
         if count > MAX_ROBOTS - robots.len() {
             return Err(refuse(&too_many_robots()));
         }
 
         let table = entry.into_inner();
-        for number in 1..=count {
-            let name = RobotName::new(&member(table.name.as_str(), number))
+        let base = table.name.name.as_str();
+        for (number, place) in numbers.zip(1..) {
+            let name = RobotName::new(&member(base, number))
                 .map_err(|error| refuse(&error.to_string()))?;
             let class = table.class.clone();
             let robot = RawRobot {
                 count: None,
-                class: class.or_else(|| Some(table.name.to_string())),
-                name,
-                at: table.at.member(number, count),
+                class: class.or_else(|| Some(base.to_owned())),
+                name: name.into(),
+                at: table.at.member(place, count),
                 ..table.clone()
             };
             robots.push(Spanned::new(span.clone(), robot));
@@ -410,12 +422,12 @@ fn robots(
     for entry in raw {
         let span = entry.span();
         let robot = entry.into_inner();
-        if robot.name.is_operator() {
+        if robot.name.name.is_operator() {
             let reason = "the name `operator` is kept for commands from outside the roster";
             return Err(FileError::at(source, Some(span), reason));
         }
 
-        let name = robot.name.clone();
+        let name = robot.name.name.clone();
         let spec = spec(robot, span.clone(), source, folder)?;
         if robots.insert(name.clone(), spec).is_some() {
             let reason = format!("a second robot called {name}");
@@ -437,13 +449,13 @@ fn spec(
         parameters = named_parameters(file, source, folder)?;
     }
     merge(&mut parameters, &robot.params);
-    mood::carry_over(&mut parameters, &robot.name, folder.is_some())
+    mood::carry_over(&mut parameters, &robot.name.name, folder.is_some())
         .map_err(|reason| FileError::at(source, Some(span), &reason))?;
 
     let class = robot.class;
     let (at, drawn) = robot.at.resolve();
     Ok(RobotSpec {
-        class: class.unwrap_or_else(|| robot.name.as_str().to_owned()),
+        class: class.unwrap_or_else(|| robot.name.name.to_string()),
         at: to_wire(at),
         drawn,
         shape: solids::shape(robot.size.as_ref(), robot.radius.as_ref(), source)?,
@@ -495,7 +507,7 @@ impl FilePlaces {
             obstacles: obstacles.map(|(_, span)| span.clone()).collect(),
             walls: walls.map(|(_, span)| span.clone()).collect(),
             robots: robots
-                .map(|robot| (robot.get_ref().name.clone(), robot.span()))
+                .map(|robot| (robot.get_ref().name.name.clone(), robot.span()))
                 .collect(),
         }
     }
@@ -604,7 +616,7 @@ impl RawRobot {
         let parameters = spec.parameters.iter();
         let params = parameters.filter_map(|(key, value)| Some((key.clone(), to_toml(value)?)));
         Self {
-            name: name.clone(),
+            name: name.clone().into(),
             count: None,
             class: Some(spec.class.clone()),
             at: StartPlace::of(to_world(spec.at), spec.drawn),

@@ -4,6 +4,7 @@
 
 use std::path::Path;
 
+use protocol::RobotName;
 use protocol::messages::DisplayUnit;
 use scenario::Scenario;
 use scenario::diagnostic::{FileError, Source};
@@ -134,6 +135,48 @@ fn the_resolved_file_gives_the_same_scenario() {
     let second = parse(&resolved).unwrap();
     assert_eq!(format!("{first:?}"), format!("{second:?}"), "{resolved}");
     assert_eq!(resolved, second.to_toml().unwrap());
+}
+
+#[test]
+fn a_range_of_names_is_a_count() {
+    let text = |names: &str| {
+        format!(
+            "[field]\nsize = [\"60 ft\", \"60 ft\"]\n[[robot]]\n{names}\nat = \"random\"\nparams = {{ k = 1 }}\n"
+        )
+    };
+    let counted = parse(&text("name = \"S\"\ncount = 20")).unwrap();
+    let ranged = parse(&text("name = \"S{1..20}\"")).unwrap();
+    assert_eq!(ranged, counted);
+    assert_eq!(ranged.robots.len(), 20);
+    assert!(ranged.robots.values().all(|robot| robot.class == "S"));
+
+    let later = parse(&text("name = \"S{9..11}\"\nclass = \"Leguin\"")).unwrap();
+    let names: Vec<&str> = later.robots.keys().map(|name| name.as_str()).collect();
+    assert_eq!(names, ["S10", "S11", "S9"]);
+    assert_eq!(later.robots[&RobotName::new("S9").unwrap()].class, "Leguin");
+
+    for (names, place, reason) in [
+        (
+            "name = \"S{3..1}\"",
+            "hall.toml:4:8",
+            "the range ends with 1, before 3",
+        ),
+        ("name = \"S{1..}\"", "hall.toml:4:8", "such as"),
+        ("name = \"{1..2}\"", "hall.toml:4:8", "name"),
+        (
+            "name = \"S{1..1025}\"",
+            "hall.toml:3:1",
+            "more than 1024 robots",
+        ),
+        (
+            "name = \"S{1..2}\"\ncount = 2",
+            "hall.toml:3:1",
+            "leave `count` out",
+        ),
+    ] {
+        let shown = shown(&parse(&text(names)).unwrap_err());
+        assert!(shown.contains(place) && shown.contains(reason), "{shown}");
+    }
 }
 
 /// A scenario with robots in bulk that stand side by side, as changes place them.

@@ -174,6 +174,54 @@ fn an_entry_runs_robots_in_bulk() {
 }
 
 #[test]
+fn an_entry_is_as_many_processes_as_its_robots_need() {
+    let text = |per_process: &str, more: &str| {
+        format!(
+            "[[process]]\nname = \"team\"\ncommand = [\"x\"]\nrobots = \"*\"\nper_process = {per_process}\n{more}"
+        )
+    };
+    let names = |per_process: &str| {
+        let mut names = Vec::new();
+        for process in load(&text(per_process, "")).unwrap().processes {
+            let robots = process.robots.iter().map(ToString::to_string);
+            names.push((process.name, robots.collect::<Vec<_>>().join(" ")));
+        }
+        names
+    };
+    let own = |(name, robots): (&str, &str)| (name.to_owned(), robots.to_owned());
+    assert_eq!(
+        names("1"),
+        [("team1", "Butler"), ("team2", "Leguin")].map(own)
+    );
+    for per_process in ["2", "64", "1024"] {
+        assert_eq!(names(per_process), [("team1", "Butler Leguin")].map(own));
+    }
+
+    for wrong in ["0", "1025"] {
+        check(
+            &text(wrong, ""),
+            &["launch/x.toml:6:15", "a process has 1 to 1024 robots"],
+        );
+    }
+    check(&text("-1", ""), &["launch/x.toml:6:15"]);
+    check(
+        "[[process]]\nname = \"*\"\ncommand = [\"x\"]\nper_process = 2",
+        &["launch/x.toml:5:15", "name the process"],
+    );
+    check(
+        &text(
+            "1",
+            "[[process]]\nname = \"team2\"\nrobots = []\ncommand = [\"x\"]",
+        ),
+        &["a second process called team2", "per_process"],
+    );
+    check(
+        "[[process]]\nname = \"team\"\ncommand = [\"x\"]\nrobots = 3",
+        &["robots are a name or a pattern"],
+    );
+}
+
+#[test]
 fn a_misspelt_key_is_shown_with_file_line_and_caret() {
     let shown = refusal("[[process]]\nname = \"Butler\"\ncomand = [\"cars-butler\"]");
     let line = shown

@@ -15,6 +15,7 @@ use super::super::checked::{to_wire, to_world};
 use super::super::sites::{OnConflict, SiteSpec, SiteVariable};
 use super::numbers::positive;
 use super::place::StartPlace;
+use super::robot_names::RobotNames;
 use super::unplaced::unplaced;
 
 /// Kind of a site that names none.
@@ -23,7 +24,7 @@ const KIND: &str = "site";
 #[derive(Debug, Clone, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SiteTable {
-    name: RobotName,
+    name: RobotNames,
     /// So many sites, whose names are this one and a number.
     count: Option<usize>,
     kind: Option<Spanned<String>>,
@@ -63,21 +64,29 @@ pub(super) fn check(
         let refuse = |reason: &str| FileError::at(source, Some(span.clone()), reason);
         let table = entry.into_inner();
         let spec = table.check(sensing_range, source)?;
-        let count = table.count.unwrap_or(1);
+        let base = table.name.name.as_str();
+        let numbers = match (&table.name.numbers, table.count) {
+            (Some(_), Some(_)) => {
+                return Err(refuse("the name has a range of numbers: leave `count` out"));
+            }
+            (Some(numbers), None) => Some(numbers.clone()),
+            (None, count) => count.map(|count| 1..=count),
+        };
+        let count = numbers.clone().map_or(1, Iterator::count);
         if count > MAX_SITES - sites.len() {
             return Err(refuse(&format!("more than {MAX_SITES} sites")));
         }
 
         for number in 1..=count {
-            let name = match table.count {
-                Some(_) => RobotName::new(&member(table.name.as_str(), number)),
-                None => RobotName::new(table.name.as_str()),
+            let name = match &numbers {
+                Some(numbers) => RobotName::new(&member(base, numbers.start() + number - 1)),
+                None => RobotName::new(base),
             };
             let name = name.map_err(|error| refuse(&error.to_string()))?;
             if robots.contains(&name) {
                 return Err(refuse(&format!("a robot is called {name} as well")));
             }
-            let place = match table.count {
+            let place = match numbers {
                 Some(_) => table.at.get_ref().member(number, count),
                 None => table.at.get_ref().clone(),
             };
@@ -140,7 +149,7 @@ impl SiteTable {
             state.insert(unplaced(key.clone()), unplaced(to_toml(variable)));
         }
         Some(Self {
-            name: RobotName::new(name).ok()?,
+            name: RobotName::new(name).ok()?.into(),
             count: None,
             kind: Some(unplaced(spec.kind.clone())),
             at: unplaced(StartPlace::of(to_world(spec.at), spec.drawn)),
