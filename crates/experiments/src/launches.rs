@@ -22,7 +22,7 @@ use protocol::messages::{Control, ControlAnswer, End, Phase, Status};
 use protocol::{Epoch, RunName, Tick, decode, encode};
 use record::RunFolder;
 use record::names::{ENDPOINT, EVENTS, OPERATOR_CONFIG, RECORDING, SCENARIO, SUMMARY};
-use scenario::Scenario;
+use scenario::{FaultEnd, Scenario};
 use xxhash_rust::xxh3::xxh3_128;
 
 use super::follow::{EndedRun, Follow};
@@ -37,6 +37,8 @@ const OUTPUT: &str = "launch.err";
 const MAX_REASON: usize = 2000;
 /// How long a tick of wall clock may take, and a launch to begin, unless the options say otherwise.
 pub const TICK_PATIENCE: Duration = Duration::from_secs(120);
+/// Most robots that are named where a run does not go on.
+const MAX_AWAITED: usize = 5;
 /// How long the simulator may take for an answer before it is asked again.
 const ANSWER: Duration = Duration::from_secs(2);
 /// How long a launch may take to end before it is killed.
@@ -161,8 +163,8 @@ impl Launches {
             return Vec::new();
         }
         vec![
-            "a robot keeps something over `init`: played once more by the same processes, a run was another one. Every unit of \
-             these robots gets fresh processes, which is slower"
+            "a robot keeps something over `init`: played once more by the same processes, the first run was another one, or \
+             failed. Every unit of these robots gets fresh processes, which is slower"
                 .to_owned(),
         ]
     }
@@ -180,16 +182,17 @@ impl Launches {
         scenario.record.log = false;
         let text = scenario.to_toml()?;
         let kind = Kind::of(&scenario, launch);
+        let patience = self.usage.tick_patience + longest_hold(&scenario);
 
         if let Some(mut launched) = self.take(kind) {
-            match self.play_again(&mut launched, &text) {
+            match self.play_again(&mut launched, &text, patience) {
                 Ok(()) => return self.conclude(launched, &scenario, follower),
                 Err(_) => launched.end(),
             }
         }
 
         let mut launched = self.start(kind, &scenario, launch)?;
-        match launched.play(self.usage.tick_patience) {
+        match launched.play(patience) {
             Ok(()) if launched.has_finished() => {
                 let digest = read_summary(&launched.run())?.map(|summary| summary.digest);
                 launched.first = digest.map(|digest| (text, digest));
@@ -222,13 +225,17 @@ impl Launches {
     }
 
     /// Plays a further unit; its first one once more before the second.
-    fn play_again(&self, launched: &mut Launched, scenario: &str) -> Result<(), Broken> {
-        let patience = self.usage.tick_patience;
+    fn play_again(
+        &self,
+        launched: &mut Launched,
+        scenario: &str,
+        patience: Duration,
+    ) -> Result<(), Broken> {
         if let Some((first, digest)) = launched.first.take() {
             launched.load(&first)?;
-            launched.play(patience)?;
+            let has_ended = launched.play(patience).is_ok();
             let again = read_summary(&launched.run()).ok().flatten();
-            if again.is_none_or(|again| again.digest != digest) {
+            if !has_ended || again.is_none_or(|again| again.digest != digest) {
                 lock(&self.kept_state).insert(launched.kind);
                 return Err(Broken::Because("another run after `init`".to_owned()));
             }
@@ -500,17 +507,32 @@ impl Session {
     }
 }
 
+/// Longest time of wall clock for which a fault of the scenario holds the clock.
+fn longest_hold(scenario: &Scenario) -> Duration {
+    let changed = scenario.changes.iter().flat_map(|change| &change.faults);
+    let all = scenario.faults.iter().chain(changed);
+    let held = all.map(|fault| match fault.end {
+        FaultEnd::After(time_s) => Duration::try_from_secs_f64(time_s).unwrap_or_default(),
+        _ => Duration::ZERO,
+    });
+    held.max().unwrap_or_default()
+}
+
 /// That a run does not go on, for people.
 fn hung(status: Option<&Status>, patience: Duration) -> String {
     let patience_s = patience.as_secs_f64();
     let Some(status) = status else {
         return format!("the launch has not begun to play within {patience_s} s");
     };
-    let mut text = format!("no tick for {patience_s} s after tick {}", status.tick);
-    for awaited in &status.awaiting {
-        text += &format!(": {} {}", awaited.name, awaited.because);
+    let mut awaited = Vec::new();
+    for one in status.awaiting.iter().take(MAX_AWAITED) {
+        awaited.push(format!("{} {}", one.name, one.because));
     }
-    text
+    let text = format!("no tick for {patience_s} s after tick {}", status.tick);
+    if awaited.is_empty() {
+        return text;
+    }
+    format!("{text}: {}", awaited.join("; "))
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {

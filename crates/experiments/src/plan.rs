@@ -14,7 +14,7 @@ use protocol::RobotName;
 use record::folder::check_no_links;
 use scenario::Scenario;
 use serde::{Deserialize, Serialize};
-use xxhash_rust::xxh3::Xxh3;
+use xxhash_rust::xxh3::{Xxh3, xxh3_128};
 
 use super::case::Case;
 use super::condition::{Condition, OWN_OPTIONS};
@@ -33,6 +33,8 @@ pub(super) const FILE: &str = "experiment.toml";
 pub(super) const UNITS: &str = "units";
 /// How the name of a file with units ends.
 pub(super) const UNITS_ENDING: &str = ".jsonl";
+/// Largest program of a launch file that is a part of the identity of a unit.
+const MAX_PROGRAM_BYTES: u64 = 256 << 20;
 /// How units are measured. It is a part of the identity of a unit, so units that were measured otherwise are played again.
 const MEASURING: u32 = 2;
 
@@ -123,6 +125,9 @@ pub struct LaunchText {
     pub folder: PathBuf,
     /// Its text.
     pub text: String,
+    /// Digests of the files that its commands name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub files: BTreeMap<String, String>,
 }
 
 /// The program that plays the units: another one may give other runs.
@@ -354,6 +359,10 @@ impl Plan {
             add_text(&mut content, &cell.scenario);
             if let Robots::Launched(launch) = &written.robots {
                 add_text(&mut content, &launch.text);
+                for (file, digest) in &launch.files {
+                    add_text(&mut content, file);
+                    add_text(&mut content, digest);
+                }
             }
             for (robots, digest) in &written.own_robots {
                 add_text(&mut content, robots);
@@ -481,7 +490,15 @@ impl Plan {
         if before.measures != now.measures {
             changes.push("the measures have changed: every unit is another one".to_owned());
         }
-        if before.own_robots != now.own_robots {
+        let files = |plan: &WrittenPlan| match &plan.robots {
+            Robots::Launched(launch) => Some(launch.files.clone()),
+            Robots::InProcess | Robots::Programs => None,
+        };
+        let have_changed = match (files(&before), files(now)) {
+            (Some(before), Some(now)) => before != now,
+            _ => false,
+        };
+        if before.own_robots != now.own_robots || have_changed {
             changes.push("the robots have changed: every unit is another one".to_owned());
         }
         let mut changed = Vec::new();
@@ -712,11 +729,42 @@ impl LaunchText {
         let folder = file
             .map(|file| file.parent().unwrap_or(Path::new("/")).to_owned())
             .map_err(|error| FileError::unreadable(path, &error))?;
+        let files = digests_of_commands(&source.text, &folder);
         Ok(Self {
             folder,
             text: source.text,
+            files,
         })
     }
+}
+
+/// Digests of the files that the commands of a launch file name: programs with a `/`, which are in its folder, and arguments.
+fn digests_of_commands(text: &str, folder: &Path) -> BTreeMap<String, String> {
+    let mut digests = BTreeMap::new();
+    let table: toml::Table = toml::from_str(text).unwrap_or_default();
+    let processes = table.get("process").and_then(toml::Value::as_array);
+    for process in processes.into_iter().flatten() {
+        let command = process.get("command").and_then(toml::Value::as_array);
+        for word in command
+            .into_iter()
+            .flatten()
+            .filter_map(toml::Value::as_str)
+        {
+            let own = folder.join(word);
+            let file = if word.contains('/') && own.is_file() {
+                own
+            } else {
+                PathBuf::from(word)
+            };
+            let is_read = file
+                .metadata()
+                .is_ok_and(|found| found.is_file() && found.len() <= MAX_PROGRAM_BYTES);
+            if is_read && let Ok(bytes) = std::fs::read(&file) {
+                digests.insert(word.to_owned(), format!("{:032x}", xxh3_128(&bytes)));
+            }
+        }
+    }
+    digests
 }
 
 /// Whether a folder has files. Drafts that a killed process left, whose names begin with a point, are none.

@@ -11,6 +11,7 @@ use config::units::Time;
 use experiments::hunt::{FaultClass, HuntBudget, HuntOptions, HuntRobots, Subject, hunt as go};
 use experiments::{Launches, Robots};
 use pyo3::prelude::*;
+use scenario::Scenario;
 
 use crate::error::{argument, plain, read, reported};
 use crate::interrupt::interruptible;
@@ -75,9 +76,10 @@ pub(crate) fn hunt(
         }
     };
     let file = scenario_of(&file)?;
+    let scenario = Scenario::load(&file, &changes).map_err(reported)?;
+    makers.check(&scenario.robots.into_keys().collect())?;
     let subject = py.detach(|| Subject::load_with(&file, &changes, hunted));
     let subject = subject.map_err(reported)?;
-    makers.check(&subject.scenario.robots.keys().cloned().collect())?;
 
     let stop = Arc::new(AtomicBool::new(false));
     let is_stopped = stop.clone();

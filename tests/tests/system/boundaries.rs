@@ -106,6 +106,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     (
         "experiments",
         &[
+            "bus",
             "lab",
             "scenario",
             "record",

@@ -306,3 +306,30 @@ fn an_expectation_that_no_plan_has_asked_is_named() {
     let report: Value = serde_json::from_str(&report).unwrap();
     assert_eq!(report["never_asked"], serde_json::json!(["odd"]));
 }
+
+/// What a hunt finds does not depend on whether robots are processes.
+#[test]
+fn a_hunt_of_processes_finds_the_same() {
+    let lab = Lab::new();
+    let args = |more: &[&'static str]| {
+        affectless(&[&["--plans", "4", "--kinds", "lose,crash"], more].concat())
+    };
+    let report = |args: &[&str]| {
+        let output = lab.cars(args).output().unwrap();
+        let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+        let report: Result<Value, _> = serde_json::from_slice(&output.stdout);
+        report.unwrap_or_else(|error| panic!("{error}: {errors}"))
+    };
+    let here = report(&args(&["--shrink-runs", "4"]));
+    let there = report(&args(&["--shrink-runs", "4", "--processes", "--jobs", "2"]));
+    for key in ["plans", "ticks", "coverage", "never_asked"] {
+        assert_eq!(here[key], there[key], "{key}");
+    }
+    let causes = |report: &Value| {
+        let findings = report["findings"].as_array().unwrap().iter();
+        findings
+            .map(|finding| finding["cause"].clone())
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(causes(&here), causes(&there));
+}

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
 use protocol::random;
-use system_tests::{Lab, PATIENCE, is_within, programs, root};
+use system_tests::{Lab, PATIENCE, eventually, is_within, programs, root};
 
 use super::{HALL, assert_same_results, cars, command, files_of_units, ok, rows};
 
@@ -582,9 +582,11 @@ fn runs_of_processes_give_the_results_of_one_process() {
     };
     let one = play("one", &[]);
     let processes = play("processes", &["--processes"]);
+    let fresh = play("fresh", &["--processes", "--fresh-processes"]);
     for name in ["runs.csv", "results.json"] {
         let bytes = |folder: &Path| fs::read(folder.join(name)).unwrap();
         assert!(bytes(&one) == bytes(&processes), "{name}");
+        assert!(bytes(&one) == bytes(&fresh), "{name}");
     }
     // The yoke acts: what is compared is not the same run four times.
     let rows = rows(&one);
@@ -635,4 +637,89 @@ fn a_robot_in_another_language_takes_part() {
             "{row:?}"
         );
     }
+}
+
+/// The number of robots of a team is a factor, also where processes share the team out.
+#[test]
+fn the_number_of_robots_is_a_factor() {
+    let lab = Lab::new();
+    lab.write(
+        "team.toml",
+        "[field]\nsize = ['60 ft', '60 ft']\n[[robot]]\nname = 'S{1..2}'\nclass = 'Leguin'\nat = 'random'\n\
+         [[robot]]\nname = 'Butler'\nat = 'random'\nparams = { refiller = 'S1' }\n",
+    );
+    lab.write(
+        "launch.toml",
+        "scenario = 'team.toml'\n[[process]]\nname = 'team'\ncommand = ['cars-leguin']\nrobots = 'S*'\nper_process = 2\n\
+         [[process]]\nname = 'Butler'\ncommand = ['cars-butler']\n",
+    );
+    let file = lab.write(
+        "size.toml",
+        "question = '?'\nscenario = 'launch.toml'\nduration = '20 s'\nseeds = 2\n\
+         [[factor]]\nname = 'robots'\nvalues = [1, 5]\nset = ['robot.S.count={value}', 'robot.S*.params.waiter=Butler']\n\
+         [[arm]]\nname = 'a'\n\
+         [[measure]]\nname = 'states'\ncount = { event = 'behavior', robot = '*' }\n\
+         [[measure]]\nname = 'balance'\njain = { robot = 'S*', name = 'trips' }\n",
+    );
+    let play = |name: &str, more: &[&str]| {
+        let folder = lab.out().join(name);
+        let args = [
+            "run",
+            file.to_str().unwrap(),
+            "-o",
+            folder.to_str().unwrap(),
+        ];
+        ok(&[&args, more].concat());
+        fs::read(folder.join("runs.csv")).unwrap()
+    };
+    let here = play("here", &[]);
+    assert!(here == play("there", &["--processes"]));
+    assert_eq!(String::from_utf8(here).unwrap().lines().count(), 1 + 4);
+}
+
+/// Whatever ends an experiment, its processes end, too.
+#[test]
+fn a_killed_experiment_leaves_no_process() {
+    let lab = Lab::new();
+    let short = Short::text();
+    let launch = root().join("launch/hors_doeuvres.toml");
+    let text = short.replace(
+        &format!("scenario = {:?}", root().join(HALL)),
+        &format!("scenario = {launch:?}"),
+    );
+    let file = lab.write("killed.toml", &text);
+    let folder = lab.out().join("killed");
+    let temporary = lab.out().join("temporary");
+    fs::create_dir(&temporary).unwrap();
+    let mut command = command(&[
+        "run",
+        file.to_str().unwrap(),
+        "-o",
+        folder.to_str().unwrap(),
+    ]);
+    command
+        .args(["--processes", "--jobs", "2"])
+        .env("TMPDIR", &temporary)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null());
+    let mut experiment = command.spawn().unwrap();
+    eventually("a unit that has been played again", || {
+        let files = files_of_units(&folder);
+        let lines = files.iter().map(|file| {
+            let text = fs::read_to_string(file).unwrap_or_default();
+            text.lines().count()
+        });
+        (lines.sum::<usize>() > 6).then_some(())
+    });
+
+    experiment.kill().unwrap();
+    experiment.wait().unwrap();
+    let place = temporary.display().to_string();
+    eventually("the last process to be gone", || {
+        let entries = fs::read_dir("/proc").unwrap().flatten();
+        let mut lines =
+            entries.map(|entry| fs::read(entry.path().join("cmdline")).unwrap_or_default());
+        let is_any = lines.any(|line| String::from_utf8_lossy(&line).contains(&place));
+        (!is_any).then_some(())
+    });
 }
