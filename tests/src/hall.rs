@@ -26,8 +26,8 @@ pub fn scenario(file: &str, seed: u64, set: &[&str]) -> Scenario {
     let set = set.map(|change| change.parse().expect("a legal change"));
     let changes = Changes {
         seed: Some(seed),
-        duration_s: None,
         set: set.collect(),
+        ..Changes::default()
     };
 
     let file = root().join(Path::new(file));

@@ -1,5 +1,7 @@
 //! `--set path=value`: changes to a file from the command line.
 
+use std::path::PathBuf;
+
 use protocol::pattern::{is_pattern, overlap};
 
 use crate::bulk;
@@ -21,6 +23,8 @@ pub struct Changes {
     pub duration_s: Option<f64>,
     /// `path=value` pairs.
     pub set: Vec<Override>,
+    /// Where the runs are that the file names, instead of `runs`.
+    pub runs: Option<PathBuf>,
 }
 
 /// One change: a path in the file and its new value.

@@ -96,6 +96,7 @@ fn play_bare(scenario: &std::path::Path) -> Result<f64, Box<dyn Error>> {
             seed: Some(seed),
             duration_s: Some(600.0),
             set,
+            ..Changes::default()
         };
         let mut local = Local::new(Scenario::load(scenario, &changes)?, &run)?;
         local.simulation.init(&mut local.robots)?;

@@ -116,8 +116,8 @@ impl<'a> Case<'a> {
         let seed = self.experiment.seeds.first().copied();
         let changes = Changes {
             seed: seed.filter(|_| count > 0),
-            duration_s: None,
             set,
+            ..Changes::default()
         };
         Scenario::load(&self.experiment.scenario, &changes)
     }

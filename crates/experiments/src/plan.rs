@@ -705,8 +705,8 @@ impl Plan {
         };
         let changes = Changes {
             seed: Some(seed),
-            duration_s: None,
             set,
+            ..Changes::default()
         };
         let scenario = Scenario::parse(&changes.apply(&source)?, Path::new(""))?;
         if changes.set.is_empty() {

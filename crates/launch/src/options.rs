@@ -38,6 +38,7 @@ impl RunOptions {
             seed: self.seed,
             duration_s: self.duration.map(|duration| duration.0),
             set: self.set.clone(),
+            runs: Some(self.out.clone()),
         }
     }
 

@@ -1,5 +1,7 @@
 //! Names of the files in the folder of a run.
 
+/// Where the folders of runs are, unless a command names another place.
+pub const RUNS: &str = "runs";
 /// The scenario of the epoch in progress, complete.
 pub const SCENARIO: &str = "scenario.toml";
 /// The events, for programs.

@@ -67,16 +67,19 @@ impl Scenario {
     /// [`FileError`] with file, line and caret; for a change that cannot be made, with its path.
     pub fn load(path: &Path, changes: &Changes) -> Result<Self, FileError> {
         let source = Source::read(path)?;
-        let folder = path.parent().unwrap_or(Path::new("."));
+        let folders = raw::Folders {
+            files: path.parent().unwrap_or(Path::new(".")),
+            runs: changes.runs.as_deref().unwrap_or(Path::new(files::RUNS)),
+        };
         // Parsed before it is changed, so that errors show the lines of the file.
         let raw: raw::ScenarioFile = source.parse()?;
         if changes.is_empty() {
-            return raw.check(&source, Some(folder));
+            return raw.check(&source, Some(folders));
         }
 
         let source = changes.apply(&source)?;
         let raw: raw::ScenarioFile = source.parse()?;
-        let mut scenario = raw.check(&source, Some(folder))?;
+        let mut scenario = raw.check(&source, Some(folders))?;
         scenario.parent = None; // It is no fork of that run any more.
         Ok(scenario)
     }
@@ -99,9 +102,13 @@ impl Scenario {
     /// # Errors
     /// [`FileError`] with line and caret.
     pub fn parse(source: &Source, folder: &Path) -> Result<Self, FileError> {
+        let folders = raw::Folders {
+            files: folder,
+            runs: Path::new(files::RUNS),
+        };
         source
             .parse::<raw::ScenarioFile>()?
-            .check(source, Some(folder))
+            .check(source, Some(folders))
     }
 
     /// Reads and checks an untrusted text of a scenario, which must not name files.

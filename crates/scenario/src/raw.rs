@@ -58,6 +58,15 @@ const MAX_DURATION_S: f64 = 18_446_744_073.0;
 /// Most robots of a scenario.
 const MAX_ROBOTS: usize = 1024;
 
+/// Where a scenario file finds what it names.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Folders<'a> {
+    /// Where its relative paths lead from.
+    pub(super) files: &'a Path,
+    /// Where its runs are.
+    pub(super) runs: &'a Path,
+}
+
 #[derive(Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ScenarioFile {
@@ -161,14 +170,13 @@ impl ScenarioFile {
         self
     }
 
-    /// Checks the scenario and fills in defaults. Files that it names are relative to `folder`; without one, which is for
-    /// untrusted texts, it must not name files.
+    /// Checks the scenario and fills in defaults. Without folders, which is for untrusted texts, it must not name files.
     pub(super) fn check(
         self,
         source: &Source,
-        folder: Option<&Path>,
+        folders: Option<Folders<'_>>,
     ) -> Result<checked::Scenario, FileError> {
-        self.check_from(source, folder, 0)
+        self.check_from(source, folders, 0)
     }
 
     /// Remarks about a scenario that can be used: times that are rounded, and what never begins.
@@ -196,7 +204,7 @@ impl ScenarioFile {
     pub(super) fn check_from(
         mut self,
         source: &Source,
-        folder: Option<&Path>,
+        folders: Option<Folders<'_>>,
         settled: Tick,
     ) -> Result<checked::Scenario, FileError> {
         self.robots = single_robots(self.robots, source)?;
@@ -210,7 +218,7 @@ impl ScenarioFile {
         let guests = guests::walks(guests, source)?;
         let mut fixed = Fixed::read(&self.obstacles, &self.walls, source)?;
         if let Some(plan) = &self.floor_plan {
-            fixed.add_plan(plan, folder, source)?;
+            fixed.add_plan(plan, folders.map(|folders| folders.files), source)?;
         }
         let places = FilePlaces::of(&self, &fixed);
 
@@ -220,7 +228,7 @@ impl ScenarioFile {
         let max_speed = field.and_then(|field| field.max_speed);
         let display_unit = field.and_then(|field| field.display_unit);
 
-        let robots = robots(self.robots, source, folder)?;
+        let robots = robots(self.robots, source, folders)?;
         let (sites, site_spans) = site::check(
             self.sites,
             size.0.map(|length| length.0),
@@ -281,7 +289,7 @@ impl ScenarioFile {
             placing::check(&scenario).map_err(refuse)?;
         }
         scenario.changes = change::check(self.changes, &scenario, source, |changed, at| {
-            changed.parse::<Self>()?.check_from(changed, folder, at)
+            changed.parse::<Self>()?.check_from(changed, folders, at)
         })?;
         Ok(scenario)
     }
@@ -416,7 +424,7 @@ fn too_many_robots() -> String {
 fn robots(
     raw: Vec<Spanned<RawRobot>>,
     source: &Source,
-    folder: Option<&Path>,
+    folders: Option<Folders<'_>>,
 ) -> Result<BTreeMap<RobotName, RobotSpec>, FileError> {
     let mut robots = BTreeMap::new();
     for entry in raw {
@@ -428,7 +436,7 @@ fn robots(
         }
 
         let name = robot.name.name.clone();
-        let spec = spec(robot, span.clone(), source, folder)?;
+        let spec = spec(robot, span.clone(), source, folders)?;
         if robots.insert(name.clone(), spec).is_some() {
             let reason = format!("a second robot called {name}");
             return Err(FileError::at(source, Some(span), &reason));
@@ -442,15 +450,19 @@ fn spec(
     robot: RawRobot,
     span: Span<usize>,
     source: &Source,
-    folder: Option<&Path>,
+    folders: Option<Folders<'_>>,
 ) -> Result<RobotSpec, FileError> {
     let mut parameters = toml::Table::new();
     if let Some(file) = &robot.params_from {
-        parameters = named_parameters(file, source, folder)?;
+        parameters = named_parameters(file, source, folders)?;
     }
     merge(&mut parameters, &robot.params);
-    mood::carry_over(&mut parameters, &robot.name.name, folder.is_some())
-        .map_err(|reason| FileError::at(source, Some(span), &reason))?;
+    mood::carry_over(
+        &mut parameters,
+        &robot.name.name,
+        folders.map(|folders| folders.runs),
+    )
+    .map_err(|reason| FileError::at(source, Some(span), &reason))?;
 
     let class = robot.class;
     let (at, drawn) = robot.at.resolve();
@@ -467,11 +479,12 @@ fn spec(
 fn named_parameters(
     file: &Spanned<PathBuf>,
     source: &Source,
-    folder: Option<&Path>,
+    folders: Option<Folders<'_>>,
 ) -> Result<toml::Table, FileError> {
     let shipped = shipped::path(shipped::SCENARIOS);
-    let path = folder.unwrap_or(&shipped).join(file.get_ref());
-    if folder.is_none() && !shipped::contains(&path) {
+    let folder = folders.map_or(shipped.as_path(), |folders| folders.files);
+    let path = folder.join(file.get_ref());
+    if folders.is_none() && !shipped::contains(&path) {
         let names: Vec<_> = shipped::names(shipped::PARAMETERS).collect();
         let reason = format!(
             "`params_from` of a scenario from outside names robots/{}.toml; write other parameters out under `params`",

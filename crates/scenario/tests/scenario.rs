@@ -537,6 +537,7 @@ fn the_command_line_changes_a_scenario() {
                 seed: Some(9),
                 duration_s: Some(10.0),
                 set,
+                ..Changes::default()
             },
         )
     };
@@ -934,6 +935,27 @@ fn a_robot_begins_with_the_mood_in_which_it_ended_another_run() {
     std::fs::remove_file(&summary).unwrap();
     let text = scenario.to_toml().unwrap();
     assert!(parse(&text).is_ok(), "the record depends on no other run");
+}
+
+#[test]
+fn the_mood_at_the_start_does_not_change_while_the_run_goes_on() {
+    let refused = "mood.start is A's mood at the beginning of the run";
+    for (set, is_refused) in [
+        ("robot.A.params.mood.start=0.5", true),
+        ("robot.*.params={ mood = { start = 0.5 } }", true),
+        ("robot.A.params.mood.start=-0.25", false),
+        ("robot.A.params.mood.weight=0.5", false),
+        ("robot.A.params={}", false),
+    ] {
+        let robot = "[[robot]]\nname = \"A\"\nat = [\"5 m\", \"5 m\"]\nparams = { mood = { start = -0.25 } }\n";
+        let change = format!("[[change]]\nat = \"1 s\"\nset = ['{set}']\n");
+        let error = parse(&format!("{robot}{change}"))
+            .err()
+            .map(|error| shown(&error).replace("\n", " "))
+            .unwrap_or_default();
+        assert_eq!(error.contains(refused), is_refused, "{set}: {error}");
+        assert_eq!(error.is_empty(), !is_refused, "{set}: {error}");
+    }
 }
 
 #[test]

@@ -124,6 +124,7 @@ fn run(args: &SimulatorArgs) -> Result<ExitCode, Box<dyn Error + Send + Sync>> {
             seed: args.seed,
             duration_s,
             set: args.set.clone(),
+            runs: Some(args.out.clone()),
         },
     )?;
 

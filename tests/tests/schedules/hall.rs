@@ -57,8 +57,7 @@ fn scenario(file: &str, seed: u64, set: &[&str]) -> Scenario {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let mut changes = Changes {
         seed: Some(seed),
-        duration_s: None,
-        set: Vec::new(),
+        ..Changes::default()
     };
     for change in set {
         changes.set.push(change.parse().expect("a legal change"));

@@ -151,6 +151,19 @@ fn check_difference(
         );
     }
 
+    for (name, robot) in &after.robots {
+        let start = mood::start(&robot.parameters);
+        let start_before = before
+            .robots
+            .get(name)
+            .map(|robot| mood::start(&robot.parameters));
+        if start.is_some() && start_before != Some(start) {
+            return Err(format!(
+                "mood.start is {name}'s mood at the beginning of the run, and no change has an effect on it: set it in the scenario"
+            ));
+        }
+    }
+
     let begun = |faults: &[Fault]| -> Vec<Fault> {
         let begun = faults.iter().filter(|fault| fault.at < at);
         begun.cloned().collect()

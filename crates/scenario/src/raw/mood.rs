@@ -4,44 +4,47 @@ use std::path::{Path, PathBuf};
 
 use config::{Source, bulk};
 use protocol::RobotName;
+use protocol::messages::Parameters;
 use toml::{Table, Value};
 
-use crate::files::SUMMARY;
+use crate::files::{RUNS, SUMMARY};
 
 /// Where a robot names a run.
 pub(super) const FROM: [&str; 3] = ["params", "mood", "from"];
 /// The state variable and the parameter with a robot's mood, and the key that takes the mood of the run.
 const MOOD: &str = "mood";
 const START: &str = "start";
-/// Where run folders are made.
-const RUNS: &str = "runs";
+
+/// The mood with which a robot with these parameters begins, if they have one.
+pub(super) fn start(parameters: &Parameters) -> Option<&serde_json::Value> {
+    parameters.get(MOOD)?.get(START)
+}
 
 /// Puts the mood that the robot had at the end of the run that its parameters name in the place of the name. So a record has a
-/// number, and depends on no other one. `reads_files` is false for a scenario from outside.
+/// number, and depends on no other one. The run is in the folder `runs`, or is named by its path; a scenario from outside, for which
+/// there is no such folder, names none.
 ///
 /// # Errors
 /// There is no such run, it is not over, or the robot has no mood in it.
 pub(super) fn carry_over(
     parameters: &mut Table,
     robot: &RobotName,
-    reads_files: bool,
+    runs: Option<&Path>,
 ) -> Result<(), String> {
     let Some(mood) = parameters.get_mut(MOOD).and_then(Value::as_table_mut) else {
         return Ok(());
     };
-    let run = match mood.remove(FROM[2]) {
-        None => return Ok(()),
-        Some(_) if !reads_files => {
-            return Err(
-                "mood.from of a scenario from outside names no run; write its number as mood.start"
-                    .to_owned(),
-            );
-        }
-        Some(Value::String(run)) => run,
-        Some(_) => return Err("mood.from is the name of a run, in quotation marks".to_owned()),
+    let Some(run) = mood.remove(FROM[2]) else {
+        return Ok(());
+    };
+    let runs = runs.ok_or(
+        "mood.from of a scenario from outside names no run; write its number as mood.start",
+    )?;
+    let Value::String(run) = run else {
+        return Err("mood.from is the name of a run, in quotation marks".to_owned());
     };
 
-    let last = last_mood(&run, robot)?;
+    let last = last_mood(runs, &run, robot)?;
     mood.insert(START.to_owned(), Value::Float(last));
     Ok(())
 }
@@ -72,18 +75,19 @@ pub(crate) fn carry_all_over(content: &mut Table) -> Result<(), String> {
             .map(RobotName::new);
         let parameters = robot.get_mut(FROM[0]).and_then(Value::as_table_mut);
         if let (Some(Ok(name)), Some(parameters)) = (name, parameters) {
-            carry_over(parameters, &name, true)?;
+            carry_over(parameters, &name, Some(Path::new(RUNS)))?;
         }
     }
     Ok(())
 }
 
 /// The mood that the robot published last in a run.
-fn last_mood(run: &str, robot: &RobotName) -> Result<f64, String> {
-    let candidates: [PathBuf; 2] = [Path::new(RUNS).join(run), PathBuf::from(run)];
+fn last_mood(runs: &Path, run: &str, robot: &RobotName) -> Result<f64, String> {
+    let candidates: [PathBuf; 2] = [runs.join(run), PathBuf::from(run)];
     let Some(folder) = candidates.into_iter().find(|path| path.is_dir()) else {
         return Err(format!(
-            "mood.from: there is no run {run}, neither in {RUNS} nor as a folder"
+            "mood.from: there is no run {run}, neither in {} nor as a folder",
+            runs.display()
         ));
     };
 
