@@ -220,3 +220,33 @@ fn the_examples_of_files_are_right() {
         assert_eq!(status, 0, "{text}\n{file}");
     }
 }
+
+/// Whoever tries the examples in a checkout has not changed it.
+#[test]
+fn git_ignores_what_the_examples_write() {
+    let ignored = read(&root().join(".gitignore"));
+    let ignored: BTreeSet<&str> = ignored.lines().collect();
+    let mut written = BTreeSet::from(["hunt".to_owned()]); // `cars hunt` without --out.
+    let book = pages(&docs());
+    for page in book.iter().chain([&root().join("README.md")]) {
+        for line in read(page).lines().filter(|line| line.contains("cars ")) {
+            let words: Vec<&str> = line.split([' ', '`']).collect();
+            let outputs = words.windows(2).filter(|pair| pair[0] == "-o");
+            let robots = words
+                .windows(3)
+                .filter(|words| words[..2] == ["new", "robot"]);
+            written.extend(outputs.map(|pair| pair[1].to_owned()));
+            written.extend(robots.map(|words| words[2].to_owned()));
+        }
+    }
+
+    assert!(written.contains("Rosie") && written.contains("report.html"));
+    // Neither placeholders, nor what is elsewhere.
+    written.retain(|path| path.to_uppercase() != *path && !path.contains('/'));
+    for path in written {
+        assert!(
+            ignored.contains(&*format!("/{path}")),
+            "{path} is not in .gitignore"
+        );
+    }
+}
