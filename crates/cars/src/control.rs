@@ -382,7 +382,12 @@ fn print_answer(run: &RunRef, control: &Control, is_json: bool) -> Result<ExitCo
             let status = serde_json::to_string(&status)?;
             terminal::data(format_args!("{status}\n"))?;
         }
-        ControlAnswer::Done(status) => terminal::print(describe(&status))?,
+        ControlAnswer::Done(status) => {
+            if matches!(control, Control::Intervene { .. }) {
+                terminal::print("asked: it takes effect before the next tick; now:\n")?;
+            }
+            terminal::print(describe(&status))?;
+        }
         ControlAnswer::Setup(answer) => terminal::data(answer.scenario)?,
         ControlAnswer::Log { lines } => {
             for line in &lines {

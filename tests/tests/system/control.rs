@@ -61,7 +61,8 @@ fn init_gives_the_digests_of_a_fresh_start_with_the_same_processes() {
     let mut launch = paused(&lab, "ctl-init", &["--duration", "60 s"]);
     lab.step("ctl-init", 50);
     let before = launch.processes();
-    lab.ctl("ctl-init", &["init"]);
+    let reply = lab.ctl("ctl-init", &["init"]);
+    assert_eq!((&reply["tick"], &reply["epoch"]), (&0.into(), &2.into()));
     let again = eventually("the new epoch", || {
         let status = status(&lab, "ctl-init");
         (status["phase"] == "ready" && status["epoch"] == 2).then_some(status)
@@ -179,9 +180,12 @@ fn stop_ends_the_run_with_its_record_complete() {
     let lab = Lab::new();
     let mut launch = paused(&lab, "ctl-stop", &[]);
     lab.step("ctl-stop", 20);
-    lab.ok(&["ctl", "stop", "--run", "ctl-stop"]);
-    launch.finish();
+    let reply = lab.ctl("ctl-stop", &["stop"]);
+    assert_eq!(reply["phase"], "ended");
+    // Whoever has the answer may read the record.
     let events = lab.events("ctl-stop");
+    launch.finish();
+    assert_eq!(lab.events("ctl-stop"), events);
     let end = &events[events.len() - 1];
     let tick = events
         .iter()

@@ -49,8 +49,8 @@ pub(super) fn execute<S: TickSource>(
         Control::Setup => answer_setup(&query, source.scenario()),
         Control::Log => frontend.observers.answer_log(&query),
         Control::Stop => {
-            // Answered now: a server that stops answers nothing more.
-            source.answer_status(&query, frontend);
+            // Answered when the record is complete.
+            frontend.stopping = Some(query);
             return Err(StopReason::End(End::Stopped).into());
         }
         other => match act(other, source, frontend) {

@@ -12,7 +12,7 @@ use record::summary::Summary;
 use super::control::handle;
 use super::departed::{STANDBY, Wait};
 use super::event::{ServerError, ServerEvent, StopReason};
-use super::frontend::Frontend;
+use super::frontend::{Frontend, refuse};
 use super::live::LiveRun;
 use super::options::KeepAlive;
 use super::record::EpochRecord;
@@ -148,6 +148,13 @@ impl LiveRun {
     ) -> Result<Summary, ServerError> {
         // Its failure is looked at last, so that the robots get to know the end in any case.
         let summary = self.end(end, &mut frontend);
+        match (&summary, frontend.stopping.take()) {
+            (Err(error), Some(query)) => refuse(&query, &error.to_string()),
+            (_, query) => {
+                frontend.stopping = query;
+                self.answer_stopping(&mut frontend);
+            }
+        }
         self.leave(end, frontend)?;
         Ok(summary?)
     }
@@ -190,7 +197,10 @@ impl LiveRun {
                     }
                 }
                 // The run is over: nothing else changes anything any more.
-                Some(event) => drop(handle(event, self, frontend)),
+                Some(event) => {
+                    drop(handle(event, self, frontend));
+                    self.answer_stopping(frontend);
+                }
             }
         }
     }

@@ -90,8 +90,11 @@ impl<E: Into<ServerError>> From<E> for StopReason {
 /// Why an epoch of a run stops.
 #[derive(Debug)]
 pub(super) enum EpochStop {
-    /// Another one begins with this scenario.
-    Init(Box<Scenario>),
+    /// Another one begins with this scenario, and the client that wants it is answered then.
+    Init {
+        scenario: Box<Scenario>,
+        query: Query,
+    },
     /// The server stops.
     Exit(StopReason),
 }

@@ -17,6 +17,8 @@ pub(super) struct Frontend {
     pub(super) inbox: Inbox<ServerEvent>,
     pub(super) observers: Observers,
     pub(super) pace: Pace,
+    /// The client that has stopped the run.
+    pub(super) stopping: Option<Query>,
     declared: Vec<Declared>,
 }
 
@@ -42,6 +44,7 @@ impl Frontend {
             keys,
             inbox: Inbox::new(on_arrival),
             pace: Pace::new(speed, is_paused),
+            stopping: None,
             declared: Vec::new(),
         })
     }

@@ -226,7 +226,14 @@ impl TickSource for LiveRun {
 
         match outcome {
             Ok(rest) => return Ok(rest),
-            Err(EpochStop::Init(next)) => self.begin_next_epoch(*next, frontend)?,
+            Err(EpochStop::Init { scenario, query }) => {
+                let begun = self.begin_next_epoch(*scenario, frontend);
+                match &begun {
+                    Ok(()) => self.answer_status(&query, frontend),
+                    Err(error) => refuse(&query, &error.to_string()),
+                }
+                begun?;
+            }
             // A client that stops a run wants its processes to end.
             Err(EpochStop::Exit(StopReason::End(end))) if end != End::Stopped && self.stays() => {
                 self.end_and_stay(end, frontend)?;

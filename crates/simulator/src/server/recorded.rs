@@ -91,6 +91,7 @@ impl Server<RecordedRun> {
 
         frontend.pace.end();
         source.answer_stepping(&mut frontend);
+        source.answer_stopping(&mut frontend);
         source.put_frame(&mut frontend);
         drop(source);
         frontend.close();

@@ -35,10 +35,10 @@ impl LiveRun {
             Control::Init { seed, setup, epoch } => {
                 let next = check_epoch(*epoch, simulation.epoch())
                     .and_then(|()| next_scenario(&simulation.planned(), *seed, setup.as_deref()));
-                self.on_init(next, &query, frontend)
+                self.on_init(next, query, frontend)
             }
             Control::Load { scenario } => {
-                self.on_init(load(scenario, simulation.scenario()), &query, frontend)
+                self.on_init(load(scenario, simulation.scenario()), query, frontend)
             }
 
             // The faults before the next tick are being carried out: it waits for that tick.
@@ -248,20 +248,21 @@ impl LiveRun {
     fn on_init(
         &mut self,
         next: Result<Scenario, ControlAnswer>,
-        query: &Query,
+        query: Query,
         frontend: &mut Frontend,
     ) -> Result<(), EpochStop> {
         match next {
-            Err(refusal) => answer(query, &refusal),
+            Err(refusal) => answer(&query, &refusal),
             Ok(_) if frontend.pace.phase == Phase::Gathering => {
-                refuse(query, &format!("the run is {}", frontend.pace.phase));
+                refuse(&query, &format!("the run is {}", frontend.pace.phase));
             }
             Ok(next) => {
-                // All are answered now: the epoch that they asked about is over when the next one
-                // begins.
+                // Answered now: the epoch that it steps in is over when the next one begins.
                 self.answer_stepping(frontend);
-                self.answer_status(query, frontend);
-                return Err(EpochStop::Init(Box::new(next)));
+                return Err(EpochStop::Init {
+                    scenario: Box::new(next),
+                    query,
+                });
             }
         }
 

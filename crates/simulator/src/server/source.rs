@@ -83,6 +83,13 @@ pub(super) trait TickSource: Send + Sized + 'static {
         answer(query, &ControlAnswer::Done(status));
     }
 
+    /// Answers the client that has stopped the run, which is over now.
+    fn answer_stopping(&self, frontend: &mut Frontend) {
+        if let Some(query) = frontend.stopping.take() {
+            self.answer_status(&query, frontend);
+        }
+    }
+
     /// Answers a client whose steps are done.
     fn answer_reached(&self, tick: Tick, frontend: &mut Frontend) {
         if let Some(query) = frontend.pace.reached(tick) {
