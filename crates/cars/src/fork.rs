@@ -12,9 +12,7 @@ use lab::fork::Fork;
 use lab::moment::Moment;
 use launch::RunOptions;
 use protocol::{Epoch, RunName};
-use record::NewRun;
 use scenario::Scenario;
-use scenario::files::LATEST;
 
 use crate::errors::{Result, refusal};
 use crate::execution::if_taken;
@@ -106,40 +104,16 @@ pub(crate) fn fork(args: ForkArgs) -> Result<ExitCode> {
         out: args.out,
         set: Vec::new(),
     };
-    let latest = std::fs::read_link(options.out.join(LATEST)).ok();
     let made = options.folder(&run, &scenario)?;
     if let Some(notice) = &made.notice {
         terminal::note(notice);
     }
     let executed = fork.execute(scenario, &made.run, &made.folder);
-    let summary = executed.inspect_err(|_| undo(&made, latest.as_deref()))?;
+    let summary = executed.inspect_err(|_| made.undo())?;
     if !args.quiet {
         table::print(&summary, made.folder.path())?;
     }
     Ok(ExitCode::from(summary.verdict().exit_status()))
-}
-
-/// Removes what a fork that failed has made, and points the link to the latest run where it was.
-fn undo(made: &NewRun, latest: Option<&Path>) {
-    let folder = &made.folder;
-    if let Err(error) = folder.remove() {
-        let place = folder.path().display();
-        terminal::note(format_args!("note: {place} could not be removed: {error}"));
-    }
-
-    let link = folder.path().with_file_name(LATEST);
-    let is_own = std::fs::read_link(&link)
-        .is_ok_and(|target| Some(target.as_os_str()) == folder.path().file_name());
-    if !is_own {
-        return; // Another run has begun since.
-    }
-    match latest {
-        Some(latest) if link.with_file_name(latest).exists() => folder.point_latest_to(latest),
-        _ => {
-            // Without the link, runs have to be named.
-            let _unlinked = std::fs::remove_file(&link);
-        }
-    }
 }
 
 fn is_same_place(one: &Path, other: &Path) -> bool {

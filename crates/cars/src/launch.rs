@@ -133,7 +133,7 @@ pub(crate) fn launch(args: LaunchArgs) -> Result<ExitCode> {
         }
         None => {
             let (mut outcome, mut folder) = launch.play(|text| terminal::note(text))?;
-            while outcome.is_to_resume {
+            while outcome.is_to_resume && !outcome.keeps_replaced {
                 terminal::note(
                     outcome
                         .failure
@@ -217,7 +217,15 @@ fn print_plan(planned: Vec<Planned>) -> Result<(), OutputError> {
 
 /// Prints the summary of the run, or its failure; returns the exit status.
 fn conclude(outcome: &LaunchOutcome, folder: &RunFolder, is_quiet: bool) -> Result<ExitCode> {
-    let summary = lab::folder::read_summary(folder)?;
+    let mut summary = None;
+    if outcome.keeps_replaced {
+        let place = folder.path().display();
+        terminal::note(format_args!(
+            "the run has not begun: {place} has the record that it was to replace"
+        ));
+    } else {
+        summary = lab::folder::read_summary(folder)?;
+    }
     if let Some(summary) = &summary
         && !is_quiet
     {

@@ -40,7 +40,8 @@ pub(crate) fn run(args: RunArgs) -> Result<ExitCode> {
         terminal::note(notice);
     }
     let speed = options.speed.and_then(|speed| speed.0);
-    let summary = execute(scenario, &made.run, &made.folder, speed)?;
+    let executed = execute(scenario, &made.run, &made.folder, speed);
+    let summary = executed.inspect_err(|_| made.undo_unless_begun())?;
     if !args.quiet {
         table::print(&summary, made.folder.path())?;
     }

@@ -2,13 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use record::folder::FAILED;
 use serde::Serialize;
 use terminal::ADDRESS_TAKEN;
 
 use super::file::SIMULATOR;
-
-/// Name of the file, among the logs of a run, in which the console reads why the run has failed.
-pub(super) const FAILED: &str = "failed.json";
 
 /// A failure that ended a run.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,8 +19,8 @@ pub struct Failure {
     pub code: u8,
     /// The last lines of the process's error output.
     pub tail: Vec<String>,
-    /// Path of the process's log.
-    pub log: PathBuf,
+    /// Path of the process's log, if it is kept.
+    pub log: Option<PathBuf>,
 }
 
 impl std::fmt::Display for Failure {
@@ -35,7 +33,10 @@ impl std::fmt::Display for Failure {
         for line in &self.tail {
             writeln!(f, "  {line}")?;
         }
-        write!(f, "its log: {}", self.log.display())
+        match &self.log {
+            Some(log) => write!(f, "its log: {}", log.display()),
+            None => Ok(()),
+        }
     }
 }
 
@@ -44,7 +45,7 @@ impl std::fmt::Display for Failure {
 struct FailureMessage<'a> {
     text: &'a str,
     lines: &'a [String],
-    log: &'a Path,
+    log: Option<&'a Path>,
     command: String,
 }
 
@@ -59,7 +60,7 @@ impl Failure {
         let shown = FailureMessage {
             text: &self.text,
             lines: &self.tail,
-            log: &self.log,
+            log: self.log.as_deref(),
             command,
         };
         let text = serde_json::to_vec(&shown)?;

@@ -9,6 +9,7 @@ use bus::{check_exposure, check_run};
 use config::units::Time;
 use config::{Changes, FileError, Source, Speed};
 use protocol::{RobotName, RunName};
+use record::folder::FAILED;
 use record::names::{LOGS, SCENARIO};
 use record::{IfTaken, RunFolder, RunLock};
 use scenario::{Scenario, roster};
@@ -16,7 +17,7 @@ use scenario::{Scenario, roster};
 use super::compose;
 use super::endpoint;
 use super::error::LaunchError;
-use super::failure::{FAILED, Failure};
+use super::failure::Failure;
 use super::file::{self, LaunchFile};
 use super::launched::Launched;
 use super::leftovers::Leftovers;
@@ -373,7 +374,7 @@ impl Launch {
         // What cannot be launched leaves no folder.
         self.plan(&endpoint)?;
         let (folder, _in_use) = self.take_folder(&mut notice)?;
-        loop {
+        let mut play = || loop {
             let planned = self.plan(&endpoint)?;
             if !self.options.is_quiet {
                 self.announce(&endpoint, &folder, &mut notice);
@@ -382,11 +383,20 @@ impl Launch {
             let outcome = self.supervise(planned, &endpoint, &folder)?;
             ports_left -= 1;
             if ports_left == 0 || !is_port_taken(&outcome) {
-                return Ok((outcome, folder));
+                return Ok(outcome);
             }
             notice(&format!("{endpoint} is taken: trying another port"));
             endpoint = self.endpoint()?;
+        };
+
+        let played: Result<LaunchOutcome, LaunchError> = play();
+        let keeps_replaced = folder.restore_replaced()?;
+        let mut outcome = played?;
+        outcome.keeps_replaced = keeps_replaced;
+        if let Some(failure) = outcome.failure.as_mut().filter(|_| keeps_replaced) {
+            failure.log = None; // Another one is in its place.
         }
+        Ok((outcome, folder))
     }
 
     fn announce(&self, endpoint: &str, folder: &RunFolder, notice: &mut impl FnMut(&str)) {

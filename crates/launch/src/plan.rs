@@ -8,11 +8,10 @@ use bus::endpoint::connectable;
 use config::FileError;
 use protocol::{RobotName, RunName};
 use record::RunFolder;
-use record::folder::CONSOLE_KEPT;
+use record::folder::{CONSOLE_KEPT, FAILED};
 use record::names::{LOGS, SCENARIO};
 
 use super::child::{self, AtExit};
-use super::failure::FAILED;
 use super::file::{CONSOLE, LaunchFile, Process, SIMULATOR};
 use super::program::{NotFound, Places, how_to_install};
 use super::restart::Restart;

@@ -90,6 +90,8 @@ pub struct LaunchOutcome {
     pub asked: Option<Signal>,
     /// Whether a person who saw the failure in the console wants the run to go on.
     pub is_to_resume: bool,
+    /// Whether the run has not begun, and the record that it was to replace is as it was.
+    pub keeps_replaced: bool,
 }
 
 /// A process under supervision.
@@ -179,6 +181,7 @@ impl Supervisor {
                 failure: None,
                 asked: None,
                 is_to_resume: false,
+                keeps_replaced: false,
             },
         }
     }
@@ -553,7 +556,7 @@ impl Supervisor {
             text: format!("{name} {ended}"),
             code: ended.code(),
             tail: self.processes[index].tail.lines(),
-            log: log_of(&self.logs, name),
+            log: Some(log_of(&self.logs, name)),
         };
         // What fails after that fails because of it, most likely.
         if self.outcome.failure.is_none() {

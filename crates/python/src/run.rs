@@ -93,7 +93,8 @@ fn play(
     };
     let robots = makers.of_run(failure);
     let make = |name: &_, class: &_| robots.make(name, class);
-    let played = execute_with(scenario, &made.run, folder, speed, &make, goes_on);
+    let played = execute_with(scenario, &made.run, folder, speed, &make, goes_on)
+        .inspect_err(|_| made.undo_unless_begun());
     // What Python raised is the reason, whatever became of it on its way.
     if let Some(error) = failure.take() {
         return Err(error);

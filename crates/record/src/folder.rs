@@ -11,14 +11,14 @@ use std::path::{Path, PathBuf};
 
 use config::FileError;
 use protocol::messages::End;
-use protocol::{Epoch, RunName};
+use protocol::{Epoch, Event, Line, RunName};
 use scenario::Scenario;
 use scenario::files::{
     ENDPOINT, EVENTS, LATEST, LAUNCHED, LINKS, LOCK, LOG, LOGS, OPERATOR_CONFIG, RECORDING,
     SCENARIO, SUMMARY, check_log_name,
 };
 
-use crate::seal;
+use crate::seal::{self, RawLines};
 
 /// The files of the record of one epoch.
 #[derive(Debug, Clone)]
@@ -43,6 +43,12 @@ const PER_EPOCH: [&str; 3] = [SCENARIO, EVENTS, RECORDING];
 const LOG_ENDING: &str = ".log";
 /// Name of the file in which the console keeps its address and its token, among the logs.
 pub const CONSOLE_KEPT: &str = "console.kept";
+/// Name of the file in which the console reads why the run has failed, among the logs.
+pub const FAILED: &str = "failed.json";
+/// Where the record of a run is that another one replaces, until that one has begun.
+const REPLACED: &str = ".replaced";
+/// The same while its files are moved, to there or back: both places together have the record.
+const MOVED: &str = ".replaced-moved";
 
 /// What a new run does where an entry with its name exists.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -69,6 +75,8 @@ pub struct NewRun {
     pub lock: RunLock,
     /// A sentence for people, if the name is another one than was asked for.
     pub notice: Option<String>,
+    /// Where the link to the latest run led before.
+    latest: Option<PathBuf>,
 }
 
 /// The folder of a new run that another process is to take.
@@ -160,8 +168,8 @@ impl RunFolder {
         })
     }
 
-    /// Makes the folder of a new run under `out`, without content. The folder of a run that is over is cleared where it is to be
-    /// replaced.
+    /// Makes the folder of a new run under `out`, without content. Where a run that is over is to be replaced, its record is kept aside
+    /// until the new run has begun ([`Self::forget_replaced`]), or is put back ([`Self::restore_replaced`]).
     ///
     /// # Errors
     /// [`FileError`] if the folder cannot be made, or the name is taken and `if_taken` does not help.
@@ -260,11 +268,11 @@ impl RunFolder {
         Ok(lock)
     }
 
-    /// Takes the folder of a run that is over, and removes its record. Files that no run makes stay.
+    /// Takes the folder of a run that is over, and puts its record aside. Files that no run makes stay.
     fn take_over(&self) -> Result<RunLock, FileError> {
         let place = self.path.display();
         let is_folder = self.path.symlink_metadata().is_ok_and(|at| at.is_dir());
-        if !is_folder || !self.has_record() {
+        if !is_folder || !(self.has_record() || self.has_replaced()) {
             let error = FileError::new(format!("{place} is there and is not the folder of a run"));
             return Err(error.with_help("choose another --run or --out, or move it away"));
         }
@@ -273,9 +281,107 @@ impl RunFolder {
         // First that of the launcher: its simulator may be about to take the other one.
         let _launcher = self.lock_of_launcher()?;
         let lock = self.lock()?;
-        // Under both locks: neither a launcher nor a simulator is at work in the folder.
-        self.clear()?;
+        // Under both locks: neither a launcher nor a simulator is at work in the folder. A launch that was killed may have left a
+        // record aside.
+        self.restore_replaced()?;
+        self.put_aside()
+            .map_err(|error| self.failed("replace the record in", &error))?;
         Ok(lock)
+    }
+
+    fn put_aside(&self) -> std::io::Result<()> {
+        let moved = self.file(MOVED);
+        for file in self.files() {
+            let Ok(name) = file.strip_prefix(&self.path) else {
+                continue;
+            };
+            let aside = moved.join(name);
+            if file.symlink_metadata().is_ok() {
+                std::fs::create_dir_all(aside.parent().unwrap_or(&moved))?;
+                std::fs::rename(&file, aside)?;
+            }
+        }
+        // The new name states that the record is complete there.
+        match std::fs::rename(&moved, self.file(REPLACED)) {
+            Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
+            renamed => renamed,
+        }
+    }
+
+    /// Puts back the record that this run was to replace, unless the run has begun. Returns whether it did.
+    ///
+    /// # Errors
+    /// [`FileError`] if a file cannot be moved.
+    pub fn restore_replaced(&self) -> Result<bool, FileError> {
+        if self.file(REPLACED).is_dir() {
+            if self.has_begun() {
+                self.forget_replaced()?;
+                return Ok(false);
+            }
+            self.clear()?;
+        }
+        self.try_restore()
+            .map_err(|error| self.failed("put the record back into", &error))
+    }
+
+    fn try_restore(&self) -> std::io::Result<bool> {
+        // First the name, by one call of the system: a process that is killed here must not take what is back for a new record.
+        let moved = self.file(MOVED);
+        match std::fs::rename(self.file(REPLACED), &moved) {
+            Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
+            _ if !moved.is_dir() => return Ok(false),
+            _ => {}
+        }
+
+        for folder in [moved.join(LOGS), moved.clone()] {
+            let Ok(entries) = std::fs::read_dir(&folder) else {
+                continue; // A run without logs of processes.
+            };
+            for entry in entries {
+                let file = entry?.path();
+                if let Ok(name) = file.strip_prefix(&moved)
+                    && !file.is_dir()
+                {
+                    std::fs::rename(&file, self.path.join(name))?;
+                }
+            }
+            std::fs::remove_dir(&folder)?;
+        }
+        Ok(true)
+    }
+
+    /// Removes the record that this run replaces, if there is one: the run has begun.
+    ///
+    /// # Errors
+    /// [`FileError`] if a file cannot be removed.
+    pub fn forget_replaced(&self) -> Result<(), FileError> {
+        match std::fs::remove_dir_all(self.file(REPLACED)) {
+            Err(error) if error.kind() != ErrorKind::NotFound => {
+                Err(self.failed("remove the record replaced in", &error))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn has_replaced(&self) -> bool {
+        [REPLACED, MOVED]
+            .iter()
+            .any(|name| self.file(name).is_dir())
+    }
+
+    /// Whether a tick of the run is complete. A run does not begin where a robot refuses its parameters, for example.
+    #[must_use]
+    pub fn has_begun(&self) -> bool {
+        let Ok(mut lines) = RawLines::open(&self.file(EVENTS)) else {
+            return false;
+        };
+        while let Ok(Some(raw)) = lines.next() {
+            let line = Line::from_json(&raw.bytes);
+            if line.is_ok_and(|line| matches!(line.event, Event::Tick { .. })) {
+                return true;
+            }
+        }
+        false
     }
 
     /// Checks that the path is that of a folder, and not of a link.
@@ -409,6 +515,16 @@ impl RunFolder {
         Ok(())
     }
 
+    fn discard(&self) {
+        let discarded = match self.restore_replaced() {
+            Ok(false) => self.remove(),
+            restored => restored.map(drop),
+        };
+        if let Err(error) = discarded {
+            tracing::warn!("{} could not be removed: {error}", self.path.display());
+        }
+    }
+
     /// The logs that a launch has written.
     fn logs_of_processes(&self) -> Vec<PathBuf> {
         let mut logs = Vec::new();
@@ -416,7 +532,7 @@ impl RunFolder {
         for entry in entries.flatten() {
             let name = entry.file_name();
             let name = name.to_str().unwrap_or_default();
-            if name.ends_with(LOG_ENDING) || name == CONSOLE_KEPT {
+            if name.ends_with(LOG_ENDING) || [CONSOLE_KEPT, FAILED].contains(&name) {
                 logs.push(entry.path());
             }
         }
@@ -670,9 +786,38 @@ impl NewRun {
     fn named(run: &RunName, folder: RunFolder, lock: RunLock) -> Self {
         Self {
             run: run.clone(),
+            latest: std::fs::read_link(folder.path.with_file_name(LATEST)).ok(),
             folder,
             lock,
             notice: None,
+        }
+    }
+
+    /// Takes back what was made for a run that has failed before a tick was complete, such as one with parameters that a robot refuses.
+    pub fn undo_unless_begun(&self) {
+        if !self.folder.has_begun() {
+            self.undo();
+        }
+    }
+
+    /// Takes back what was made for a run that has failed: its folder goes, or has the record again that it was to replace, and the link
+    /// to the latest run leads where it did.
+    pub fn undo(&self) {
+        let folder = &self.folder;
+        folder.discard();
+
+        let link = folder.path.with_file_name(LATEST);
+        let is_own = std::fs::read_link(&link)
+            .is_ok_and(|target| Some(target.as_os_str()) == folder.path.file_name());
+        if !is_own {
+            return; // Another run has begun since.
+        }
+        match &self.latest {
+            Some(latest) if link.with_file_name(latest).exists() => folder.point_latest_to(latest),
+            _ => {
+                // Without the link, runs have to be named.
+                let _unlinked = std::fs::remove_file(&link);
+            }
         }
     }
 
@@ -687,12 +832,9 @@ impl NewRun {
 }
 
 impl Reserved {
-    /// Removes the folder of a run that does not begin.
+    /// Removes the folder of a run that does not begin, or puts back the record that it was to replace.
     pub fn discard(&self) {
-        if let Err(error) = self.folder.remove() {
-            let place = self.folder.path().display();
-            tracing::warn!("{place} could not be removed: {error}");
-        }
+        self.folder.discard();
     }
 }
 

@@ -146,6 +146,22 @@ fn run(args: &SimulatorArgs) -> Result<ExitCode, Box<dyn Error + Send + Sync>> {
     };
     let folder = RunFolder::new(&args.out, &args.run);
     let (_lock, past) = open_folder(&folder, &scenario, args)?;
+    let summary = serve(bus, scenario, &folder, past, args);
+    // A launcher does so itself, when all processes have ended.
+    if args.replace {
+        folder.restore_replaced()?;
+    }
+    Ok(exit_code(&summary?, args.no_verdict))
+}
+
+/// Runs the server of a run to its end, which others find by the run's folder meanwhile.
+fn serve(
+    bus: Bus,
+    scenario: Scenario,
+    folder: &RunFolder,
+    past: Option<ReplayLog>,
+    args: &SimulatorArgs,
+) -> Result<Summary, Box<dyn Error + Send + Sync>> {
     let options = ServerOptions {
         run: args.run.clone(),
         speed: args.speed.0,
@@ -154,7 +170,7 @@ fn run(args: &SimulatorArgs) -> Result<ExitCode, Box<dyn Error + Send + Sync>> {
         stay: args.stay.map_or(KeepAlive::Never, KeepAlive::from),
         repeat_after: REPEAT_AFTER,
     };
-    let server = Server::open(bus, scenario, options, &folder, past)?;
+    let server = Server::open(bus, scenario, options, folder, past)?;
     ctrlc::set_handler(server.stopper())?;
 
     if let Some(file) = &args.operator_config {
@@ -175,7 +191,7 @@ fn run(args: &SimulatorArgs) -> Result<ExitCode, Box<dyn Error + Send + Sync>> {
         }
     }
 
-    Ok(exit_code(&summary?, args.no_verdict))
+    Ok(summary?)
 }
 
 /// Makes the folder of a new run, or takes the one that the launcher made, or opens that of a run to resume, with its record.

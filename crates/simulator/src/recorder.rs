@@ -379,6 +379,9 @@ impl Recorder {
         }
         // Handed to the system at once: a crash of this process does not lose them.
         self.events.flush()?;
+        if noted.record.tick == 0 && !is_end {
+            self.folder.forget_replaced()?;
+        }
         self.write_log(&noted.lines)?;
 
         if self.recording.is_some() {

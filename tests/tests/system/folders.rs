@@ -6,8 +6,10 @@ use std::fs::File;
 use std::os::unix::ffi::OsStrExt;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 
+use nix::sys::signal::Signal;
+use nix::unistd::Pid;
 use system_tests::processes::{Running, nobody_is_left};
 use system_tests::{Lab, eventually, free_port, programs, root};
 
@@ -1073,12 +1075,91 @@ fn a_run_that_ended_before_tick_0_is_whole() {
     eventually("the endpoint", || {
         folder.join("endpoint").exists().then_some(())
     });
-    let pid = nix::unistd::Pid::from_raw(i32::try_from(simulator.id()).unwrap());
-    nix::sys::signal::kill(pid, nix::sys::signal::Signal::SIGTERM).unwrap();
+    kill(&simulator, Signal::SIGTERM);
     simulator.wait().unwrap();
 
     let (code, printed) = lab.cars_without_out(&["check", folder.to_str().unwrap()]);
     assert_eq!(code, 0, "{printed}");
+}
+
+/// A finished run that is to be replaced, with a file of a person beside its record.
+fn with_a_run() -> Lab {
+    let lab = Lab::new();
+    let args = ["run", HALL, "--duration", "2 s", "-q", "--run"];
+    lab.ok(&[&args[..], &[PRECIOUS]].concat());
+    lab.ok(&[&args[..], &[TAKEN]].concat());
+    lab.write(&format!("{TAKEN}/notes.txt"), "mine");
+    lab
+}
+
+#[test]
+fn a_run_that_a_robot_refuses_leaves_what_was_there() {
+    let lab = with_a_run();
+    let folder = lab.out().join(TAKEN);
+    std::fs::write(folder.join("logs/Butler.log"), "earlier\n").unwrap();
+    let before = tree(lab.out());
+
+    for (command, own) in [
+        ("run", &[][..]),
+        ("run", &["--replace"]),
+        ("launch", &["--replace", "--no-console", "--speed", "max"]),
+    ] {
+        let output = program("cars")
+            .args([command, HALL, "--run", TAKEN])
+            .args(["--set", "robot.Butler.params.no_such=1"])
+            .args(own)
+            .arg("--out")
+            .arg(lab.out())
+            .output()
+            .unwrap();
+
+        let printed = said(&output);
+        assert_eq!(output.status.code(), Some(1), "{command}: {printed}");
+        assert!(printed.contains("no_such"), "{command}: {printed}");
+        let after = tree(lab.out());
+        for path in before.keys().chain(after.keys()) {
+            let place = path.display();
+            assert_eq!(
+                before.get(path),
+                after.get(path),
+                "{command} {own:?}: {place}"
+            );
+        }
+    }
+
+    // Accepted, it replaces the record.
+    lab.ok(&["run", HALL, "--duration", "3 s", "-q", "--run", TAKEN]);
+    assert!(!folder.join("logs/Butler.log").exists());
+    assert!(!folder.join(".replaced").exists());
+    assert_eq!(lab.summary(TAKEN)["ticks"], 6);
+}
+
+#[test]
+fn a_simulator_that_does_not_begin_keeps_the_record_that_it_was_to_replace() {
+    let lab = with_a_run();
+    let before = tree(lab.out());
+    let endpoint = lab.out().join(TAKEN).join("endpoint");
+    // Killed it leaves the record aside, and the next one finds it there.
+    for signal in [Signal::SIGKILL, Signal::SIGTERM] {
+        let _left = std::fs::remove_file(&endpoint);
+        let mut simulator = program("cars-sim")
+            .args(["configs/hors_doeuvres.toml", "--run", TAKEN, "--replace"])
+            .args(["--listen", &format!("tcp/127.0.0.1:{}", free_port())])
+            .arg("--out")
+            .arg(lab.out())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        eventually("the endpoint", || endpoint.exists().then_some(()));
+        kill(&simulator, signal);
+        simulator.wait().unwrap();
+    }
+    assert_eq!(tree(lab.out()), before);
+}
+
+fn kill(process: &Child, signal: Signal) {
+    let pid = Pid::from_raw(i32::try_from(process.id()).unwrap());
+    nix::sys::signal::kill(pid, signal).unwrap();
 }
 
 #[test]

@@ -106,7 +106,8 @@ fn record(scenario: Scenario, run: &RunName, options: &RunOptions) -> Result<(Su
     if let Some(notice) = &made.notice {
         terminal::note(notice);
     }
-    let summary = execute(scenario, &made.run, &made.folder, None)?;
+    let executed = execute(scenario, &made.run, &made.folder, None);
+    let summary = executed.inspect_err(|_| made.undo_unless_begun())?;
     Ok((summary, made.folder))
 }
 
@@ -143,6 +144,9 @@ fn launch(
     let status = command.status()?;
 
     let folder = reserved.folder;
+    if folder.restore_replaced()? {
+        return Err(refusal!("the launch failed: {status}"));
+    }
     let summary = read_summary(&folder)?;
     // Verdicts are exit statuses, too: the run is there.
     let summary = summary.filter(|summary| summary.end.is_some());

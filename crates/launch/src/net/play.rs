@@ -173,6 +173,8 @@ pub fn play(play: &Play, mut report: impl FnMut(String)) -> Result<u8, LaunchErr
 
     // The links are dropped after this, so that nothing is cut while the processes leave.
     let status = launch.wait().map_err(LaunchError::system(LOST))?;
+    // A launch that has not come to its folder has not done so.
+    folder.restore_replaced()?;
     played.map(|()| exit_code(status))
 }
 

@@ -227,7 +227,7 @@ fn the_first_required_failure_ends_the_run_in_good_order() {
     assert_eq!(failure.code, 3);
     assert_eq!(failure.text, "Butler ended with exit status 3");
     assert_eq!(failure.tail, ["one", "two"]);
-    assert_eq!(failure.log, hall.path("Butler.log"));
+    assert_eq!(failure.log, Some(hall.path("Butler.log")));
     assert_eq!(
         hall.read("record"),
         "stopped\n",
