@@ -7,6 +7,7 @@ use config::FileError;
 use export::ExportError;
 use lab::LabError;
 use launch::LaunchError;
+use record::RecordError;
 
 /// The result of a command. `?` takes the errors of all libraries.
 pub(crate) type Result<T, E = Box<dyn Error + Send + Sync>> = std::result::Result<T, E>;
@@ -69,7 +70,7 @@ fn file_of<'a>(error: &'a (dyn Error + 'static)) -> Option<&'a FileError> {
         return error.file();
     }
     match (error.downcast_ref(), error.downcast_ref()) {
-        (Some(LaunchError::File(file)), _) | (_, Some(ExportError::Read(file))) => Some(file),
+        (Some(LaunchError::File(file)), _) | (_, Some(ExportError::File(file))) => Some(file),
         _ => None,
     }
 }
@@ -79,8 +80,13 @@ fn help_of<'a>(error: &'a (dyn Error + 'static)) -> Option<&'a str> {
     let refusal = error.downcast_ref::<RefusedCommand>();
     let launch = error.downcast_ref::<LaunchError>();
     let lab = error.downcast_ref::<LabError>();
+    let record = match error.downcast_ref() {
+        Some(ExportError::Read(error)) => Some(error),
+        _ => error.downcast_ref::<RecordError>(),
+    };
     refusal
         .and_then(|error| error.help.as_deref())
         .or_else(|| launch.and_then(LaunchError::help))
         .or_else(|| lab.and_then(LabError::help))
+        .or_else(|| record.and_then(RecordError::help))
 }

@@ -5,17 +5,17 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
+use config::Speed;
 use config::units::Time;
-use config::{FileError, Speed};
 use lab::diff::{Comparison, compare};
 use lab::folder::{find, recorded_epoch, recorded_epochs};
 use lab::scratch::Scratch;
 use lab::verify::{Verification, verify as verify_epoch};
 use launch::{Launch, LaunchOptions, RunOptions};
 use protocol::{Event, RobotName};
-use record::Record;
 use record::difference::Difference;
 use record::{EpochFiles, IfTaken, RunFolder};
+use record::{Record, RecordError};
 use terminal::OutputError;
 
 use crate::errors::{Result, refusal};
@@ -120,7 +120,7 @@ fn conclude(text: &str, are_same: bool) -> Result<ExitCode> {
 
 /// What an epoch has that does not follow from its scenario: what a person did, or ticks that a robot missed without a fault of
 /// the scenario. `None` if it has nothing of the kind.
-fn input_of_chance(files: &EpochFiles) -> Result<Option<String>, FileError> {
+fn input_of_chance(files: &EpochFiles) -> Result<Option<String>, RecordError> {
     let operator = RobotName::operator();
     let mut faulty: BTreeSet<RobotName> = BTreeSet::new();
     let mut record = Record::of_events(&files.events)?;

@@ -21,7 +21,6 @@ const MAX_FILE_BYTES: u64 = 16 << 20;
 pub struct FileError {
     message: String,
     is_warning: bool,
-    is_of_record: bool,
     help: Option<String>,
     place: Option<Box<ErrorLocation>>,
 }
@@ -63,7 +62,6 @@ impl FileError {
         Self {
             message: escape_text(&message.into()),
             is_warning: false,
-            is_of_record: false,
             help: None,
             place: None,
         }
@@ -92,7 +90,6 @@ impl FileError {
         Self {
             message: format!("{name} cannot be used"),
             is_warning: false,
-            is_of_record: false,
             help: None,
             place: Some(Box::new(place)),
         }
@@ -140,19 +137,6 @@ impl FileError {
         let name = escape_line(name);
         self.message = format!("{}, named by {name}", self.message);
         self
-    }
-
-    /// The error of the record of a run, which no person has written.
-    #[must_use]
-    pub fn of_record(mut self) -> Self {
-        self.is_of_record = true;
-        self
-    }
-
-    /// Whether it is that of the record of a run.
-    #[must_use]
-    pub fn is_of_record(&self) -> bool {
-        self.is_of_record
     }
 
     /// The error with a help text.

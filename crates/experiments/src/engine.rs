@@ -230,7 +230,7 @@ fn is_open(store: &Store, unit: &Unit<'_>, retries_failed: bool) -> bool {
 
 /// Locks the folder for the first process on it. A further one begins elsewhere in the queue, so that they rarely play the same
 /// unit at the same time; if they do, both give the same.
-fn first(folder: &Path, queue: &mut Queue) -> Result<Option<File>, FileError> {
+fn first(folder: &Path, queue: &mut Queue) -> Result<Option<File>, LabError> {
     if queue.units.is_empty() {
         return Ok(None);
     }

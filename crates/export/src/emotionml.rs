@@ -17,11 +17,10 @@ use affect::frame::{
     ACTION_TENDENCY, AGENCY, CAUSAL_CHAIN, CERTAINTY, CONTROLLABILITY, FACIAL_EXPRESSION, FOCALITY,
     GOAL_CONGRUENCE, INTENSITY, MODIFIABILITY, NOVELTY, URGENCY, VALENCE,
 };
-use config::FileError;
 use protocol::keys::Keys;
 use protocol::messages::{StateVariables, Variable};
 use protocol::{Event, RobotName, RunName, Tick};
-use record::{Entry, EpochFiles, Record};
+use record::{Entry, EpochFiles, Record, RecordError};
 use timeline::{Span, StateKind, StateSpan, Timeline};
 
 use crate::ExportError;
@@ -90,11 +89,9 @@ pub fn write(
     let path = files.events.display();
     let first = record.next_entry()?;
     let first =
-        first.ok_or_else(|| FileError::new(format!("{path} has no complete tick")).of_record())?;
+        first.ok_or_else(|| RecordError::unusable(format!("{path} has no complete tick")))?;
     let Some(Event::Init { seed, tick_s, .. }) = first.events.first() else {
-        return Err(FileError::new(format!("{path} does not begin with `init`"))
-            .of_record()
-            .into());
+        return Err(RecordError::unusable(format!("{path} does not begin with `init`")).into());
     };
     let mut timeline = Timeline::default();
     timeline.tick(0, &first.events);
@@ -102,7 +99,7 @@ pub fn write(
     if let Some(only) = only.filter(|only| !robots.contains(&only.as_str())) {
         let robots = robots.join(", ");
         let reason = format!("no robot of this run is called {only}; there are {robots}");
-        return Err(FileError::new(reason).of_record().into());
+        return Err(RecordError::unusable(reason).into());
     }
 
     let is_recorded = record.recording().is_some();

@@ -10,6 +10,7 @@ pub mod tables;
 pub mod trace;
 
 use config::FileError;
+use record::RecordError;
 use recording::RecordingError;
 
 /// Why an export is incomplete. What was written of it is of no use.
@@ -17,7 +18,10 @@ use recording::RecordingError;
 pub enum ExportError {
     /// The record of the run cannot be read.
     #[error(transparent)]
-    Read(#[from] FileError),
+    Read(#[from] RecordError),
+    /// A file of the export cannot be made.
+    #[error(transparent)]
+    File(#[from] FileError),
     /// The output cannot be written.
     #[error("the export cannot be written: {0}")]
     Write(#[from] std::io::Error),
@@ -25,6 +29,6 @@ pub enum ExportError {
 
 impl From<RecordingError> for ExportError {
     fn from(error: RecordingError) -> Self {
-        Self::Read(FileError::new(error.to_string()).of_record())
+        Self::Read(RecordError::unusable(error))
     }
 }

@@ -9,10 +9,11 @@ use protocol::time::time_s;
 use protocol::{Epoch, Event, RobotName, Seq, Tick};
 use record::EpochFiles;
 use record::names::EVENTS as EVENTS_FILE;
-use record::{Entry, Record};
+use record::{Entry, Record, RecordError};
 use recording::{PlacedRobot, RecordedTick, Recording, RecordingError, Ticks};
 use serde::Serialize;
 
+use crate::ExportError;
 use crate::csv::{CsvTable, FieldValue};
 use crate::draft::{Draft, unwritable};
 
@@ -49,9 +50,9 @@ pub struct Tables {
 /// replaced. Epochs without a recording have events only, those of a damaged one end before the damage.
 ///
 /// # Errors
-/// [`FileError`] if events are damaged, a file cannot be read, or one cannot be written. No file is written then. Damage of a
+/// [`ExportError`] if events are damaged, a file cannot be read, or one cannot be written. No file is written then. Damage of a
 /// recording is no error here, but part of what is returned.
-pub fn write(epochs: &[EpochFiles], folder: &Path) -> Result<Tables, FileError> {
+pub fn write(epochs: &[EpochFiles], folder: &Path) -> Result<Tables, ExportError> {
     let is_new = !folder.exists();
     std::fs::create_dir_all(folder).map_err(|error| unwritable(folder, &error))?;
 
@@ -66,7 +67,7 @@ pub fn write(epochs: &[EpochFiles], folder: &Path) -> Result<Tables, FileError> 
 
 impl Tables {
     /// All files are complete before the first of them gets its name.
-    fn write_all(&mut self, epochs: &[EpochFiles], folder: &Path) -> Result<(), FileError> {
+    fn write_all(&mut self, epochs: &[EpochFiles], folder: &Path) -> Result<(), ExportError> {
         let mut drafts = vec![self.write_events(epochs, folder)?];
         drafts.extend(self.write_states(epochs, folder)?);
         for draft in drafts {
@@ -75,7 +76,7 @@ impl Tables {
         Ok(())
     }
 
-    fn write_events(&mut self, epochs: &[EpochFiles], folder: &Path) -> Result<Draft, FileError> {
+    fn write_events(&mut self, epochs: &[EpochFiles], folder: &Path) -> Result<Draft, ExportError> {
         let mut table = create(folder, FILES[0], EVENTS)?;
         for files in epochs {
             let last = add_events(&mut table, files)?;
@@ -98,7 +99,7 @@ impl Tables {
         &mut self,
         epochs: &[EpochFiles],
         folder: &Path,
-    ) -> Result<Vec<Draft>, FileError> {
+    ) -> Result<Vec<Draft>, ExportError> {
         let mut recorded = Vec::new();
         for files in epochs {
             if files.recording.exists() {
@@ -129,7 +130,7 @@ impl Tables {
         states: &mut CsvTable,
         variables: &mut CsvTable,
         files: &EpochFiles,
-    ) -> Result<(), FileError> {
+    ) -> Result<(), ExportError> {
         let epoch = files.epoch;
         let recording = match Recording::open(&files.recording) {
             Ok(recording) => recording,
@@ -187,7 +188,7 @@ fn when(epoch: Epoch, tick: Tick, tick_s: f64) -> [Column<'static>; 3] {
 }
 
 /// Adds the events of an epoch. Returns the last complete tick, or the end of the run.
-fn add_events(table: &mut CsvTable, files: &EpochFiles) -> Result<Option<Entry>, FileError> {
+fn add_events(table: &mut CsvTable, files: &EpochFiles) -> Result<Option<Entry>, ExportError> {
     let mut record = Record::of_events(&files.events)?;
     let mut next = record.next_entry()?;
     let tick_s = match next.as_ref().and_then(|entry| entry.events.first()) {
@@ -195,7 +196,7 @@ fn add_events(table: &mut CsvTable, files: &EpochFiles) -> Result<Option<Entry>,
         Some(Event::Init { tick_s, .. }) => *tick_s,
         Some(_) => {
             let path = files.events.display();
-            return Err(FileError::new(format!("{path} does not begin with `init`")).of_record());
+            return Err(RecordError::unusable(format!("{path} does not begin with `init`")).into());
         }
     };
 
@@ -222,9 +223,9 @@ fn is_last(files: &EpochFiles) -> bool {
 }
 
 /// The damage of a recording; an error if the recording could not be read at all, whatever is in it.
-fn damage(error: RecordingError) -> Result<RecordingError, FileError> {
+fn damage(error: RecordingError) -> Result<RecordingError, ExportError> {
     match error {
-        RecordingError::Unreadable { .. } => Err(FileError::new(error.to_string()).of_record()),
+        RecordingError::Unreadable { .. } => Err(error.into()),
         RecordingError::Damaged { .. }
         | RecordingError::Headless { .. }
         | RecordingError::NoSuchTick { .. } => Ok(error),
@@ -237,7 +238,7 @@ fn add_states(
     variables: &mut CsvTable,
     when: &[Column<'static>; 3],
     tick: &RecordedTick,
-) -> Result<(), FileError> {
+) -> Result<(), ExportError> {
     for robot in &tick.frame.robots {
         let report = tick.reports.get(&robot.name);
         let cells = state_cells(robot, report);

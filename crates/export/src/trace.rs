@@ -6,10 +6,10 @@
 use std::collections::BTreeMap;
 use std::io::Write;
 
-use config::FileError;
 use protocol::messages::Awaited;
 use protocol::time::time_s;
 use protocol::{RobotName, Tick};
+use record::RecordError;
 use recording::{RecordedTick, Recording};
 use serde_json::{Value, json};
 
@@ -51,7 +51,7 @@ pub fn write(
                 len - 1
             ),
         };
-        return Err(FileError::new(reason).of_record().into());
+        return Err(RecordError::unusable(reason).into());
     }
 
     let header = recording.header();

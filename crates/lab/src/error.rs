@@ -6,6 +6,7 @@ use std::io;
 use std::path::Path;
 
 use config::FileError;
+use record::RecordError;
 use recording::RecordingError;
 use robot::RobotError;
 
@@ -14,10 +15,10 @@ use robot::RobotError;
 pub enum LabError {
     /// A file that a person has written cannot be used, or a file cannot be read or written.
     #[error(transparent)]
-    File(FileError),
-    /// The record of a run or an experiment is damaged, incomplete, or not there.
+    File(#[from] FileError),
+    /// The folder of a run cannot be used, or the record of a run or an experiment is damaged, incomplete, or not there.
     #[error(transparent)]
-    Record(FileError),
+    Record(RecordError),
     /// A robot ends the run, or refuses its parameters.
     #[error(transparent)]
     Robot(#[from] RobotError),
@@ -40,12 +41,12 @@ pub enum LabError {
 impl LabError {
     /// The error of a record that is damaged, incomplete, or not there.
     pub fn record(reason: impl Into<String>) -> Self {
-        Self::Record(FileError::new(reason))
+        Self::Record(RecordError::unusable(reason.into()))
     }
 
     /// The error of a part of a record that cannot be read.
     pub(crate) fn unreadable(path: &Path) -> impl Fn(io::Error) -> Self {
-        move |error| Self::Record(FileError::unreadable(path, &error))
+        move |error| Self::Record(RecordError::unreadable(path, &error))
     }
 
     /// The error of a request that cannot be met.
@@ -79,7 +80,7 @@ impl LabError {
     #[must_use]
     pub fn file(&self) -> Option<&FileError> {
         match self {
-            Self::File(error) | Self::Record(error) => Some(error),
+            Self::File(error) => Some(error),
             _ => None,
         }
     }
@@ -89,16 +90,17 @@ impl LabError {
     pub fn help(&self) -> Option<&str> {
         match self {
             Self::Refused { help, .. } => help.as_deref(),
+            Self::Record(error) => error.help(),
             _ => None,
         }
     }
 }
 
-impl From<FileError> for LabError {
-    fn from(error: FileError) -> Self {
-        match error.is_of_record() {
-            true => Self::Record(error),
-            false => Self::File(error),
+impl From<RecordError> for LabError {
+    fn from(error: RecordError) -> Self {
+        match error {
+            RecordError::Scenario(error) => Self::File(error),
+            error => Self::Record(error),
         }
     }
 }

@@ -2,11 +2,10 @@
 
 use std::path::Path;
 
-use config::FileError;
 use protocol::messages::{CommandText, Report};
 use protocol::{RobotName, Tick};
 use record::EpochFiles;
-use record::{Entry, Record};
+use record::{Entry, Record, RecordError};
 use robot::{Action, BadParameters, Cars, Robot};
 
 use crate::error::LabError;
@@ -51,7 +50,7 @@ impl Replayed {
     }
 
     /// What the record has of a tick. Ticks are asked for in their order.
-    fn entry(&mut self, tick: Tick) -> Result<Option<&Entry>, FileError> {
+    fn entry(&mut self, tick: Tick) -> Result<Option<&Entry>, RecordError> {
         while self.entry.as_ref().is_none_or(|entry| entry.tick < tick) {
             match self.record.next_entry()? {
                 Some(entry) if !entry.is_end() => self.entry = Some(entry),
@@ -62,7 +61,7 @@ impl Replayed {
     }
 
     /// Repeats what the record has of a tick.
-    fn repeat(&mut self, cars: &mut Cars<'_>) -> Result<Option<Report>, FileError> {
+    fn repeat(&mut self, cars: &mut Cars<'_>) -> Result<Option<Report>, RecordError> {
         let name = self.name.clone();
         let Some(entry) = self.entry(cars.tick())? else {
             return Ok(None);

@@ -6,13 +6,17 @@ use std::path::{Path, PathBuf};
 
 use bus::BusError;
 use config::FileError;
+use record::RecordError;
 
 /// Why a launch, a program as a robot, a play of faults, or certificates cannot be had.
 #[derive(Debug, thiserror::Error)]
 pub enum LaunchError {
-    /// A launch file, what it names, or the folder of a run cannot be used.
+    /// A launch file, or what it names, cannot be used.
     #[error(transparent)]
     File(#[from] FileError),
+    /// The folder of a run cannot be used.
+    #[error(transparent)]
+    Record(#[from] RecordError),
     /// The network does not allow it, for example because of the certificates.
     #[error(transparent)]
     Bus(#[from] BusError),
@@ -66,6 +70,7 @@ impl LaunchError {
     pub fn help(&self) -> Option<&str> {
         match self {
             Self::Refused { help, .. } | Self::Tool { help, .. } => *help,
+            Self::Record(error) => error.help(),
             _ => None,
         }
     }

@@ -5,9 +5,8 @@ use std::path::{Path, PathBuf};
 
 use config::{FileError, Source};
 use protocol::RobotName;
-use record::RunFolder;
 use record::names::LAUNCHED;
-use record::seal;
+use record::{RecordError, RunFolder, seal};
 use scenario::Scenario;
 use serde::{Deserialize, Serialize};
 
@@ -36,10 +35,11 @@ impl Launched {
     /// Writes it into the folder of the run.
     ///
     /// # Errors
-    /// [`FileError`] if it cannot be written.
-    pub(super) fn write(&self, folder: &RunFolder) -> Result<(), FileError> {
-        let text = seal::sealed_text(self)
-            .map_err(|error| FileError::new(format!("{LAUNCHED} cannot be written: {error}")))?;
+    /// [`RecordError`] if it cannot be written.
+    pub(super) fn write(&self, folder: &RunFolder) -> Result<(), RecordError> {
+        let text = seal::sealed_text(self).map_err(|error| {
+            RecordError::folder(format!("{LAUNCHED} cannot be written: {error}"))
+        })?;
         folder.write_line(LAUNCHED, &text)
     }
 

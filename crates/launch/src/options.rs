@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use config::units::Time;
 use config::{Changes, FileError, Override, Speed};
 use protocol::RunName;
-use record::{IfTaken, NewRun, RunFolder};
+use record::{IfTaken, NewRun, RecordError, RunFolder};
 use scenario::Scenario;
 
 use super::file::{LaunchFile, is_launch_file};
@@ -78,8 +78,8 @@ impl RunOptions {
     /// the record must keep the lock.
     ///
     /// # Errors
-    /// [`FileError`] as [`RunFolder::make`].
-    pub fn folder(&self, run: &RunName, scenario: &Scenario) -> Result<NewRun, FileError> {
+    /// [`RecordError`] as [`RunFolder::make`].
+    pub fn folder(&self, run: &RunName, scenario: &Scenario) -> Result<NewRun, RecordError> {
         let made = RunFolder::make(&self.out, run, self.if_taken)?;
         made.folder.fill(scenario)?;
         made.folder.point_latest();

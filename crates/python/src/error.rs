@@ -30,7 +30,9 @@ pub(crate) fn reported(error: impl Into<LabError>) -> PyErr {
         None => render_plain(&error, error.help(), COLUMNS),
     };
     match error {
-        LabError::File(_) => FileError::new_err(text),
+        LabError::File(_) | LabError::Record(record::RecordError::Folder { .. }) => {
+            FileError::new_err(text)
+        }
         LabError::Record(_) => RecordError::new_err(text),
         LabError::Robot(_) => RobotError::new_err(text),
         LabError::Refused { .. } => RefusedError::new_err(text),

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use ::export::tables;
+use ::export::{ExportError, tables};
 use config::shipped::{self, LAUNCHES, SCENARIOS};
 use config::units::Time;
 use config::{Override, Speed, seed};
@@ -127,7 +127,11 @@ pub(crate) fn find(out: PathBuf, run: PathBuf) -> PyResult<(PathBuf, Option<Stri
 pub(crate) fn export(py: Python<'_>, run: PathBuf, into: PathBuf) -> PyResult<Vec<String>> {
     let exported = py.detach(|| {
         let epochs = recorded_epochs(&RunFolder::at(run))?;
-        Ok::<_, LabError>(tables::write(&epochs, &into)?)
+        tables::write(&epochs, &into).map_err(|error| match error {
+            ExportError::Read(error) => error.into(),
+            ExportError::File(error) => error.into(),
+            ExportError::Write(error) => LabError::failed(error),
+        })
     });
     let mut exported = exported.map_err(reported)?;
     exported.notes.append(&mut exported.damage);

@@ -9,7 +9,6 @@ use std::io::{ErrorKind, Write};
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
-use config::FileError;
 use protocol::messages::End;
 use protocol::{Epoch, Event, Line, RunName};
 use scenario::Scenario;
@@ -18,6 +17,7 @@ use scenario::files::{
     SCENARIO, SUMMARY, check_log_name,
 };
 
+use crate::error::RecordError;
 use crate::seal::{self, RawLines};
 
 /// The files of the record of one epoch.
@@ -112,8 +112,8 @@ impl RunFolder {
     /// The folder itself, where the path is a link such as `latest`.
     ///
     /// # Errors
-    /// [`FileError`] if there is none.
-    pub fn resolved(&self) -> Result<Self, FileError> {
+    /// [`RecordError`] if there is none.
+    pub fn resolved(&self) -> Result<Self, RecordError> {
         let path = self.path.canonicalize();
         let path = path.map_err(|error| self.failed("find", &error))?;
         Ok(Self { path })
@@ -122,8 +122,8 @@ impl RunFolder {
     /// The folder itself, to write into it. The link `latest` is followed to the folder beside it, and no other link.
     ///
     /// # Errors
-    /// [`FileError`] if there is none, or it is reached by a link.
-    pub fn resolved_to_write(&self) -> Result<Self, FileError> {
+    /// [`RecordError`] if there is none, or it is reached by a link.
+    pub fn resolved_to_write(&self) -> Result<Self, RecordError> {
         let mut path = self.path.clone();
         if self.path.file_name() == Some(OsStr::new(LATEST))
             && let Ok(target) = std::fs::read_link(&self.path)
@@ -135,7 +135,7 @@ impl RunFolder {
 
         if path.is_symlink() {
             let place = path.display();
-            return Err(FileError::new(format!(
+            return Err(RecordError::folder(format!(
                 "{place} is a link, and no record is written through one"
             ))
             .with_help("name the folder to which it leads"));
@@ -155,12 +155,12 @@ impl RunFolder {
     /// The name of the run by which its processes know it: that of its folder, also where the path is a link.
     ///
     /// # Errors
-    /// [`FileError`] if there is no folder, or it is not named like a run: it was copied or renamed.
-    pub fn name(&self) -> Result<RunName, FileError> {
+    /// [`RecordError`] if there is no folder, or it is not named like a run: it was copied or renamed.
+    pub fn name(&self) -> Result<RunName, RecordError> {
         let path = self.resolved()?.path;
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         RunName::new(&name).map_err(|error| {
-            FileError::new(format!(
+            RecordError::folder(format!(
                 "{} is not named like a run: {error}",
                 path.display()
             ))
@@ -172,10 +172,10 @@ impl RunFolder {
     /// until the new run has begun ([`Self::forget_replaced`]), or is put back ([`Self::restore_replaced`]).
     ///
     /// # Errors
-    /// [`FileError`] if the folder cannot be made, or the name is taken and `if_taken` does not help.
-    pub fn make(out: &Path, run: &RunName, if_taken: IfTaken) -> Result<NewRun, FileError> {
+    /// [`RecordError`] if the folder cannot be made, or the name is taken and `if_taken` does not help.
+    pub fn make(out: &Path, run: &RunName, if_taken: IfTaken) -> Result<NewRun, RecordError> {
         std::fs::create_dir_all(out).map_err(|error| {
-            FileError::new(format!("cannot make the folder {}: {error}", out.display()))
+            RecordError::folder(format!("cannot make the folder {}: {error}", out.display()))
         })?;
 
         let folder = Self::new(out, run);
@@ -199,14 +199,16 @@ impl RunFolder {
         }
         if if_taken != IfTaken::Number {
             let place = folder.path.display();
-            return Err(FileError::new(format!("{place} exists already")).with_help(
-                "choose another --run or --out; --replace replaces a run that is over",
-            ));
+            return Err(
+                RecordError::folder(format!("{place} exists already")).with_help(
+                    "choose another --run or --out; --replace replaces a run that is over",
+                ),
+            );
         }
         Self::make_numbered(out, run)
     }
 
-    fn make_numbered(out: &Path, asked: &RunName) -> Result<NewRun, FileError> {
+    fn make_numbered(out: &Path, asked: &RunName) -> Result<NewRun, RecordError> {
         let mut number = 2;
         loop {
             let run = asked.numbered(number);
@@ -245,7 +247,7 @@ impl RunFolder {
     }
 
     /// Makes the folder and locks it; `None` if there is anything at the path.
-    fn try_make(&self) -> Result<Option<RunLock>, FileError> {
+    fn try_make(&self) -> Result<Option<RunLock>, RecordError> {
         match std::fs::create_dir(&self.path) {
             Ok(()) => {}
             Err(error) if error.kind() == ErrorKind::AlreadyExists => return Ok(None),
@@ -255,7 +257,7 @@ impl RunFolder {
     }
 
     /// Takes a folder that another process made for this one: it has no record.
-    fn take_reserved(&self) -> Result<RunLock, FileError> {
+    fn take_reserved(&self) -> Result<RunLock, RecordError> {
         self.check_itself()?;
         self.check_links()?;
         // Links are looked for before anything is opened for writing, the lock included.
@@ -263,17 +265,18 @@ impl RunFolder {
         // Under the lock: no other process can begin a record any more.
         if self.file(EVENTS).exists() {
             let place = self.path.display();
-            return Err(FileError::new(format!("{place} has a run already")));
+            return Err(RecordError::folder(format!("{place} has a run already")));
         }
         Ok(lock)
     }
 
     /// Takes the folder of a run that is over, and puts its record aside. Files that no run makes stay.
-    fn take_over(&self) -> Result<RunLock, FileError> {
+    fn take_over(&self) -> Result<RunLock, RecordError> {
         let place = self.path.display();
         let is_folder = self.path.symlink_metadata().is_ok_and(|at| at.is_dir());
         if !is_folder || !(self.has_record() || self.has_replaced()) {
-            let error = FileError::new(format!("{place} is there and is not the folder of a run"));
+            let error =
+                RecordError::folder(format!("{place} is there and is not the folder of a run"));
             return Err(error.with_help("choose another --run or --out, or move it away"));
         }
         self.check_links()?;
@@ -311,8 +314,8 @@ impl RunFolder {
     /// Puts back the record that this run was to replace, unless the run has begun. Returns whether it did.
     ///
     /// # Errors
-    /// [`FileError`] if a file cannot be moved.
-    pub fn restore_replaced(&self) -> Result<bool, FileError> {
+    /// [`RecordError`] if a file cannot be moved.
+    pub fn restore_replaced(&self) -> Result<bool, RecordError> {
         if self.file(REPLACED).is_dir() {
             if self.has_begun() {
                 self.forget_replaced()?;
@@ -353,8 +356,8 @@ impl RunFolder {
     /// Removes the record that this run replaces, if there is one: the run has begun.
     ///
     /// # Errors
-    /// [`FileError`] if a file cannot be removed.
-    pub fn forget_replaced(&self) -> Result<(), FileError> {
+    /// [`RecordError`] if a file cannot be removed.
+    pub fn forget_replaced(&self) -> Result<(), RecordError> {
         match std::fs::remove_dir_all(self.file(REPLACED)) {
             Err(error) if error.kind() != ErrorKind::NotFound => {
                 Err(self.failed("remove the record replaced in", &error))
@@ -385,18 +388,18 @@ impl RunFolder {
     }
 
     /// Checks that the path is that of a folder, and not of a link.
-    fn check_itself(&self) -> Result<(), FileError> {
+    fn check_itself(&self) -> Result<(), RecordError> {
         let found = self.path.symlink_metadata();
         let found = found.map_err(|error| self.failed("find", &error))?;
         if found.is_dir() {
             return Ok(());
         }
         let place = self.path.display();
-        Err(FileError::new(format!("{place} is not a folder")))
+        Err(RecordError::folder(format!("{place} is not a folder")))
     }
 
     /// Checks that no entry of the folder, and of that with the logs, is a link: what is written to one would be written elsewhere.
-    fn check_links(&self) -> Result<(), FileError> {
+    fn check_links(&self) -> Result<(), RecordError> {
         check_no_links(&self.path)?;
         check_no_links(&self.file(LOGS))
     }
@@ -404,8 +407,8 @@ impl RunFolder {
     /// Makes the folder of the logs and writes the scenario: from then on it is the folder of a run.
     ///
     /// # Errors
-    /// [`FileError`] if a file cannot be written.
-    pub fn fill(&self, scenario: &Scenario) -> Result<(), FileError> {
+    /// [`RecordError`] if a file cannot be written.
+    pub fn fill(&self, scenario: &Scenario) -> Result<(), RecordError> {
         let logs = self.file(LOGS);
         match std::fs::create_dir(&logs) {
             Err(error) if error.kind() != ErrorKind::AlreadyExists => {
@@ -419,8 +422,8 @@ impl RunFolder {
     /// Makes the folder, which must not exist, with the scenario.
     ///
     /// # Errors
-    /// [`FileError`] as [`Self::make`] and [`Self::fill`].
-    pub fn create(&self, scenario: &Scenario) -> Result<RunLock, FileError> {
+    /// [`RecordError`] as [`Self::make`] and [`Self::fill`].
+    pub fn create(&self, scenario: &Scenario) -> Result<RunLock, RecordError> {
         let out = self.path.parent().unwrap_or(Path::new(""));
         let made = Self::make(out, &self.named()?, IfTaken::Refuse)?;
         self.fill(scenario)?;
@@ -428,16 +431,16 @@ impl RunFolder {
     }
 
     /// The name of a folder that may not exist yet.
-    fn named(&self) -> Result<RunName, FileError> {
+    fn named(&self) -> Result<RunName, RecordError> {
         let name = self.path.file_name().unwrap_or_default().to_string_lossy();
-        RunName::new(&name).map_err(|error| FileError::new(error.to_string()))
+        RunName::new(&name).map_err(|error| RecordError::folder(error))
     }
 
     /// Removes the record of a run.
     ///
     /// # Errors
-    /// [`FileError`] if a file cannot be removed.
-    pub fn clear(&self) -> Result<(), FileError> {
+    /// [`RecordError`] if a file cannot be removed.
+    pub fn clear(&self) -> Result<(), RecordError> {
         for file in self.files() {
             remove_if_there(&file).map_err(|error| self.failed("clear", &error))?;
         }
@@ -494,8 +497,8 @@ impl RunFolder {
     /// Removes the record of a run that has failed, and the folder unless there is something else in it.
     ///
     /// # Errors
-    /// [`FileError`] if a file cannot be removed.
-    pub fn remove(&self) -> Result<(), FileError> {
+    /// [`RecordError`] if a file cannot be removed.
+    pub fn remove(&self) -> Result<(), RecordError> {
         self.clear()?;
         remove_if_there(&self.file(LOCK)).map_err(|error| self.failed("remove", &error))?;
 
@@ -540,7 +543,7 @@ impl RunFolder {
     }
 
     /// Writes [`SCENARIO`], once for each epoch.
-    pub fn write_scenario(&self, scenario: &Scenario) -> Result<(), FileError> {
+    pub fn write_scenario(&self, scenario: &Scenario) -> Result<(), RecordError> {
         self.write(SCENARIO, &scenario.to_toml()?)
     }
 
@@ -588,12 +591,12 @@ impl RunFolder {
     /// may not be there yet. The record is checked first.
     ///
     /// # Errors
-    /// [`FileError`] if it is not the folder of a run, the run is in progress or has ended, the record is damaged, or a link is
+    /// [`RecordError`] if it is not the folder of a run, the run is in progress or has ended, the record is damaged, or a link is
     /// in the place of a file.
-    pub fn reopen(&self) -> Result<(RunLock, EpochFiles), FileError> {
+    pub fn reopen(&self) -> Result<(RunLock, EpochFiles), RecordError> {
         let place = self.path.display();
         if !self.file(SCENARIO).exists() {
-            let error = FileError::new(format!("{place} is not the folder of a run"));
+            let error = RecordError::folder(format!("{place} is not the folder of a run"));
             return Err(error.with_help("name a run under --out, or its folder"));
         }
         self.check_itself()?;
@@ -605,7 +608,7 @@ impl RunFolder {
         if files.events.exists() {
             let end = seal::check(&files.events)?.end;
             if end.is_some_and(|end| end != End::Stopped) {
-                let error = FileError::new(format!("the run in {place} has ended"));
+                let error = RecordError::folder(format!("the run in {place} has ended"));
                 return Err(error.with_help("start it again without --resume"));
             }
         }
@@ -615,8 +618,8 @@ impl RunFolder {
     /// Takes the folder: while the lock is held, no other process writes a record into it.
     ///
     /// # Errors
-    /// [`FileError`] if another process has it.
-    pub fn lock(&self) -> Result<RunLock, FileError> {
+    /// [`RecordError`] if another process has it.
+    pub fn lock(&self) -> Result<RunLock, RecordError> {
         let path = self.file(LOCK);
         if path.is_symlink() {
             return Err(is_link(&path));
@@ -631,8 +634,8 @@ impl RunFolder {
     /// take the folder one after the other.
     ///
     /// # Errors
-    /// [`FileError`] if a launcher has it.
-    pub fn lock_of_launcher(&self) -> Result<Option<RunLock>, FileError> {
+    /// [`RecordError`] if a launcher has it.
+    pub fn lock_of_launcher(&self) -> Result<Option<RunLock>, RecordError> {
         // The file that a launcher writes anyway is its lock: a run that was not launched has none.
         match File::open(self.file(LAUNCHED)) {
             Ok(file) => self.try_lock(file).map(Some),
@@ -641,10 +644,10 @@ impl RunFolder {
         }
     }
 
-    fn try_lock(&self, file: File) -> Result<RunLock, FileError> {
+    fn try_lock(&self, file: File) -> Result<RunLock, RecordError> {
         file.try_lock().map_err(|_| {
             let path = self.path.display();
-            FileError::new(format!("the run in {path} is in progress"))
+            RecordError::folder(format!("the run in {path} is in progress"))
                 .with_help("choose another --run, or end it with `cars ctl stop`")
         })?;
         Ok(RunLock { _file: file })
@@ -670,7 +673,7 @@ impl RunFolder {
     }
 
     /// Renames the files of the epoch before this one, so that their names contain its number.
-    pub fn supersede(&self, epoch: Epoch) -> Result<(), FileError> {
+    pub fn supersede(&self, epoch: Epoch) -> Result<(), RecordError> {
         let before = epoch.saturating_sub(1);
         for name in PER_EPOCH {
             let file = self.file(name);
@@ -706,16 +709,16 @@ impl RunFolder {
     /// Writes a file of one line that others wait for: they see it whole or not at all.
     ///
     /// # Errors
-    /// [`FileError`] if it cannot be written.
-    pub fn write_line(&self, name: &str, line: &str) -> Result<(), FileError> {
+    /// [`RecordError`] if it cannot be written.
+    pub fn write_line(&self, name: &str, line: &str) -> Result<(), RecordError> {
         self.write(name, &format!("{line}\n"))
     }
 
     /// Writes a file, which appears under its name when it is complete.
     ///
     /// # Errors
-    /// [`FileError`] if it cannot be written, or a link has its name.
-    pub fn write(&self, name: &str, text: &str) -> Result<(), FileError> {
+    /// [`RecordError`] if it cannot be written, or a link has its name.
+    pub fn write(&self, name: &str, text: &str) -> Result<(), RecordError> {
         let path = self.file(name);
         if path.is_symlink() {
             return Err(is_link(&path));
@@ -730,7 +733,7 @@ impl RunFolder {
             .and_then(|()| std::fs::rename(&new, &path));
         written.map_err(|error| {
             let _is_not_there = std::fs::remove_file(&new);
-            FileError::new(format!("cannot write {}: {error}", path.display()))
+            RecordError::folder(format!("cannot write {}: {error}", path.display()))
         })
     }
 
@@ -776,8 +779,8 @@ impl RunFolder {
         }
     }
 
-    fn failed(&self, doing: &str, error: &std::io::Error) -> FileError {
-        FileError::new(format!("cannot {doing} {}: {error}", self.path.display()))
+    fn failed(&self, doing: &str, error: &std::io::Error) -> RecordError {
+        RecordError::folder(format!("cannot {doing} {}: {error}", self.path.display()))
     }
 }
 
@@ -848,8 +851,8 @@ pub struct RunLock {
 /// no such folder.
 ///
 /// # Errors
-/// [`FileError`] if the folder is a link, or has one.
-pub fn check_no_links(folder: &Path) -> Result<(), FileError> {
+/// [`RecordError`] if the folder is a link, or has one.
+pub fn check_no_links(folder: &Path) -> Result<(), RecordError> {
     if folder.is_symlink() {
         return Err(is_link(folder));
     }
@@ -857,16 +860,16 @@ pub fn check_no_links(folder: &Path) -> Result<(), FileError> {
     let entries = match std::fs::read_dir(folder) {
         Ok(entries) => entries,
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
-        Err(error) => return Err(FileError::unreadable(folder, &error)),
+        Err(error) => return Err(RecordError::unreadable(folder, &error)),
     };
     for entry in entries {
-        let entry = entry.map_err(|error| FileError::unreadable(folder, &error))?;
+        let entry = entry.map_err(|error| RecordError::unreadable(folder, &error))?;
         let path = entry.path();
         let found = match path.symlink_metadata() {
             Ok(found) => found,
             // A program that writes there has given its draft the final name since.
             Err(error) if error.kind() == ErrorKind::NotFound => continue,
-            Err(error) => return Err(FileError::unreadable(&path, &error)),
+            Err(error) => return Err(RecordError::unreadable(&path, &error)),
         };
         if found.is_symlink() {
             return Err(is_link(&path));
@@ -879,17 +882,17 @@ pub fn check_no_links(folder: &Path) -> Result<(), FileError> {
     Ok(())
 }
 
-fn is_link(path: &Path) -> FileError {
+fn is_link(path: &Path) -> RecordError {
     let place = path.display();
-    FileError::new(format!(
+    RecordError::folder(format!(
         "{place} is a link, and nothing is written through one"
     ))
     .with_help("put what it leads to in its place, or choose another folder")
 }
 
-fn has_hard_links(path: &Path) -> FileError {
+fn has_hard_links(path: &Path) -> RecordError {
     let place = path.display();
-    FileError::new(format!(
+    RecordError::folder(format!(
         "{place} has a second name elsewhere (a hard link), and what is written to it would change that, too"
     ))
     .with_help("copy the folder without links, as `cp -r` does, and take the copy")

@@ -2,11 +2,13 @@
 //! tick ([`Record`]) and compared ([`difference`]). The simulator writes through it; everything else reads through it.
 
 pub mod difference;
+mod error;
 pub mod folder;
 pub mod read;
 pub mod seal;
 pub mod summary;
 
+pub use error::RecordError;
 pub use folder::{EpochFiles, IfTaken, NewRun, Reserved, RunFolder, RunLock};
 pub use read::{Entry, Record};
 /// Names of the files in the folder of a run.

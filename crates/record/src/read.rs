@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use config::FileError;
 use lockstep::{Attendance, Sent};
 use protocol::messages::{CommandText, Payload, Report, Target};
 use protocol::{Event, Line, RobotName, Tick};
 use recording::{Frame, Recording, RecordingError, Ticks};
 
+use crate::error::RecordError;
 use crate::folder::EpochFiles;
 use crate::seal::RawLines;
 
@@ -171,8 +171,8 @@ impl Record {
     /// Opens the record of an epoch: its events, and its recording if there is one.
     ///
     /// # Errors
-    /// [`FileError`] if a file cannot be read.
-    pub fn open(files: &EpochFiles) -> Result<Self, FileError> {
+    /// [`RecordError`] if a file cannot be read.
+    pub fn open(files: &EpochFiles) -> Result<Self, RecordError> {
         let mut record = Self::of_events(&files.events)?;
         if files.recording.exists() {
             let recording = Recording::open(&files.recording);
@@ -185,8 +185,8 @@ impl Record {
     /// Opens a file of events alone.
     ///
     /// # Errors
-    /// [`FileError`] if it cannot be read.
-    pub fn of_events(path: &Path) -> Result<Self, FileError> {
+    /// [`RecordError`] if it cannot be read.
+    pub fn of_events(path: &Path) -> Result<Self, RecordError> {
         Ok(Self {
             path: path.to_owned(),
             lines: RawLines::open(path)?,
@@ -206,8 +206,8 @@ impl Record {
     /// The next complete tick; `None` at the end of the record. Events of a tick that was not completed are left out.
     ///
     /// # Errors
-    /// [`FileError`] if the file cannot be read, or names a line that is not an event or is of another tick.
-    pub fn next_entry(&mut self) -> Result<Option<Entry>, FileError> {
+    /// [`RecordError`] if the file cannot be read, or names a line that is not an event or is of another tick.
+    pub fn next_entry(&mut self) -> Result<Option<Entry>, RecordError> {
         let mut entry = Entry {
             tick: self.tick,
             ..Entry::default()
@@ -246,7 +246,7 @@ impl Record {
     }
 
     /// Adds what the recording has of a tick: nothing where it has ended earlier than the events.
-    fn add_recorded(&mut self, entry: &mut Entry) -> Result<(), FileError> {
+    fn add_recorded(&mut self, entry: &mut Entry) -> Result<(), RecordError> {
         let Some(recorded) = &mut self.recorded else {
             return Ok(());
         };
@@ -255,11 +255,10 @@ impl Record {
         let after = self.events_after.take().unwrap_or_default();
         if !after.is_empty() {
             let before = entry.tick.saturating_sub(1);
-            return Err(FileError::new(format!(
+            return Err(RecordError::unusable(format!(
                 "the recording has events of tick {before} that {} does not have",
                 self.path.display()
-            ))
-            .of_record());
+            )));
         }
         let tick = recorded.next_tick().map_err(|error| unreadable(&error))?;
         let Some(mut tick) = tick else {
@@ -276,7 +275,7 @@ impl Record {
         Ok(())
     }
 
-    fn next_line(&mut self) -> Result<Option<Line>, FileError> {
+    fn next_line(&mut self) -> Result<Option<Line>, RecordError> {
         let Some(raw) = self.lines.next()? else {
             return Ok(None);
         };
@@ -289,16 +288,14 @@ impl Record {
         Ok(Some(line))
     }
 
-    fn malformed(&self, error: &dyn std::fmt::Display) -> FileError {
+    fn malformed(&self, error: &dyn std::fmt::Display) -> RecordError {
         let path = self.path.display();
-        FileError::new(format!("{path}, line {}: {error}", self.number))
+        RecordError::unusable(format!("{path}, line {}: {error}", self.number))
             .with_help("the record is damaged: `cars check` says how far it is good")
-            .of_record()
     }
 }
 
-fn unreadable(error: &RecordingError) -> FileError {
-    FileError::new(error.to_string())
+fn unreadable(error: &RecordingError) -> RecordError {
+    RecordError::unusable(error)
         .with_help("the recording is damaged: nothing can be said of what the robots reported")
-        .of_record()
 }

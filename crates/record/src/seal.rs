@@ -5,11 +5,12 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
-use config::FileError;
 use protocol::Tick;
 use protocol::event::{Event, Line};
 use protocol::messages::End;
 use xxhash_rust::xxh3::Xxh3;
+
+use crate::error::RecordError;
 
 /// What a seal begins with, in the last field of a line.
 const FIELD: &[u8] = b",\"seal\":\"";
@@ -143,10 +144,9 @@ impl RawLines {
     /// Opens a file.
     ///
     /// # Errors
-    /// [`FileError`] if it cannot be read.
-    pub(crate) fn open(path: &Path) -> Result<Self, FileError> {
-        let file =
-            File::open(path).map_err(|error| FileError::unreadable(path, &error).of_record())?;
+    /// [`RecordError`] if it cannot be read.
+    pub(crate) fn open(path: &Path) -> Result<Self, RecordError> {
+        let file = File::open(path).map_err(|error| RecordError::unreadable(path, &error))?;
         Ok(Self {
             path: path.to_owned(),
             reader: BufReader::new(file),
@@ -156,14 +156,14 @@ impl RawLines {
     /// The next line; `None` at the end of the file.
     ///
     /// # Errors
-    /// [`FileError`] if it cannot be read.
-    pub(crate) fn next(&mut self) -> Result<Option<RawLine>, FileError> {
+    /// [`RecordError`] if it cannot be read.
+    pub(crate) fn next(&mut self) -> Result<Option<RawLine>, RecordError> {
         let mut bytes = Vec::new();
         let count = (&mut self.reader)
             // A file without line breaks must not be read into memory as one line.
             .take(MAX_LINE)
             .read_until(b'\n', &mut bytes)
-            .map_err(|error| FileError::unreadable(&self.path, &error).of_record())?;
+            .map_err(|error| RecordError::unreadable(&self.path, &error))?;
         if count == 0 {
             return Ok(None);
         }
@@ -176,8 +176,8 @@ impl RawLines {
 /// Reads a file of events and compares it with its seals.
 ///
 /// # Errors
-/// [`FileError`] if the file cannot be read, or names the first lines that are damaged.
-pub fn check(path: &Path) -> Result<Checked, FileError> {
+/// [`RecordError`] if the file cannot be read, or names the first lines that are damaged.
+pub fn check(path: &Path) -> Result<Checked, RecordError> {
     let mut lines = RawLines::open(path)?;
     let mut checked = Checked {
         lines: 0,
@@ -222,16 +222,15 @@ pub fn check(path: &Path) -> Result<Checked, FileError> {
     Ok(checked)
 }
 
-fn damaged(path: &Path, checked: &Checked, reason: &str) -> FileError {
+fn damaged(path: &Path, checked: &Checked, reason: &str) -> RecordError {
     let first = checked.lines + 1;
     let last = checked.lines + checked.incomplete_lines.max(1);
     let place = path.display();
-    FileError::new(format!(
+    RecordError::unusable(format!(
         "{place}: lines {first} to {last} are damaged: {reason}"
     ))
     .with_help(format!(
         "the record is good up to the end of tick {}; execute the run again from its scenario.toml",
         checked.tick
     ))
-    .of_record()
 }

@@ -8,11 +8,11 @@ use bus::endpoint::connectable;
 use bus::{Bus, DEFAULT_ENDPOINT, Role, check_exposure, check_run};
 use clap::{Parser, ValueEnum};
 use config::units::Time;
-use config::{FileError, Speed, shipped};
+use config::{Speed, shipped};
 use protocol::RunName;
 use protocol::messages::End;
 use record::names::{ENDPOINT, OPERATOR_CONFIG};
-use record::{IfTaken, RunFolder, RunLock, Summary};
+use record::{IfTaken, RecordError, RunFolder, RunLock, Summary};
 use scenario::{Changes, Override, Scenario};
 use simulator::server::{KeepAlive, REPEAT_AFTER, ReplayLog, Server, ServerOptions};
 use terminal::ADDRESS_TAKEN;
@@ -103,7 +103,10 @@ fn main() -> ExitCode {
     bus::runtime::use_router_threads();
     terminal::print_diagnostics("warn,zenoh=error");
 
-    terminal::conclude(run(&args), |error| config::render(error, None))
+    terminal::conclude(run(&args), |error| {
+        let record = error.downcast_ref::<RecordError>();
+        config::render(error, record.and_then(RecordError::help))
+    })
 }
 
 fn exit_code(summary: &Summary, no_verdict: bool) -> ExitCode {
@@ -199,7 +202,7 @@ fn open_folder(
     folder: &RunFolder,
     scenario: &Scenario,
     args: &SimulatorArgs,
-) -> Result<(RunLock, Option<ReplayLog>), FileError> {
+) -> Result<(RunLock, Option<ReplayLog>), RecordError> {
     if args.resume {
         let (lock, files) = folder.reopen()?;
         return Ok((lock, Some(ReplayLog::open(&files)?)));

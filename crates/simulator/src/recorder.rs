@@ -9,7 +9,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use config::FileError;
 use protocol::event::log_line;
 use protocol::messages::{Awaited, LogRecord, Panel, Report};
 use protocol::{Line, PROTOCOL_VERSION, RobotName, RunName, Tick};
@@ -23,8 +22,8 @@ use record::seal::Seal;
 use record::summary::Summary;
 use scenario::SyncPoint;
 
-use record::RunFolder;
 use record::names::{EVENTS, RECORDING, SUMMARY};
+use record::{RecordError, RunFolder};
 
 /// How often [`SyncPoint::Second`] synchronizes.
 const SYNC_INTERVAL: Duration = Duration::from_secs(1);
@@ -36,7 +35,7 @@ struct LineFile {
 }
 
 impl LineFile {
-    fn open(path: PathBuf, options: &OpenOptions) -> Result<Self, FileError> {
+    fn open(path: PathBuf, options: &OpenOptions) -> Result<Self, RecordError> {
         match options.open(&path) {
             Ok(file) => Ok(Self {
                 path,
@@ -47,12 +46,12 @@ impl LineFile {
     }
 
     /// A new file: one that is there belongs to another record, or is a link.
-    fn create(path: PathBuf) -> Result<Self, FileError> {
+    fn create(path: PathBuf) -> Result<Self, RecordError> {
         Self::open(path, File::options().create_new(true).write(true))
     }
 
     /// A file that grows from epoch to epoch.
-    fn append(path: PathBuf) -> Result<Self, FileError> {
+    fn append(path: PathBuf) -> Result<Self, RecordError> {
         // To append follows links, and the line would be written elsewhere.
         if path.is_symlink() {
             return Err(unwritable(&path, &"it is a link"));
@@ -60,19 +59,19 @@ impl LineFile {
         Self::open(path, File::options().create(true).append(true))
     }
 
-    fn add(&mut self, line: &str) -> Result<(), FileError> {
+    fn add(&mut self, line: &str) -> Result<(), RecordError> {
         writeln!(self.file, "{line}").map_err(|error| unwritable(&self.path, &error))
     }
 
     /// Hands everything to the operating system.
-    fn flush(&mut self) -> Result<(), FileError> {
+    fn flush(&mut self) -> Result<(), RecordError> {
         self.file
             .flush()
             .map_err(|error| unwritable(&self.path, &error))
     }
 
     /// Waits until everything is on the disk.
-    fn sync(&self) -> Result<(), FileError> {
+    fn sync(&self) -> Result<(), RecordError> {
         self.file
             .get_ref()
             .sync_data()
@@ -174,12 +173,12 @@ impl Recorder {
     /// `events-epoch1.jsonl`.
     ///
     /// # Errors
-    /// [`FileError`] if the files cannot be made.
+    /// [`RecordError`] if the files cannot be made.
     pub fn begin(
         folder: &RunFolder,
         run: &RunName,
         simulation: &Simulation,
-    ) -> Result<Self, FileError> {
+    ) -> Result<Self, RecordError> {
         let scenario = simulation.scenario();
         let epoch = simulation.epoch();
         // The files of the epoch before are out of the way first: new ones are made only where there is
@@ -203,12 +202,12 @@ impl Recorder {
     /// record when they have all of it. Until then, and if they never do, the record is as it was.
     ///
     /// # Errors
-    /// [`FileError`] if the files cannot be made.
+    /// [`RecordError`] if the files cannot be made.
     pub fn resume(
         folder: &RunFolder,
         run: &RunName,
         simulation: &Simulation,
-    ) -> Result<Self, FileError> {
+    ) -> Result<Self, RecordError> {
         let record = &simulation.scenario().record;
         let log_name = format!("{}{DRAFT}", record.log_name);
         for name in [EVENTS, RECORDING, &record.log_name] {
@@ -242,7 +241,7 @@ impl Recorder {
         simulation: &Simulation,
         log: Option<LineFile>,
         suffix: &str,
-    ) -> Result<Self, FileError> {
+    ) -> Result<Self, RecordError> {
         let record = &simulation.scenario().record;
         let mut recording = None;
         if record.frames {
@@ -275,8 +274,8 @@ impl Recorder {
     /// Puts the drafts of a run that is resumed in the place of its record.
     ///
     /// # Errors
-    /// [`FileError`] if a file cannot be written or renamed.
-    pub fn supersede_record(&mut self) -> Result<(), FileError> {
+    /// [`RecordError`] if a file cannot be written or renamed.
+    pub fn supersede_record(&mut self) -> Result<(), RecordError> {
         // All drafts are on the disk before the first takes the place of a file: a crash in between leaves the events of one and the
         // recording of the other, which are the same up to the end of the older one.
         self.write_noted()?;
@@ -298,12 +297,12 @@ impl Recorder {
     /// Writes a tick. Returns the lines of the log, for observers.
     ///
     /// # Errors
-    /// [`FileError`] if it cannot be written.
+    /// [`RecordError`] if it cannot be written.
     pub fn write(
         &mut self,
         simulation: &Simulation,
         record: &TickRecord,
-    ) -> Result<Vec<LogRecord>, FileError> {
+    ) -> Result<Vec<LogRecord>, RecordError> {
         let lines = self.note(simulation, record)?;
         self.write_noted()?;
         Ok(lines)
@@ -313,12 +312,12 @@ impl Recorder {
     /// `sync = "tick"` it is written here. Returns the lines of the log, for observers.
     ///
     /// # Errors
-    /// [`FileError`] if it, or the tick that was noted before, cannot be written.
+    /// [`RecordError`] if it, or the tick that was noted before, cannot be written.
     pub fn note(
         &mut self,
         simulation: &Simulation,
         record: &TickRecord,
-    ) -> Result<Vec<LogRecord>, FileError> {
+    ) -> Result<Vec<LogRecord>, RecordError> {
         // The tick before first: the memory of its frame is used again below.
         self.write_noted()?;
 
@@ -360,8 +359,8 @@ impl Recorder {
     /// Writes the tick that was noted, if it is not written yet.
     ///
     /// # Errors
-    /// [`FileError`] if it cannot be written.
-    pub fn write_noted(&mut self) -> Result<(), FileError> {
+    /// [`RecordError`] if it cannot be written.
+    pub fn write_noted(&mut self) -> Result<(), RecordError> {
         let Some(noted) = self.noted.take() else {
             return Ok(());
         };
@@ -394,7 +393,7 @@ impl Recorder {
         Ok(())
     }
 
-    fn record_tick(&mut self, noted: &PendingTick) -> Result<(), FileError> {
+    fn record_tick(&mut self, noted: &PendingTick) -> Result<(), RecordError> {
         let Some(recording) = &mut self.recording else {
             return Ok(());
         };
@@ -413,7 +412,7 @@ impl Recorder {
         recording.tick(&tick).map_err(|error| unrecordable(&error))
     }
 
-    fn add_event(&mut self, line: &Line) -> Result<(), FileError> {
+    fn add_event(&mut self, line: &Line) -> Result<(), RecordError> {
         let mut text = line.to_json();
         if line.event.is_sealed() {
             // The seal is about all lines before and the beginning of this one; then the whole line
@@ -424,7 +423,7 @@ impl Recorder {
         self.events.add(&text)
     }
 
-    fn write_log(&mut self, lines: &[LogRecord]) -> Result<(), FileError> {
+    fn write_log(&mut self, lines: &[LogRecord]) -> Result<(), RecordError> {
         let Some(log) = self.log.as_mut().filter(|_| !lines.is_empty()) else {
             return Ok(());
         };
@@ -442,7 +441,7 @@ impl Recorder {
         }
     }
 
-    fn sync(&mut self) -> Result<(), FileError> {
+    fn sync(&mut self) -> Result<(), RecordError> {
         self.events.sync()?;
         if let Some(log) = &self.log {
             log.sync()?;
@@ -464,8 +463,8 @@ impl Recorder {
     /// Ends an epoch that another one follows.
     ///
     /// # Errors
-    /// [`FileError`] if what remains to be recorded cannot be written.
-    pub fn supersede(&mut self) -> Result<(), FileError> {
+    /// [`RecordError`] if what remains to be recorded cannot be written.
+    pub fn supersede(&mut self) -> Result<(), RecordError> {
         match self.recording.take() {
             Some(recording) => recording.finish().map_err(|error| unrecordable(&error)),
             None => Ok(()),
@@ -475,8 +474,8 @@ impl Recorder {
     /// Ends the epoch and writes the summary.
     ///
     /// # Errors
-    /// [`FileError`] if it cannot be written.
-    pub fn finish(&mut self, simulation: &Simulation) -> Result<Summary, FileError> {
+    /// [`RecordError`] if it cannot be written.
+    pub fn finish(&mut self, simulation: &Simulation) -> Result<Summary, RecordError> {
         simulation.finish_summary(&mut self.summary);
         if !self.drafts.is_empty() {
             // The run was ended before it was resumed: its record is as it was.
@@ -486,14 +485,14 @@ impl Recorder {
         let text = self
             .summary
             .seal()
-            .map_err(|error| FileError::new(error.to_string()))?;
+            .map_err(|error| RecordError::folder(error))?;
         self.folder.write_line(SUMMARY, &text)?;
         Ok(self.summary.clone())
     }
 }
 
 /// Removes a draft that a process left which was killed.
-fn remove_draft(path: &Path) -> Result<(), FileError> {
+fn remove_draft(path: &Path) -> Result<(), RecordError> {
     match std::fs::remove_file(path) {
         Err(error) if error.kind() != ErrorKind::NotFound => Err(unwritable(path, &error)),
         _ => Ok(()),
@@ -505,7 +504,7 @@ fn copy_log_of_earlier_epochs(
     folder: &RunFolder,
     log: &str,
     to: &mut LineFile,
-) -> Result<(), FileError> {
+) -> Result<(), RecordError> {
     let mut epochs = folder.epochs();
     epochs.pop();
     // The log has no mark where an epoch begins, so its lines are counted by the events that they are
@@ -524,9 +523,9 @@ fn copy_log_of_earlier_epochs(
     }
 
     let path = folder.file(log);
-    let file = File::open(&path).map_err(|error| FileError::unreadable(&path, &error))?;
+    let file = File::open(&path).map_err(|error| RecordError::unreadable(&path, &error))?;
     for line in BufReader::new(file).lines().take(count) {
-        to.add(&line.map_err(|error| FileError::unreadable(&path, &error))?)?;
+        to.add(&line.map_err(|error| RecordError::unreadable(&path, &error))?)?;
     }
     Ok(())
 }
@@ -539,15 +538,15 @@ fn finish(mut recording: Writer, end: &TickRecord) -> Result<(), WriteError> {
     recording.finish()
 }
 
-fn unwritable(path: &Path, error: &dyn std::fmt::Display) -> FileError {
+fn unwritable(path: &Path, error: &dyn std::fmt::Display) -> RecordError {
     let place = path.display();
-    FileError::new(format!("cannot write {place}: {error}")).with_help(format!(
+    RecordError::folder(format!("cannot write {place}: {error}")).with_help(format!(
         "what was recorded before is kept; `cars check {}` says how far it is good",
         path.parent().unwrap_or(path).display()
     ))
 }
 
-fn unrecordable(error: &WriteError) -> FileError {
+fn unrecordable(error: &WriteError) -> RecordError {
     unwritable(&error.path, &error.error)
 }
 

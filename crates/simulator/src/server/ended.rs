@@ -3,10 +3,10 @@
 use std::time::{Duration, Instant};
 
 use bus::BusError;
-use config::diagnostic::FileError;
 use protocol::event::WaitedFor;
 use protocol::messages::{Awaited, Clock, End, LogKind, Reason};
 use protocol::{RobotName, encode};
+use record::RecordError;
 use record::summary::Summary;
 
 use super::control::handle;
@@ -77,7 +77,7 @@ impl LiveRun {
     }
 
     /// Ends the run, if it has not ended yet, and writes what came of it.
-    fn end(&mut self, end: End, frontend: &mut Frontend) -> Result<Summary, FileError> {
+    fn end(&mut self, end: End, frontend: &mut Frontend) -> Result<Summary, RecordError> {
         if let EpochRecord::Closed(summary) = &self.epoch.record {
             return Ok(summary.as_ref().clone());
         }
@@ -116,7 +116,7 @@ impl LiveRun {
         &mut self,
         end: End,
         frontend: &mut Frontend,
-    ) -> Result<(), FileError> {
+    ) -> Result<(), RecordError> {
         self.end(end, frontend)?;
         let status = self.status(frontend);
         frontend.observers.log_line(

@@ -1,9 +1,9 @@
 //! What can happen to a server, and why it stops.
 
 use bus::{BusError, Query};
-use config::diagnostic::FileError;
 use protocol::messages::{Command, Control, End, Report, Target, TickPanel, Waiting};
 use protocol::{Malformed, RobotName, RunName};
+use record::RecordError;
 use record::difference::Difference;
 use recording::RecordingError;
 use scenario::Scenario;
@@ -52,7 +52,7 @@ pub enum ServerError {
     Bus(#[from] BusError),
     /// The record cannot be written.
     #[error(transparent)]
-    File(#[from] FileError),
+    Record(#[from] RecordError),
     /// The environment cannot be set up.
     #[error(transparent)]
     Hall(#[from] world::HallError),

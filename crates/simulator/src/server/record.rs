@@ -2,12 +2,11 @@
 
 use std::time::Instant;
 
-use config::diagnostic::FileError;
 use protocol::RunName;
 use protocol::event::WaitedFor;
 use protocol::messages::{End, LogRecord};
-use record::RunFolder;
 use record::summary::{Summary, WallSummary};
+use record::{RecordError, RunFolder};
 
 use super::event::{ServerError, StopReason};
 use super::replay_log::ReplayLog;
@@ -36,7 +35,7 @@ impl EpochRecord {
         run: &RunName,
         simulation: &Simulation,
         replay_log: Option<ReplayLog>,
-    ) -> Result<Self, FileError> {
+    ) -> Result<Self, RecordError> {
         let mut recorder = match &replay_log {
             None => Recorder::begin(folder, run, simulation)?,
             Some(_) => Recorder::resume(folder, run, simulation)?,
@@ -90,7 +89,7 @@ impl EpochRecord {
         record: &TickRecord,
         opened: Instant,
         is_written: bool,
-    ) -> Result<Vec<LogRecord>, FileError> {
+    ) -> Result<Vec<LogRecord>, RecordError> {
         let Some(open) = self.open() else {
             unreachable!("no tick takes place after the end of a run");
         };
@@ -134,7 +133,7 @@ impl EpochRecord {
     }
 
     /// Ends the record of an epoch that another one follows.
-    pub(super) fn supersede(&mut self) -> Result<(), FileError> {
+    pub(super) fn supersede(&mut self) -> Result<(), RecordError> {
         match self.open() {
             Some(open) => open.recorder.supersede(),
             None => Ok(()),
@@ -148,7 +147,7 @@ impl EpochRecord {
         waited_for: Vec<WaitedFor>,
         simulation: &mut Simulation,
         wall: WallSummary,
-    ) -> Result<(Vec<LogRecord>, Summary), FileError> {
+    ) -> Result<(Vec<LogRecord>, Summary), RecordError> {
         let Some(OpenRecord { recorder, .. }) = self.open() else {
             unreachable!("a run ends once");
         };

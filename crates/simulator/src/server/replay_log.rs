@@ -4,7 +4,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use config::FileError;
 use lockstep::{Attendance, Sent};
 use protocol::messages::CommandText;
 use protocol::{Epoch, RobotName, Tick};
@@ -12,7 +11,7 @@ use protocol::{Epoch, RobotName, Tick};
 use crate::simulation::TickRecord;
 use record::EpochFiles;
 use record::difference::{Difference, between};
-use record::{Entry, Record};
+use record::{Entry, Record, RecordError};
 
 /// What is left of the record of a run that is resumed.
 pub struct ReplayLog {
@@ -28,8 +27,8 @@ impl ReplayLog {
     /// The record of an epoch.
     ///
     /// # Errors
-    /// [`FileError`] if it cannot be read.
-    pub fn open(files: &EpochFiles) -> Result<Self, FileError> {
+    /// [`RecordError`] if it cannot be read.
+    pub fn open(files: &EpochFiles) -> Result<Self, RecordError> {
         let mut record = None;
         let mut next = None;
         let mut done_late = BTreeMap::new();
@@ -102,11 +101,11 @@ impl ReplayLog {
     /// Compares a tick that was executed again, and goes on to the next one. Returns the first difference, if there is one.
     ///
     /// # Errors
-    /// [`FileError`] if the record cannot be read on.
+    /// [`RecordError`] if the record cannot be read on.
     pub(super) fn compare(
         &mut self,
         executed: &TickRecord,
-    ) -> Result<Option<Box<Difference>>, FileError> {
+    ) -> Result<Option<Box<Difference>>, RecordError> {
         let executed = Entry {
             tick: executed.tick,
             events: executed.events.to_vec(),
@@ -125,7 +124,7 @@ impl ReplayLog {
 }
 
 /// Reads which robots did which ticks too late.
-fn read_done_late(events: &Path) -> Result<BTreeMap<Tick, BTreeSet<RobotName>>, FileError> {
+fn read_done_late(events: &Path) -> Result<BTreeMap<Tick, BTreeSet<RobotName>>, RecordError> {
     let mut record = Record::of_events(events)?;
     let mut done_late: BTreeMap<Tick, BTreeSet<RobotName>> = BTreeMap::new();
     while let Some(entry) = next_tick(&mut record)? {
@@ -139,7 +138,7 @@ fn read_done_late(events: &Path) -> Result<BTreeMap<Tick, BTreeSet<RobotName>>, 
 }
 
 /// The next tick of a record. The end of a run that was stopped is not a tick: the run goes on after its last one.
-fn next_tick(record: &mut Record) -> Result<Option<Entry>, FileError> {
+fn next_tick(record: &mut Record) -> Result<Option<Entry>, RecordError> {
     let next = record.next_entry()?;
     Ok(next.filter(|entry| !entry.is_end()))
 }

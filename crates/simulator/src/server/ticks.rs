@@ -4,11 +4,11 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use bus::BusError;
-use config::diagnostic::FileError;
 use lockstep::{BarrierOutput, IncarnationNotice, TickOutcome};
 use protocol::keys::STATE;
 use protocol::messages::{Clock, CommandText, End, Reason, Report};
 use protocol::{RobotName, Tick, encode};
+use record::RecordError;
 
 use super::control::on_control;
 use super::event::{EpochStop, StopReason};
@@ -237,7 +237,7 @@ impl LiveRun {
     }
 
     /// Writes the tick that is complete and not written, if there is one.
-    pub(super) fn write_noted(&mut self) -> Result<(), FileError> {
+    pub(super) fn write_noted(&mut self) -> Result<(), RecordError> {
         let Some(recorder) = self.epoch.record.pending() else {
             return Ok(());
         };
