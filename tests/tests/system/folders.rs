@@ -1328,7 +1328,14 @@ fn what_a_killed_experiment_leaves_in_the_temporary_folder_is_removed() {
         .stdout(Stdio::null())
         .spawn()
         .unwrap();
-    eventually("a unit", || (count() > 0).then_some(()));
+    // Before it has its lock, nobody can tell a folder that was just made from one that was left.
+    let is_locked = |entry: std::io::Result<std::fs::DirEntry>| {
+        entry.is_ok_and(|entry| entry.path().join("in-use.lock").exists())
+    };
+    eventually("a unit", || {
+        let mut folders = std::fs::read_dir(&temporary).unwrap();
+        folders.any(is_locked).then_some(())
+    });
     killed.kill().unwrap();
     killed.wait().unwrap();
     assert!(count() > 0, "it was not killed in the middle of a unit");
