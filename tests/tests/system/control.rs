@@ -291,15 +291,15 @@ fn a_step_is_answered_although_others_ask_meanwhile() {
     let lab = Lab::new();
     let mut launch = paused(&lab, "ctl-asked", &["--duration", "10000 s"]);
     std::thread::scope(|scope| {
-        let stepped = scope.spawn(|| lab.ctl("ctl-asked", &["step", "4000"]));
+        let stepped = scope.spawn(|| lab.ctl("ctl-asked", &["step", "1000"]));
         eventually("the steps to be under way", || {
             let tick = status(&lab, "ctl-asked")["tick"].as_u64().unwrap();
             (tick > 0).then_some(())
         });
 
-        assert_stepped(&stepped.join().unwrap(), 4_000);
+        assert_stepped(&stepped.join().unwrap(), 1_000);
     });
-    assert_eq!(lab.settled("ctl-asked"), 4_000);
+    assert_eq!(lab.settled("ctl-asked"), 1_000);
 
     lab.ctl("ctl-asked", &["stop"]);
     launch.wait();
