@@ -433,7 +433,7 @@ impl RunFolder {
     /// The name of a folder that may not exist yet.
     fn named(&self) -> Result<RunName, RecordError> {
         let name = self.path.file_name().unwrap_or_default().to_string_lossy();
-        RunName::new(&name).map_err(|error| RecordError::folder(error))
+        RunName::new(&name).map_err(RecordError::folder)
     }
 
     /// Removes the record of a run.

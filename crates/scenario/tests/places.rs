@@ -1,7 +1,5 @@
 //! Places: patterns, regions, sizes and walls, as written in a file, drawn from the seed, and written out.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests")]
-
 use std::path::Path;
 
 use config::{Changes, FileError, Source};

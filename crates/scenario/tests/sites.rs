@@ -45,7 +45,7 @@ fn a_site_has_defaults_and_is_kept() {
         ("site", Point::new(2.0, 3.0))
     );
     assert_eq!((site.range_m, site.on_conflict), (3.0, OnConflict::First));
-    assert!(site.state.is_empty() && !site.is_at_random);
+    assert!(site.state.is_empty() && site.drawn.is_none());
 
     let text = text.to_owned()
         + "on_conflict = \"refuse\"\nkind = \"task\"\nrange = \"1 m\"\n\

@@ -482,10 +482,7 @@ impl Recorder {
             return Ok(self.summary.clone());
         }
 
-        let text = self
-            .summary
-            .seal()
-            .map_err(|error| RecordError::folder(error))?;
+        let text = self.summary.seal().map_err(RecordError::folder)?;
         self.folder.write_line(SUMMARY, &text)?;
         Ok(self.summary.clone())
     }

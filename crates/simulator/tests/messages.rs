@@ -58,6 +58,7 @@ impl<F: Fn(&str, Tick) -> Commands> Exchange<TickUpdate, Arc<Report>, CommandTex
                 emotion_state: "CALM".into(),
                 behavior_state: "IDLE".into(),
                 state_variables: StateVariables::new(),
+                site_actions: Vec::new(),
                 commands: commands.len() as u32,
                 log: vec![],
             };

@@ -52,10 +52,10 @@ pub enum ServerError {
     Bus(#[from] BusError),
     /// The record cannot be written.
     #[error(transparent)]
-    Record(#[from] RecordError),
+    Record(Box<RecordError>),
     /// The environment cannot be set up.
     #[error(transparent)]
-    Hall(#[from] world::HallError),
+    Hall(Box<world::HallError>),
     /// A run that is resumed does not go as its record.
     #[error(
         "the run cannot be resumed: executed again, it differs from its record at {0} (recorded: {recorded}; now: {now}). \
@@ -70,6 +70,18 @@ pub enum ServerError {
     /// A recording has no tick.
     #[error("the recording of run {0} has no complete tick")]
     Empty(RunName),
+}
+
+impl From<RecordError> for ServerError {
+    fn from(error: RecordError) -> Self {
+        Self::Record(Box::new(error))
+    }
+}
+
+impl From<world::HallError> for ServerError {
+    fn from(error: world::HallError) -> Self {
+        Self::Hall(Box::new(error))
+    }
 }
 
 /// Why a server stops.
@@ -93,7 +105,7 @@ pub(super) enum EpochStop {
     /// Another one begins with this scenario, and the client that wants it is answered then.
     Init {
         scenario: Box<Scenario>,
-        query: Query,
+        query: Box<Query>,
     },
     /// The server stops.
     Exit(StopReason),

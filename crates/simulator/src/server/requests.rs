@@ -261,7 +261,7 @@ impl LiveRun {
                 self.answer_stepping(frontend);
                 return Err(EpochStop::Init {
                     scenario: Box::new(next),
-                    query,
+                    query: Box::new(query),
                 });
             }
         }
