@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::{Args, Subcommand, ValueEnum};
-use launch::net::{self, FaultPlan, Flow, LinkOrder, Proxy, Shape, address};
+use launch::net::{self, FaultPlan, Flow, LinkOrder, Proxy, LinkShape, address};
 use protocol::RobotName;
 use terminal::OutputError;
 
@@ -148,13 +148,13 @@ fn obey_input(proxy: &Proxy, closes: bool) -> Result<()> {
 }
 
 /// The shape with a cut turned into closed connections if `closes`.
-fn closing(shape: Shape, closes: bool) -> Shape {
+fn closing(shape: LinkShape, closes: bool) -> LinkShape {
     let flow = if closes && shape.flow == Flow::Cut {
         Flow::Closed
     } else {
         shape.flow
     };
-    Shape { flow, ..shape }
+    LinkShape { flow, ..shape }
 }
 
 /// Plays a plan of faults on the links of a launch.

@@ -34,12 +34,12 @@ pub struct Factor {
     /// whole run.
     pub begins_s: Option<f64>,
     /// What is changed.
-    pub(super) target: Target,
+    pub(super) target: FactorTarget,
 }
 
 /// What the values of a factor change.
 #[derive(Debug, Clone)]
-pub(super) enum Target {
+pub(super) enum FactorTarget {
     /// The value at this path of the scenario.
     Path(String),
     /// What these changes of the scenario set, in which `{value}`, `{from}` and `{until}` are replaced.
@@ -383,7 +383,7 @@ impl Factor {
     }
 }
 
-impl Target {
+impl FactorTarget {
     fn changes(
         &self,
         value: &FactorValue,
@@ -491,7 +491,7 @@ mod tests {
             values: values.iter().copied().map(FactorValue::Time).collect(),
             spans: vec![0..0; values.len()],
             begins_s: Some(120.0),
-            target: Target::Set {
+            target: FactorTarget::Set {
                 changes: vec![partition.to_owned()],
                 at_zero: Some(vec!["network.partition=[]".to_owned()]),
             },
@@ -539,7 +539,7 @@ mod tests {
             spans: vec![0..0; values.len()],
             values,
             begins_s: None,
-            target: Target::Path(path.to_owned()),
+            target: FactorTarget::Path(path.to_owned()),
         }
     }
 
@@ -613,7 +613,7 @@ mod tests {
         assert!(matches!(error, ConditionError::Overlap(..)), "{error}");
 
         let mut conditions = cut(&[30.0, 60.0]);
-        conditions.factors[0].target = Target::Set {
+        conditions.factors[0].target = FactorTarget::Set {
             changes: vec!["guests.count=3".to_owned()],
             at_zero: None,
         };

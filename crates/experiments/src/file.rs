@@ -18,7 +18,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::condition::{
-    Condition, ConditionError, Conditions, Factor, FactorValue, NAMED, Target, check_apart,
+    Condition, ConditionError, Conditions, Factor, FactorTarget, FactorValue, NAMED, check_apart,
     check_change, check_levels, parse,
 };
 use super::presentation::{Presentation, RawPresentation};
@@ -614,9 +614,9 @@ impl RawFactor {
                     let reason = "`path` names a value of the scenario, such as \"guests.count\"";
                     return Err(refuse(source, path.span(), reason));
                 }
-                Target::Path(path.into_inner())
+                FactorTarget::Path(path.into_inner())
             }
-            (None, Some(changes)) => Target::Set {
+            (None, Some(changes)) => FactorTarget::Set {
                 changes: changes.into_inner(),
                 at_zero: self.set_at_zero.map(Spanned::into_inner),
             },

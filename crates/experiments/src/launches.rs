@@ -74,7 +74,7 @@ pub struct Launches {
     starting: Option<std::thread::JoinHandle<()>>,
     launcher: Launcher,
     usage: LaunchUse,
-    idle: Mutex<Vec<Launched>>,
+    idle: Mutex<Vec<ReusedLaunch>>,
     /// Processes that are not used twice, by their kinds: their robots keep something over `init`.
     kept_state: Mutex<BTreeSet<Kind>>,
 }
@@ -95,7 +95,7 @@ type StartRequest = (Command, Sender<std::io::Result<Child>>);
 struct Kind(u128);
 
 /// A launch whose processes run.
-struct Launched {
+struct ReusedLaunch {
     kind: Kind,
     folder: Scratch,
     child: Child,
@@ -211,7 +211,7 @@ impl Launches {
 
     /// A launch of a kind whose processes are there and have played, if they may play again. One of another kind makes room for
     /// the one that has to be started.
-    fn take(&self, kind: Kind) -> Option<Launched> {
+    fn take(&self, kind: Kind) -> Option<ReusedLaunch> {
         let mut idle = lock(&self.idle);
         if let Some(place) = idle.iter().position(|launched| launched.kind == kind) {
             return Some(idle.swap_remove(place));
@@ -227,7 +227,7 @@ impl Launches {
     /// Plays a further unit; its first one once more before the second.
     fn play_again(
         &self,
-        launched: &mut Launched,
+        launched: &mut ReusedLaunch,
         scenario: &str,
         patience: Duration,
     ) -> Result<(), Broken> {
@@ -252,7 +252,7 @@ impl Launches {
     /// Reads a run that has finished, and keeps its processes.
     fn conclude(
         &self,
-        launched: Launched,
+        launched: ReusedLaunch,
         scenario: &Scenario,
         follower: &mut impl Follow,
     ) -> Result<EndedRun, LabError> {
@@ -276,7 +276,7 @@ impl Launches {
         kind: Kind,
         scenario: &Scenario,
         launch: Option<&LaunchText>,
-    ) -> Result<Launched, LabError> {
+    ) -> Result<ReusedLaunch, LabError> {
         let folder = Scratch::new().map_err(LabError::failed)?;
         let file = write_launch(scenario, launch, folder.path())?;
         let output = File::create(folder.path().join(OUTPUT)).map_err(LabError::failed)?;
@@ -301,7 +301,7 @@ impl Launches {
         let is_sent = starter.is_some_and(|starter| starter.send((command, started)).is_ok());
         let child = child.recv().ok().filter(|_| is_sent);
         let child = child.ok_or_else(|| LabError::failed("no thread can be started"))?;
-        Ok(Launched {
+        Ok(ReusedLaunch {
             kind,
             folder,
             child: child.map_err(LabError::failed)?,
@@ -338,7 +338,7 @@ impl Kind {
     }
 }
 
-impl Launched {
+impl ReusedLaunch {
     fn run(&self) -> RunFolder {
         RunFolder::at(self.path())
     }
@@ -476,7 +476,7 @@ impl Launched {
     }
 }
 
-impl Drop for Launched {
+impl Drop for ReusedLaunch {
     /// In whatever way its use has ended, no process is left.
     fn drop(&mut self) {
         if matches!(self.child.try_wait(), Ok(None)) {

@@ -13,4 +13,4 @@ mod shape;
 pub use plan::FaultPlan;
 pub use play::{Play, Via, play};
 pub use proxy::{AddressError, Proxy, address};
-pub use shape::{Flow, LinkOrder, OrderError, Shape};
+pub use shape::{Flow, LinkOrder, LinkShape, OrderError};

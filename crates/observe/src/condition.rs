@@ -10,11 +10,11 @@ use serde_json::Value;
 
 use crate::pattern::{Pattern, PatternError};
 use crate::quantity::{
-    By, Gauge, OfRobot, PlaceKind, PlaceTable, Quantity, QuantityError, StateNames, Team,
-    ValueBounds, number,
+    By, OfRobot, PlaceKind, PlaceTable, QuantityError, QuantityGauge, RunQuantity, StateNames,
+    Team, ValueBounds, number,
 };
 use crate::words::{self, Word};
-use crate::{Observation, RobotState, Setting};
+use crate::{Observation, RobotState, RunSetting};
 
 /// Kinds of events that a tick gets after its conditions are evaluated.
 const AFTER_THE_TICK: [&str; 2] = ["tick", "end"];
@@ -48,7 +48,7 @@ pub enum TickConditionError {
     Unknown,
     /// A number of robots or places that cannot be taken.
     #[error(transparent)]
-    Quantity(#[from] QuantityError),
+    RunQuantity(#[from] QuantityError),
     /// A condition has a number that is taken over the run.
     #[error("a condition is about each tick: leave `as` out")]
     OverTheRun,
@@ -106,7 +106,7 @@ enum Alternative {
 /// A number of robots or places within bounds, which may have to last. A truth has no bounds.
 #[derive(Debug, Clone, PartialEq)]
 struct LastingNumber {
-    quantity: Quantity,
+    quantity: RunQuantity,
     bounds: ValueBounds,
     lasting: Option<Time>,
 }
@@ -406,7 +406,7 @@ impl ConditionTable {
             }
             _ => return Err(TickConditionError::Unknown),
         };
-        let quantity = Quantity::each(key, self.robot, self.robots, self.by, of)?;
+        let quantity = RunQuantity::each(key, self.robot, self.robots, self.by, of)?;
         within(format!("`{key}`"), quantity, bounds, self.lasting)
     }
 }
@@ -414,7 +414,7 @@ impl ConditionTable {
 /// A number within bounds. A truth has none, and any other number some.
 fn within(
     key: String,
-    quantity: Quantity,
+    quantity: RunQuantity,
     bounds: ValueBounds,
     lasting: Option<Time>,
 ) -> Result<Alternative, TickConditionError> {
@@ -547,7 +547,7 @@ impl ConditionTable {
             return;
         }
 
-        let Quantity::Each { team, by, of } = &number.quantity else {
+        let RunQuantity::Each { team, by, of } = &number.quantity else {
             return;
         };
         self.robots = Some(team.clone());
@@ -577,7 +577,7 @@ impl TickCondition {
     ///
     /// # Errors
     /// As [`Self::check`], and [`TickConditionError::TooLate`] for events that a tick gets after its end is decided.
-    pub fn check_end(&self, setting: &Setting) -> Result<(), TickConditionError> {
+    pub fn check_end(&self, setting: &RunSetting) -> Result<(), TickConditionError> {
         let mut kinds = self.patterns().into_iter().map(Pattern::kind);
         if let Some(kind) = kinds.find(|kind| AFTER_THE_TICK.contains(kind)) {
             return Err(TickConditionError::TooLate(kind.to_owned()));
@@ -589,7 +589,7 @@ impl TickCondition {
     ///
     /// # Errors
     /// [`TickConditionError::UnknownRobot`], or a number of robots or places that the run does not have.
-    pub fn check(&self, setting: &Setting) -> Result<(), TickConditionError> {
+    pub fn check(&self, setting: &RunSetting) -> Result<(), TickConditionError> {
         let mut numbers = Vec::new();
         self.visit(&mut |alternative| {
             if let Alternative::Number(number) = alternative {
@@ -764,7 +764,7 @@ struct Tracked {
     /// What a robot would have to publish so that the alternative can hold, and has not published yet.
     unknown: Option<String>,
     /// The number that it compares.
-    gauge: Option<Gauge>,
+    gauge: Option<QuantityGauge>,
     /// The conditions that hold together.
     parts: Vec<Evaluation>,
 }
@@ -772,7 +772,7 @@ struct Tracked {
 impl Evaluation {
     /// Begins to evaluate a condition in a run.
     #[must_use]
-    pub fn new(condition: &TickCondition, setting: &Setting) -> Self {
+    pub fn new(condition: &TickCondition, setting: &RunSetting) -> Self {
         let mut alternatives = Vec::new();
         for alternative in &condition.0 {
             alternatives.push(Tracked {
@@ -781,7 +781,9 @@ impl Evaluation {
                 before: Vec::new(),
                 unknown: None,
                 gauge: match alternative {
-                    Alternative::Number(number) => Some(Gauge::new(&number.quantity, setting)),
+                    Alternative::Number(number) => {
+                        Some(QuantityGauge::new(&number.quantity, setting))
+                    }
                     _ => None,
                 },
                 parts: match alternative {

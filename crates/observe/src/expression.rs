@@ -10,14 +10,14 @@ const MAX_DEPTH: usize = 32;
 /// An expression.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(try_from = "String")]
-pub struct Expression(Node);
+pub struct Expression(ExpressionNode);
 
 #[derive(Debug, Clone, PartialEq)]
-enum Node {
+enum ExpressionNode {
     Number(f64),
     Name(String),
-    Negative(Box<Node>),
-    Both(Box<Node>, Operator, Box<Node>),
+    Negative(Box<ExpressionNode>),
+    Both(Box<ExpressionNode>, Operator, Box<ExpressionNode>),
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -79,7 +79,7 @@ impl Expression {
     }
 }
 
-impl Node {
+impl ExpressionNode {
     fn add_names<'a>(&'a self, names: &mut Vec<&'a str>) {
         match self {
             Self::Number(_) => {}
@@ -136,7 +136,7 @@ impl Parser<'_> {
         })
     }
 
-    fn sum(&mut self, depth: usize) -> Result<Node, ExpressionError> {
+    fn sum(&mut self, depth: usize) -> Result<ExpressionNode, ExpressionError> {
         let mut node = self.product(depth)?;
         while let Some(sign) = self.take(&['+', '-']) {
             let operator = if sign == '+' {
@@ -145,12 +145,12 @@ impl Parser<'_> {
                 Operator::Minus
             };
             let other = self.product(depth)?;
-            node = Node::Both(Box::new(node), operator, Box::new(other));
+            node = ExpressionNode::Both(Box::new(node), operator, Box::new(other));
         }
         Ok(node)
     }
 
-    fn product(&mut self, depth: usize) -> Result<Node, ExpressionError> {
+    fn product(&mut self, depth: usize) -> Result<ExpressionNode, ExpressionError> {
         let mut node = self.factor(depth)?;
         while let Some(sign) = self.take(&['*', '/']) {
             let operator = if sign == '*' {
@@ -159,17 +159,17 @@ impl Parser<'_> {
                 Operator::Over
             };
             let other = self.factor(depth)?;
-            node = Node::Both(Box::new(node), operator, Box::new(other));
+            node = ExpressionNode::Both(Box::new(node), operator, Box::new(other));
         }
         Ok(node)
     }
 
-    fn factor(&mut self, depth: usize) -> Result<Node, ExpressionError> {
+    fn factor(&mut self, depth: usize) -> Result<ExpressionNode, ExpressionError> {
         if depth > MAX_DEPTH {
             return Err(ExpressionError::TooDeep);
         }
         if self.take(&['-']).is_some() {
-            return Ok(Node::Negative(Box::new(self.factor(depth + 1)?)));
+            return Ok(ExpressionNode::Negative(Box::new(self.factor(depth + 1)?)));
         }
         if self.take(&['(']).is_some() {
             let node = self.sum(depth + 1)?;
@@ -183,7 +183,7 @@ impl Parser<'_> {
                 return Err(self.unexpected());
             };
             self.rest = rest;
-            return Ok(Node::Name(name.to_owned()));
+            return Ok(ExpressionNode::Name(name.to_owned()));
         }
 
         let is_first = self.peek();
@@ -192,14 +192,14 @@ impl Parser<'_> {
         let (word, rest) = self.rest.split_at(end);
         let node = match is_first {
             Some(first) if first.is_ascii_digit() => match word.parse::<f64>() {
-                Ok(number) if number.is_finite() => Node::Number(number),
+                Ok(number) if number.is_finite() => ExpressionNode::Number(number),
                 _ => return Err(self.unexpected()),
             },
             Some(first) if first.is_alphabetic() || first == '_' => {
                 if word.contains('.') {
                     return Err(self.unexpected());
                 }
-                Node::Name(word.to_owned())
+                ExpressionNode::Name(word.to_owned())
             }
             _ => return Err(self.unexpected()),
         };

@@ -18,14 +18,16 @@ pub use expect::{Expectation, Judgment, Monitor, Monitors};
 pub use expression::{Expression, ExpressionError};
 pub use measure::{Measure, MeasureError, MeasureSource, Measured};
 pub use pattern::{Pattern, PatternError};
-pub use places::Region;
+pub use places::FieldRegion;
 pub use probe::Probe;
-pub use quantity::{By, OfRobot, OfValues, Quantity, QuantityError, StateNames, Team, ValueBounds};
+pub use quantity::{
+    By, OfRobot, OfValues, QuantityError, RunQuantity, StateNames, Team, ValueBounds,
+};
 pub use words::Words;
 
 /// What conditions and measures depend on beside the ticks of a run.
 #[derive(Debug, Clone)]
-pub struct Setting {
+pub struct RunSetting {
     /// Length of a tick, seconds.
     pub tick_s: f64,
     /// The last tick that is planned.

@@ -13,11 +13,11 @@ use crate::condition::TickCondition;
 use crate::expression::Expression;
 use crate::pattern::Pattern;
 use crate::quantity::{
-    By, OfRobot, OfValues, PlaceKind, PlaceTable, Quantity, QuantityError, StateNames, Team,
+    By, OfRobot, OfValues, PlaceKind, PlaceTable, QuantityError, RunQuantity, StateNames, Team,
     ValueBounds,
 };
 use crate::words::{self, Word};
-use crate::{Setting, TickConditionError};
+use crate::{RunSetting, TickConditionError};
 
 /// Longest name of a measure, bytes.
 const MAX_NAME_BYTES: usize = 100;
@@ -56,7 +56,7 @@ pub enum MeasureSource {
     /// Durations between pairs of events.
     Between(Between),
     /// Share of the simulated time in which robots have one of these emotions or behaviors, 0 to 1, or how many of them have.
-    Share(Quantity),
+    Share(RunQuantity),
     /// A number of robots or places.
     Number(Number),
     /// Time of the last progress before the robots come to a standstill.
@@ -90,7 +90,7 @@ pub enum When {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Number {
     /// What has it.
-    pub quantity: Quantity,
+    pub quantity: RunQuantity,
     /// The number of its values that is taken.
     pub taken: OfValues,
 }
@@ -339,7 +339,7 @@ pub enum MeasureError {
     NoVariable(String),
     /// A number of robots or places that cannot be taken.
     #[error(transparent)]
-    Quantity(#[from] QuantityError),
+    RunQuantity(#[from] QuantityError),
     /// A condition that no tick can have.
     #[error(transparent)]
     Condition(#[from] TickConditionError),
@@ -647,7 +647,7 @@ impl RawShare {
             _ => return Err(MeasureError::NoStates),
         };
         let of = OfRobot::State(states);
-        let quantity = Quantity::each("share", self.robot, self.robots, self.by, of)?;
+        let quantity = RunQuantity::each("share", self.robot, self.robots, self.by, of)?;
         Ok(MeasureSource::Share(quantity))
     }
 }
@@ -655,7 +655,7 @@ impl RawShare {
 impl RawVariable {
     fn check(self) -> Result<MeasureSource, MeasureError> {
         let of = OfRobot::Variable(self.name, ValueBounds::default());
-        let quantity = Quantity::each("variable", self.robot, self.robots, self.by, of)?;
+        let quantity = RunQuantity::each("variable", self.robot, self.robots, self.by, of)?;
         let taken = self.taken;
         Ok(MeasureSource::Number(Number { quantity, taken }))
     }
@@ -664,7 +664,7 @@ impl RawVariable {
 impl RawJain {
     fn source(self) -> MeasureSource {
         MeasureSource::Number(Number {
-            quantity: Quantity::Each {
+            quantity: RunQuantity::Each {
                 team: Team::One(self.robot),
                 by: Some(By::Jain),
                 of: OfRobot::Variable(self.name, ValueBounds::default()),
@@ -770,7 +770,7 @@ impl Measure {
     ///
     /// # Errors
     /// [`MeasureError`].
-    pub fn check(&self, setting: &Setting) -> Result<(), MeasureError> {
+    pub fn check(&self, setting: &RunSetting) -> Result<(), MeasureError> {
         for source in self.sources() {
             match source {
                 MeasureSource::Share(quantity) | MeasureSource::Number(Number { quantity, .. }) => {

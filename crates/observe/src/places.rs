@@ -9,7 +9,7 @@ const MAX_CELLS: f64 = 1e6;
 
 /// A part of the field. Its edge belongs to it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Region {
+pub enum FieldRegion {
     /// A rectangle between two corners.
     Rectangle {
         /// The lower left one, meters.
@@ -26,7 +26,7 @@ pub enum Region {
     },
 }
 
-impl Region {
+impl FieldRegion {
     /// The rectangle between two opposite corners.
     #[must_use]
     pub fn rectangle(one: Point, other: Point) -> Self {
@@ -56,7 +56,7 @@ fn square_m2(one: Point, other: Point) -> f64 {
 
 /// The cells of the field of which the center was within range of a robot.
 #[derive(Debug, Clone)]
-pub(crate) struct Coverage {
+pub(crate) struct CoveredArea {
     cell_m: f64,
     radius_m: f64,
     columns: usize,
@@ -65,7 +65,7 @@ pub(crate) struct Coverage {
     covered: usize,
 }
 
-impl Coverage {
+impl CoveredArea {
     /// Checks that a field has cells of this side, and not too many.
     pub(crate) fn check(field_m: [f64; 2], cell_m: f64) -> Result<(), String> {
         let [columns, rows] = field_m.map(|side_m| centers(side_m, cell_m));
@@ -222,7 +222,7 @@ mod tests {
 
     #[test]
     fn the_edge_of_a_region_belongs_to_it() {
-        let rectangle = Region::rectangle(at(3.0, 1.0), at(1.0, 2.0));
+        let rectangle = FieldRegion::rectangle(at(3.0, 1.0), at(1.0, 2.0));
         for (place, is_inside) in [
             (at(1.0, 1.0), true),
             (at(3.0, 2.0), true),
@@ -231,7 +231,7 @@ mod tests {
         ] {
             assert_eq!(rectangle.contains(place), is_inside, "{place:?}");
         }
-        let disc = Region::Disc {
+        let disc = FieldRegion::Disc {
             center: at(1.0, 1.0),
             radius_m: 5.0,
         };
@@ -241,7 +241,7 @@ mod tests {
     #[test]
     fn coverage_counts_cells_whose_centers_are_within_range() {
         // 4 × 2 cells with centers at 0.5, 1.5, 2.5, 3.5 and 0.5, 1.5.
-        let mut field = Coverage::new([4.0, 2.0], 1.0, 1.0);
+        let mut field = CoveredArea::new([4.0, 2.0], 1.0, 1.0);
         assert_eq!(field.share(), 0.0);
         field.cover(at(0.5, 0.5));
         // Itself, right and above: 1 m is within 1 m, the diagonal is not.
@@ -256,14 +256,14 @@ mod tests {
 
     #[test]
     fn cells_are_bounded() {
-        assert_eq!(Coverage::check([1000.0, 1000.0], 1.0), Ok(()));
-        let error = Coverage::check([1000.0, 1001.0], 1.0).unwrap_err();
+        assert_eq!(CoveredArea::check([1000.0, 1000.0], 1.0), Ok(()));
+        let error = CoveredArea::check([1000.0, 1001.0], 1.0).unwrap_err();
         assert!(error.contains("make `cell` larger"), "{error}");
-        let error = Coverage::check([10.0, 10.0], 25.0).unwrap_err();
+        let error = CoveredArea::check([10.0, 10.0], 25.0).unwrap_err();
         assert!(error.contains("make `cell` smaller"), "{error}");
         // Tenths of a meter are no binary fractions.
         assert_eq!(centers(0.3, 0.1), 3.0);
-        assert!(Coverage::check([10.0, 10.0], 1e-300).is_err());
+        assert!(CoveredArea::check([10.0, 10.0], 1e-300).is_err());
     }
 
     #[test]

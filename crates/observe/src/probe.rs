@@ -12,9 +12,10 @@ use crate::measure::{
     Between, Count, Measure, MeasureSource, Measured, Number, OfDurations, Parts, Stalled, When,
 };
 use crate::quantity::{
-    By, Gauge, OfRobot, OfValues, Quantity, StateNames, Undefined, number as number_of_state,
+    By, OfRobot, OfValues, QuantityGauge, RunQuantity, StateNames, Undefined,
+    number as number_of_state,
 };
-use crate::{Observation, Setting};
+use crate::{Observation, RunSetting};
 
 /// Tables of a robot's summary that have entries for what occurred.
 const OCCURRED: [&str; 4] = ["emotions_s", "behaviors_s", "entered", "sent"];
@@ -34,7 +35,7 @@ pub struct Probe<'a> {
 
 /// When a run ended.
 #[derive(Debug, Clone, Copy)]
-struct Ending {
+struct RunEnding {
     tick_s: f64,
     /// Its last tick.
     now: Tick,
@@ -60,7 +61,7 @@ enum Tally<'a> {
 impl<'a> Probe<'a> {
     /// A measure of a run that has not begun. The condition of the run begins and ends at these times, simulated seconds.
     #[must_use]
-    pub fn new(measure: &'a Measure, setting: &Setting, condition_s: (f64, f64)) -> Self {
+    pub fn new(measure: &'a Measure, setting: &RunSetting, condition_s: (f64, f64)) -> Self {
         Self {
             now: 0,
             tick_s: 0.0,
@@ -96,7 +97,7 @@ impl<'a> Probe<'a> {
         } else {
             self.now
         };
-        let end = Ending {
+        let end = RunEnding {
             tick_s: self.tick_s,
             now: self.now,
             horizon,
@@ -106,7 +107,7 @@ impl<'a> Probe<'a> {
 }
 
 impl<'a> Tally<'a> {
-    fn new(source: &'a MeasureSource, setting: &Setting, condition_s: (f64, f64)) -> Self {
+    fn new(source: &'a MeasureSource, setting: &RunSetting, condition_s: (f64, f64)) -> Self {
         match source {
             MeasureSource::Summary(path) => Self::Summary(path),
             MeasureSource::Count(count) => Self::Count(CountTally {
@@ -131,7 +132,7 @@ impl<'a> Tally<'a> {
             MeasureSource::Share(quantity) => Self::Share(ShareTally::new(quantity, setting)),
             MeasureSource::Number(number) => Self::Number(NumberTally {
                 definition: number,
-                gauge: Gauge::new(&number.quantity, setting),
+                gauge: QuantityGauge::new(&number.quantity, setting),
                 values: None,
                 undefined: None,
             }),
@@ -177,7 +178,7 @@ impl<'a> Tally<'a> {
         &self,
         summary: &Value,
         earlier: &BTreeMap<String, Measured>,
-        end: Ending,
+        end: RunEnding,
     ) -> Measured {
         match self {
             Self::Summary(path) => summary_number(summary, path),
@@ -341,7 +342,7 @@ impl TimeTally {
         }
     }
 
-    fn measured(&self, end: Ending) -> Measured {
+    fn measured(&self, end: RunEnding) -> Measured {
         let unknown = match (self.begun, self.reached, &self.after) {
             (None, _, Some(after)) => after.unknown(),
             (_, None, _) => self.to.unknown(),
@@ -450,8 +451,8 @@ struct ShareTally<'a> {
 }
 
 impl<'a> ShareTally<'a> {
-    fn new(quantity: &'a Quantity, setting: &Setting) -> Self {
-        let Quantity::Each {
+    fn new(quantity: &'a RunQuantity, setting: &RunSetting) -> Self {
+        let RunQuantity::Each {
             of: OfRobot::State(states),
             by,
             ..
@@ -536,7 +537,7 @@ impl<'a> ShareTally<'a> {
 #[derive(Debug)]
 struct NumberTally<'a> {
     definition: &'a Number,
-    gauge: Gauge,
+    gauge: QuantityGauge,
     /// `None` before the number has a value.
     values: Option<Values>,
     /// Why it has no value in the last tick.
@@ -640,7 +641,7 @@ impl StalledTally<'_> {
         }
     }
 
-    fn measured(&self, end: Ending) -> Measured {
+    fn measured(&self, end: RunEnding) -> Measured {
         for (counter, value) in self.definition.progress.iter().zip(&self.values) {
             if value.is_none() {
                 return no_variable(&counter.robot, &counter.variable);
@@ -690,8 +691,8 @@ mod tests {
         }
     }
 
-    fn setting(roster: &[RobotName]) -> Setting {
-        Setting {
+    fn setting(roster: &[RobotName]) -> RunSetting {
+        RunSetting {
             tick_s: TICK_S,
             ticks: 100,
             field_m: [10.0, 10.0],

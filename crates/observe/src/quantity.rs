@@ -1,6 +1,6 @@
 //! Numbers of robots, teams and places, one in each tick: a condition compares it, and a measure takes it over a run.
 //!
-//! [`Quantity`] is what there is to look at: what comes with another kind of subject is added there.
+//! [`RunQuantity`] is what there is to look at: what comes with another kind of subject is added there.
 
 use std::fmt;
 
@@ -10,16 +10,16 @@ use protocol::messages::{Point, Variable};
 use protocol::{RobotName, RobotPattern};
 use serde::{Deserialize, Serialize};
 
-use crate::places::{Coverage, Region, components, least_distance_m};
+use crate::places::{CoveredArea, FieldRegion, components, least_distance_m};
 use crate::words::{Word, WordKind};
-use crate::{Observation, RobotState, Setting};
+use crate::{Observation, RobotState, RunSetting};
 
 /// Most names and patterns of a team.
 const MAX_PATTERNS: usize = 64;
 
 /// One number of a run in each tick.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Quantity {
+pub enum RunQuantity {
     /// A number of each robot, combined to one.
     Each {
         /// The robots.
@@ -66,7 +66,7 @@ pub enum OfRobot {
     /// Distance to a point, meters.
     DistanceTo(Point),
     /// Whether it is within a region.
-    Inside(Region),
+    Inside(FieldRegion),
 }
 
 /// Emotions or behaviors.
@@ -287,7 +287,7 @@ impl PlaceKind {
 }
 
 impl PlaceTable {
-    pub(crate) fn check(self, kind: PlaceKind) -> Result<Quantity, QuantityError> {
+    pub(crate) fn check(self, kind: PlaceKind) -> Result<RunQuantity, QuantityError> {
         let key = kind.key();
         for (name, is_given) in [
             ("to", self.to.is_some()),
@@ -304,12 +304,12 @@ impl PlaceTable {
 
         match kind {
             PlaceKind::Walked => {
-                Quantity::each(key, self.robot, self.robots, self.by, OfRobot::Walked)
+                RunQuantity::each(key, self.robot, self.robots, self.by, OfRobot::Walked)
             }
             PlaceKind::Distance => {
                 if let Some(to) = self.to {
                     let of = OfRobot::DistanceTo(point(to));
-                    return Quantity::each(key, self.robot, self.robots, self.by, of);
+                    return RunQuantity::each(key, self.robot, self.robots, self.by, of);
                 }
                 let by = match self.by {
                     Some(by @ (By::Min | By::Mean | By::Max)) => by,
@@ -319,28 +319,28 @@ impl PlaceTable {
                     }
                 };
                 let team = several(key, self.robot.as_ref(), self.robots)?;
-                Ok(Quantity::Between { team, by })
+                Ok(RunQuantity::Between { team, by })
             }
             PlaceKind::Inside => {
                 let region = match (self.rectangle, self.disc) {
                     (Some(FixedList([one, other])), None) => {
-                        Region::rectangle(point(one), point(other))
+                        FieldRegion::rectangle(point(one), point(other))
                     }
-                    (None, Some(disc)) => Region::Disc {
+                    (None, Some(disc)) => FieldRegion::Disc {
                         center: point(disc.center),
                         radius_m: positive("radius", Some(disc.radius))?,
                     },
                     _ => return Err(QuantityError::Lacks(key, "a `rectangle` or a `disc`")),
                 };
                 let of = OfRobot::Inside(region);
-                Quantity::each(key, self.robot, self.robots, self.by, of)
+                RunQuantity::each(key, self.robot, self.robots, self.by, of)
             }
-            PlaceKind::Covered => Ok(Quantity::Covered {
+            PlaceKind::Covered => Ok(RunQuantity::Covered {
                 radius_m: positive("radius", self.radius)?,
                 cell_m: positive("cell", self.cell)?,
                 team: whole(key, self.robot.as_ref(), self.robots, self.by)?,
             }),
-            PlaceKind::Components => Ok(Quantity::Components {
+            PlaceKind::Components => Ok(RunQuantity::Components {
                 range_m: positive("range", self.range)?,
                 team: whole(key, self.robot.as_ref(), self.robots, self.by)?,
             }),
@@ -348,10 +348,10 @@ impl PlaceTable {
     }
 
     /// The table of a number of places; `None` for another one.
-    pub(crate) fn of(quantity: &Quantity) -> Option<(PlaceKind, Self)> {
+    pub(crate) fn of(quantity: &RunQuantity) -> Option<(PlaceKind, Self)> {
         let mut table = Self::default();
         let kind = match quantity {
-            Quantity::Each { team, by, of } => {
+            RunQuantity::Each { team, by, of } => {
                 match (by, team) {
                     (None, Team::One(name)) => table.robot = RobotName::new(name.as_str()).ok(),
                     _ => table.robots = Some(team.clone()),
@@ -364,11 +364,11 @@ impl PlaceTable {
                         table.to = Some(lengths(*to));
                         PlaceKind::Distance
                     }
-                    OfRobot::Inside(Region::Rectangle { least, most }) => {
+                    OfRobot::Inside(FieldRegion::Rectangle { least, most }) => {
                         table.rectangle = Some(FixedList([lengths(*least), lengths(*most)]));
                         PlaceKind::Inside
                     }
-                    OfRobot::Inside(Region::Disc { center, radius_m }) => {
+                    OfRobot::Inside(FieldRegion::Disc { center, radius_m }) => {
                         table.disc = Some(DiscTable {
                             center: lengths(*center),
                             radius: Length(*radius_m),
@@ -377,12 +377,12 @@ impl PlaceTable {
                     }
                 }
             }
-            Quantity::Between { team, by } => {
+            RunQuantity::Between { team, by } => {
                 table.robots = Some(team.clone());
                 table.by = Some(*by);
                 PlaceKind::Distance
             }
-            Quantity::Covered {
+            RunQuantity::Covered {
                 team,
                 radius_m,
                 cell_m,
@@ -392,7 +392,7 @@ impl PlaceTable {
                 table.cell = Some(Length(*cell_m));
                 PlaceKind::Covered
             }
-            Quantity::Components { team, range_m } => {
+            RunQuantity::Components { team, range_m } => {
                 table.robots = Some(team.clone());
                 table.range = Some(Length(*range_m));
                 PlaceKind::Components
@@ -542,7 +542,7 @@ impl ValueBounds {
     }
 }
 
-impl Quantity {
+impl RunQuantity {
     /// A number of one robot, or of several combined; `key` names it in errors.
     pub(crate) fn each(
         key: &'static str,
@@ -579,7 +579,7 @@ impl Quantity {
     }
 
     /// The robots of a run, in the order of their names. One that is named is there whatever the roster is.
-    pub(crate) fn robots(&self, setting: &Setting) -> Vec<RobotName> {
+    pub(crate) fn robots(&self, setting: &RunSetting) -> Vec<RobotName> {
         if let Self::Each {
             team: Team::One(name),
             by: None,
@@ -634,7 +634,7 @@ impl Quantity {
     ///
     /// # Errors
     /// [`QuantityError`].
-    pub fn check(&self, setting: &Setting) -> Result<(), QuantityError> {
+    pub fn check(&self, setting: &RunSetting) -> Result<(), QuantityError> {
         for pattern in self.team().patterns() {
             if !setting.roster.iter().any(|robot| pattern.matches(robot)) {
                 return Err(QuantityError::UnknownRobot(pattern.to_string()));
@@ -645,7 +645,7 @@ impl Quantity {
                 Err(QuantityError::NoPair)
             }
             Self::Covered { cell_m, .. } => {
-                Coverage::check(setting.field_m, *cell_m).map_err(QuantityError::Cells)
+                CoveredArea::check(setting.field_m, *cell_m).map_err(QuantityError::Cells)
             }
             _ => Ok(()),
         }
@@ -671,7 +671,7 @@ impl OfRobot {
     }
 }
 
-impl fmt::Display for Quantity {
+impl fmt::Display for RunQuantity {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Each { team, by, of } => {
@@ -721,12 +721,12 @@ impl fmt::Display for By {
 
 /// A quantity while a run is observed.
 #[derive(Debug, Clone)]
-pub(crate) struct Gauge {
-    quantity: Quantity,
+pub(crate) struct QuantityGauge {
+    quantity: RunQuantity,
     /// The robots, in the order of their names.
     robots: Vec<RobotName>,
     walked: Vec<Walk>,
-    coverage: Option<Coverage>,
+    coverage: Option<CoveredArea>,
 }
 
 /// How far a robot has walked.
@@ -736,13 +736,13 @@ struct Walk {
     walked_m: f64,
 }
 
-impl Gauge {
-    pub(crate) fn new(quantity: &Quantity, setting: &Setting) -> Self {
+impl QuantityGauge {
+    pub(crate) fn new(quantity: &RunQuantity, setting: &RunSetting) -> Self {
         let robots = quantity.robots(setting);
         let coverage = match quantity {
-            Quantity::Covered {
+            RunQuantity::Covered {
                 radius_m, cell_m, ..
-            } => Some(Coverage::new(setting.field_m, *cell_m, *radius_m)),
+            } => Some(CoveredArea::new(setting.field_m, *cell_m, *radius_m)),
             _ => None,
         };
         Self {
@@ -756,7 +756,7 @@ impl Gauge {
     /// The value in a tick. Each tick is given once and in its order; the end of the run gives the last one again.
     pub(crate) fn value(&mut self, seen: &Observation<'_>) -> Result<f64, Undefined> {
         match &self.quantity {
-            Quantity::Each { by, of, .. } => {
+            RunQuantity::Each { by, of, .. } => {
                 let mut values = Vec::with_capacity(self.robots.len());
                 for (robot, walk) in self.robots.iter().zip(&mut self.walked) {
                     values.push(of.value(robot, walk, seen)?);
@@ -766,14 +766,14 @@ impl Gauge {
                     None => values.first().copied().ok_or(Undefined::NoRobot),
                 }
             }
-            Quantity::Between { by, .. } => {
+            RunQuantity::Between { by, .. } => {
                 let places = places(&self.robots, seen)?;
                 match by {
                     By::Min => least_distance_m(&places).ok_or(Undefined::NoRobot),
                     _ => between(&places, *by).ok_or(Undefined::NoRobot),
                 }
             }
-            Quantity::Covered { .. } => {
+            RunQuantity::Covered { .. } => {
                 let Some(coverage) = &mut self.coverage else {
                     return Err(Undefined::NoRobot);
                 };
@@ -790,7 +790,7 @@ impl Gauge {
                 }
                 Ok(coverage.share())
             }
-            Quantity::Components { range_m, .. } => {
+            RunQuantity::Components { range_m, .. } => {
                 Ok(components(&places(&self.robots, seen)?, *range_m) as f64)
             }
         }

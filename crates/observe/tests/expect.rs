@@ -8,7 +8,7 @@
 use std::collections::BTreeMap;
 
 use observe::expect::{MAX_EXPECTATIONS, check_all};
-use observe::{Expectation, Judgment, Monitor, Monitors, Observation, RobotState, Setting};
+use observe::{Expectation, Judgment, Monitor, Monitors, Observation, RobotState, RunSetting};
 use protocol::messages::{End, Point, StateVariables, Verdict};
 use protocol::{Event, RobotName, Tick};
 use serde::{Deserialize, Serialize};
@@ -40,8 +40,8 @@ fn roster() -> Vec<RobotName> {
     vec![name("A"), name("B")]
 }
 
-fn setting() -> Setting {
-    Setting {
+fn setting() -> RunSetting {
+    RunSetting {
         tick_s: TICK_S,
         ticks: 1000,
         field_m: [10.0, 10.0],

@@ -8,7 +8,7 @@
 use std::collections::BTreeMap;
 
 use observe::{
-    Evaluation, Measure, Measured, Observation, Probe, RobotState, Setting, TickCondition,
+    Evaluation, Measure, Measured, Observation, Probe, RobotState, RunSetting, TickCondition,
 };
 use proptest::prelude::*;
 use protocol::messages::{End, Point, StateVariables, Variable};
@@ -34,8 +34,8 @@ fn robot(index: usize) -> RobotName {
     RobotName::new(&format!("R{index}")).unwrap()
 }
 
-fn setting(robots: usize) -> Setting {
-    Setting {
+fn setting(robots: usize) -> RunSetting {
+    RunSetting {
         tick_s: 0.5,
         ticks: 20,
         field_m: [4.0, 2.0],

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use observe::{Expectation, Setting, TickCondition};
+use observe::{Expectation, RunSetting, TickCondition};
 use protocol::messages::{DisplayUnit, Parameters, Point};
 use protocol::{RobotName, Tick};
 use serde::{Deserialize, Serialize};
@@ -179,8 +179,8 @@ impl Scenario {
 
     /// What conditions and measures depend on beside the ticks of the run.
     #[must_use]
-    pub fn setting(&self) -> Setting {
-        Setting {
+    pub fn setting(&self) -> RunSetting {
+        RunSetting {
             tick_s: self.tick_s,
             ticks: self.ticks,
             field_m: self.field_m,

@@ -48,14 +48,14 @@ pub(crate) fn read(source: &Source, placement: Placement) -> Result<FloorPlan, F
     let document = Document::parse_with_options(&source.text, options)
         .map_err(|error| not_xml(source, &error))?;
     let root = document.root_element();
-    let refuse = |error: Refused| {
-        let Refused(range, reason) = error;
+    let refuse = |error: RefusedElement| {
+        let RefusedElement(range, reason) = error;
         FileError::at(source, Some(range), &reason)
     };
-    let page = Page::of(root, placement).map_err(refuse)?;
+    let page = Drawing::of(root, placement).map_err(refuse)?;
 
     let mut plan = FloorPlan::default();
-    let mut open = vec![(root, Drawn::default())];
+    let mut open = vec![(root, DrawnSolids::default())];
     while let Some((node, drawn)) = open.pop() {
         // Backward, so that the first one is taken next: walls and obstacles are in the order of the drawing.
         let children: Vec<_> = node.children().filter(Node::is_element).collect();
@@ -69,7 +69,7 @@ pub(crate) fn read(source: &Source, placement: Placement) -> Result<FloorPlan, F
         }
         if plan.walls.len() > WALLS_MAX || plan.obstacles.len() > WALLS_MAX {
             let reason = format!("more than {WALLS_MAX} walls or bodies");
-            return Err(refuse(Refused::at(node, reason)));
+            return Err(refuse(RefusedElement::at(node, reason)));
         }
     }
     Ok(plan)
@@ -91,9 +91,9 @@ fn not_xml(source: &Source, error: &roxmltree::Error) -> FileError {
 }
 
 /// Why an element is refused, and where it is.
-struct Refused(Range<usize>, String);
+struct RefusedElement(Range<usize>, String);
 
-impl Refused {
+impl RefusedElement {
     fn at(node: Node<'_, '_>, reason: String) -> Self {
         let document = node.document();
         let name = node.tag_name().name();
@@ -140,31 +140,36 @@ fn tags(text: &str) -> impl Iterator<Item = (usize, &str)> {
 }
 
 /// The drawing's coordinates.
-struct Page {
+struct Drawing {
     /// Its left and lower edge.
     origin: (f64, f64),
     unit_m: f64,
     at: Point,
 }
 
-impl Page {
-    fn of(root: Node<'_, '_>, placement: Placement) -> Result<Self, Refused> {
+impl Drawing {
+    fn of(root: Node<'_, '_>, placement: Placement) -> Result<Self, RefusedElement> {
         if root.tag_name().name() != "svg" {
             let reason = format!("<{}> is not an SVG drawing", root.tag_name().name());
-            return Err(Refused::at(root, reason));
+            return Err(RefusedElement::at(root, reason));
         }
 
         let view_box = root.attribute("viewBox").map(numbers);
         let [left, top, width, height] = match view_box {
             Some(Some(list)) if list.len() == 4 => [list[0], list[1], list[2], list[3]],
-            Some(_) => return Err(Refused::at(root, "viewBox is not four numbers".to_owned())),
+            Some(_) => {
+                return Err(RefusedElement::at(
+                    root,
+                    "viewBox is not four numbers".to_owned(),
+                ));
+            }
             None => {
                 let side = |name| root.attribute(name).and_then(|text| text.parse().ok());
                 match (side("width"), side("height")) {
                     (Some(width), Some(height)) => [0.0, 0.0, width, height],
                     _ => {
                         let reason = "a floor plan needs a viewBox, which says where it ends";
-                        return Err(Refused::at(root, reason.to_owned()));
+                        return Err(RefusedElement::at(root, reason.to_owned()));
                     }
                 }
             }
@@ -175,7 +180,7 @@ impl Page {
         let unit_m = placement.scale_m.or(own_m).unwrap_or(1.0);
         if !(unit_m > 0.0 && unit_m.is_finite() && width > 0.0 && height > 0.0) {
             let reason = "the width, the height and the scale of a floor plan are more than zero";
-            return Err(Refused::at(root, reason.to_owned()));
+            return Err(RefusedElement::at(root, reason.to_owned()));
         }
 
         Ok(Self {
@@ -186,7 +191,7 @@ impl Page {
     }
 
     /// A point of the drawing in the hall.
-    fn place(&self, drawn: Drawn, x: f64, y: f64) -> Point {
+    fn place(&self, drawn: DrawnSolids, x: f64, y: f64) -> Point {
         let x = x * drawn.scale.0 + drawn.shift.0;
         let y = y * drawn.scale.1 + drawn.shift.1;
         let offset = Point::new(x - self.origin.0, self.origin.1 - y);
@@ -196,14 +201,14 @@ impl Page {
 
 /// What holds for an element and all that is in it.
 #[derive(Debug, Clone, Copy)]
-struct Drawn {
+struct DrawnSolids {
     scale: (f64, f64),
     shift: (f64, f64),
     is_filled: bool,
     depth: usize,
 }
 
-impl Default for Drawn {
+impl Default for DrawnSolids {
     fn default() -> Self {
         Self {
             scale: (1.0, 1.0),
@@ -214,9 +219,9 @@ impl Default for Drawn {
     }
 }
 
-impl Drawn {
+impl DrawnSolids {
     /// What holds for an element in this one; `None` if it is not drawn, or is a text.
-    fn within(self, node: Node<'_, '_>) -> Result<Option<Self>, Refused> {
+    fn within(self, node: Node<'_, '_>) -> Result<Option<Self>, RefusedElement> {
         let is_svg = matches!(
             node.tag_name().namespace(),
             None | Some("http://www.w3.org/2000/svg")
@@ -231,7 +236,7 @@ impl Drawn {
         }
         if self.depth == MAX_DEPTH {
             let reason = format!("groups in more than {MAX_DEPTH} groups");
-            return Err(Refused::at(node, reason));
+            return Err(RefusedElement::at(node, reason));
         }
 
         let mut drawn = Self {
@@ -244,7 +249,7 @@ impl Drawn {
         if let Some(text) = node.attribute("transform") {
             drawn
                 .transform(text)
-                .map_err(|reason| Refused::at(node, reason))?;
+                .map_err(|reason| RefusedElement::at(node, reason))?;
         }
         Ok(Some(drawn))
     }
@@ -280,7 +285,12 @@ impl Drawn {
 }
 
 impl FloorPlan {
-    fn add(&mut self, node: Node<'_, '_>, drawn: Drawn, page: &Page) -> Result<(), Refused> {
+    fn add(
+        &mut self,
+        node: Node<'_, '_>,
+        drawn: DrawnSolids,
+        page: &Drawing,
+    ) -> Result<(), RefusedElement> {
         let name = node.tag_name().name();
         let number = |name: &str| attribute(node, name);
         match name {
@@ -288,7 +298,7 @@ impl FloorPlan {
             "rect" => {
                 if number("rx")? != 0.0 || number("ry")? != 0.0 {
                     let reason = "a rectangle with rounded corners cannot be read";
-                    return Err(Refused::at(node, reason.to_owned()));
+                    return Err(RefusedElement::at(node, reason.to_owned()));
                 }
                 let (left, top) = (number("x")?, number("y")?);
                 let (right, bottom) = (left + number("width")?, top + number("height")?);
@@ -304,7 +314,7 @@ impl FloorPlan {
                 let is_round = drawn.scale.0.abs() == drawn.scale.1.abs();
                 if !drawn.is_filled || !is_round {
                     let reason = "only filled, round circles can be read";
-                    return Err(Refused::at(node, reason.to_owned()));
+                    return Err(RefusedElement::at(node, reason.to_owned()));
                 }
                 let at = page.place(drawn, number("cx")?, number("cy")?);
                 let radius_m = number("r")? * drawn.scale.0.abs() * page.unit_m;
@@ -320,7 +330,7 @@ impl FloorPlan {
                 let list = numbers(text).filter(|list| list.len().is_multiple_of(2));
                 let Some(list) = list else {
                     let reason = "points are not pairs of numbers";
-                    return Err(Refused::at(node, reason.to_owned()));
+                    return Err(RefusedElement::at(node, reason.to_owned()));
                 };
                 let points = list.chunks_exact(2);
                 let points: Vec<_> = points.map(|at| page.place(drawn, at[0], at[1])).collect();
@@ -328,7 +338,7 @@ impl FloorPlan {
             }
             "path" => {
                 let lines = path(node.attribute("d").unwrap_or(""))
-                    .map_err(|reason| Refused::at(node, reason))?;
+                    .map_err(|reason| RefusedElement::at(node, reason))?;
                 for (points, is_closed) in lines {
                     let points = points.into_iter();
                     let points: Vec<_> = points.map(|(x, y)| page.place(drawn, x, y)).collect();
@@ -339,7 +349,7 @@ impl FloorPlan {
                 let reason = format!(
                     "<{name}> cannot be read as part of a floor plan: use rect, circle, line, polyline, polygon, or path of straight lines"
                 );
-                return Err(Refused::at(node, reason));
+                return Err(RefusedElement::at(node, reason));
             }
         }
         Ok(())
@@ -441,7 +451,7 @@ fn property<'a>(node: Node<'a, '_>, name: &str) -> Option<&'a str> {
 }
 
 /// A number of an attribute; 0 without it.
-fn attribute(node: Node<'_, '_>, name: &str) -> Result<f64, Refused> {
+fn attribute(node: Node<'_, '_>, name: &str) -> Result<f64, RefusedElement> {
     let text = node.attribute(name).unwrap_or("0");
     let number = text
         .trim()
@@ -450,7 +460,7 @@ fn attribute(node: Node<'_, '_>, name: &str) -> Result<f64, Refused> {
         .filter(|number: &f64| number.is_finite());
     number.ok_or_else(|| {
         let reason = format!("{name} is {text:?}, and not a number in the units of the drawing");
-        Refused::at(node, reason)
+        RefusedElement::at(node, reason)
     })
 }
 

@@ -23,7 +23,7 @@ use std::path::Path;
 pub use config::diagnostic;
 pub use config::{Changes, Override};
 use config::{FileError, Source};
-use observe::{Expectation, Setting};
+use observe::{Expectation, RunSetting};
 pub use protocol::messages::OnLate;
 
 pub use by_hand::kind_in_words;
@@ -43,7 +43,7 @@ pub use sites::{OnConflict, SiteSpec, SiteVariable};
 ///
 /// # Errors
 /// [`FileError`] with file, line and caret; if there are none.
-pub fn expectations(source: &Source, setting: &Setting) -> Result<Vec<Expectation>, FileError> {
+pub fn expectations(source: &Source, setting: &RunSetting) -> Result<Vec<Expectation>, FileError> {
     let file: raw::Expectations = source.parse()?;
     let expectations = file.check(source, setting)?;
     if expectations.is_empty() {
@@ -127,7 +127,7 @@ impl Scenario {
         self.seed = seed;
         let placed = placing::place_at_random(&mut self);
         placed.map_err(|error| FileError::new(format!("with the seed {seed}, {error}")))?;
-        sites::place_at_random(&mut self)
+        placing::place_sites_at_random(&mut self)
             .map_err(|(_, error)| FileError::new(format!("with the seed {seed}, {error}")))?;
         Ok(self)
     }

@@ -105,6 +105,40 @@ pub(super) fn place_at_random(scenario: &mut Scenario) -> Result<(), PlacingErro
     Ok(())
 }
 
+/// Places the sites whose places are random, each by a stream of its own, where a body is inside the field and on no obstacle.
+/// Sites are not solid: they hinder neither each other nor robots.
+///
+/// # Errors
+/// The name of a site that has no place, and why.
+pub(super) fn place_sites_at_random(scenario: &mut Scenario) -> Result<(), (String, String)> {
+    let is_any_random = scenario.sites.values().any(|site| site.drawn.is_some());
+    if !is_any_random {
+        return Ok(());
+    }
+
+    let mut hall = scenario.hall();
+    hall.robots.clear();
+    let placer = Placer::new(&hall);
+    let seed = scenario.seed;
+    for (name, site) in &mut scenario.sites {
+        let Some(region) = site.drawn else {
+            continue;
+        };
+        let refuse = |reason: String| (name.clone(), reason);
+        // What is placed in a copy leaves no trace.
+        let mut placer = placer.clone().map_err(|error| refuse(error.to_string()))?;
+        let mut stream = protocol::random::stream(seed, &format!("at/{name}"));
+        let at = placer.place(None, region, &mut stream).ok_or_else(|| {
+            refuse(format!(
+                "there is no free place for site {name} in {} draws: the field is too full",
+                Placer::TRIES
+            ))
+        })?;
+        site.at = to_wire(at);
+    }
+    Ok(())
+}
+
 impl PlacingError {
     /// An error of a hall with these robots.
     fn of(error: HallError, robots: &[RobotName]) -> Self {

@@ -24,7 +24,7 @@ use config::bulk::member;
 use config::overrides::merge;
 use config::units::{Length, Speed, Time, quantity};
 use config::{FileError, FixedList, Source, seed, shipped};
-use observe::{Expectation, Setting, TickCondition};
+use observe::{Expectation, RunSetting, TickCondition};
 use protocol::messages::{DisplayUnit, OnLate, Parameters};
 use protocol::{RobotName, Tick};
 use serde::{Deserialize, Serialize};
@@ -49,7 +49,6 @@ use super::change::Parent;
 use super::checked::{self, DEFAULT_SEED, RecordContents, RobotSpec, to_wire, to_world};
 use super::lateness::Lateness;
 use super::placing::{self, PlacingCause, PlacingError};
-use super::sites;
 
 /// Most ticks of a scenario.
 const MAX_TICKS: f64 = 1e9;
@@ -239,7 +238,7 @@ impl ScenarioFile {
         let record = record(self.record, source)?;
         let network = network::check(self.network, &robots, tick_s, source)?;
         let faults = fault::check(self.faults, &robots, &lateness, tick_s, settled, source)?;
-        let setting = Setting {
+        let setting = RunSetting {
             tick_s,
             ticks,
             field_m: size.0.map(|length| length.0),
@@ -282,7 +281,7 @@ impl ScenarioFile {
             FileError::at(source, places.of_error(&error), &error.to_string())
         };
         placing::place_at_random(&mut scenario).map_err(refuse)?;
-        sites::place_at_random(&mut scenario).map_err(|(site, reason)| {
+        placing::place_sites_at_random(&mut scenario).map_err(|(site, reason)| {
             FileError::at(source, site_spans.get(&site).cloned(), &reason)
         })?;
         if settled == 0 {

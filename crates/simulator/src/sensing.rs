@@ -12,7 +12,7 @@ use world::{Opaque, Point, World, is_hidden};
 const RANGE_STEPS_PER_M: f64 = 10_000.0;
 
 /// A robot that looks around in a tick.
-pub(crate) struct Observer<'a> {
+pub(crate) struct Viewpoint<'a> {
     sensing: &'a Sensing,
     seed: u64,
     tick: Tick,
@@ -24,7 +24,7 @@ pub(crate) struct Observer<'a> {
     opaque: Vec<(Option<usize>, Opaque)>,
 }
 
-impl<'a> Observer<'a> {
+impl<'a> Viewpoint<'a> {
     /// A robot at a place. Nothing that it senses is farther away than `reach_m`.
     pub(crate) fn new<R>(
         scenario: &'a Scenario,

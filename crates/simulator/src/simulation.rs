@@ -22,7 +22,7 @@ use world::{Body, HallError, MoveOutcome, Reaction, World};
 use crate::digest::{Digest, TickDigest};
 use crate::guests::GuestState;
 use crate::medium::{Arrival, Medium, SentCommand};
-use crate::sensing::{Observer, ranges_m};
+use crate::sensing::{Viewpoint, ranges_m};
 use crate::sites::{SiteOrders, Sites, most_bytes};
 use scenario::{Change, FaultEnd, Lateness, Override, Scenario, to_wire, to_world};
 
@@ -1086,9 +1086,9 @@ impl Simulation {
     }
 
     /// A robot as it looks around in the tick in progress.
-    fn observer(&self, of: usize) -> Observer<'_> {
+    fn observer(&self, of: usize) -> Viewpoint<'_> {
         let reach_m = self.scenario.sensing.range_m.max(self.sites.reach_m());
-        Observer::new(
+        Viewpoint::new(
             &self.scenario,
             &self.world,
             self.now,
@@ -1119,7 +1119,7 @@ impl Simulation {
     }
 
     /// The sites that a robot senses, the first of them by name that fit into its news.
-    fn sensed_sites(&self, of: usize, observer: &Observer<'_>) -> Vec<SensedSite> {
+    fn sensed_sites(&self, of: usize, observer: &Viewpoint<'_>) -> Vec<SensedSite> {
         let mut sensed = Vec::new();
         let mut bytes = 0;
         for site in self.sites.near(to_wire(self.world.robots()[of])) {
@@ -1139,7 +1139,7 @@ impl Simulation {
     }
 
     /// All bodies within a robot's sensing range, if its news contain them.
-    fn sensed_bodies(&self, of: usize, observer: &Observer<'_>) -> Vec<SensedBody> {
+    fn sensed_bodies(&self, of: usize, observer: &Viewpoint<'_>) -> Vec<SensedBody> {
         if !self.with_bodies.contains(&self.names[of]) {
             return Vec::new();
         }
@@ -1173,7 +1173,7 @@ impl Simulation {
     }
 
     /// Where a robot senses another one that is within range.
-    fn senses_robot(&self, observer: &Observer<'_>, other: usize) -> Option<world::Point> {
+    fn senses_robot(&self, observer: &Viewpoint<'_>, other: usize) -> Option<world::Point> {
         let what = format_args!("robot/{}", self.names[other]);
         observer.senses(what, self.world.robots()[other], None)
     }
@@ -1196,7 +1196,7 @@ impl Simulation {
         near.filter_map(robot).collect()
     }
 
-    fn sensed_robots(&self, of: usize, observer: &Observer<'_>) -> Vec<SensedRobot> {
+    fn sensed_robots(&self, of: usize, observer: &Viewpoint<'_>) -> Vec<SensedRobot> {
         let robots = self.world.robots();
         let mut sensed = Vec::new();
         for other in self.robots_around(of) {

@@ -320,8 +320,15 @@ impl World {
         }
         let mut sent = BTreeMap::new();
         for (name, (_, commands)) in &outcome.reports {
-            if !commands.is_empty() {
-                sent.insert(name.clone(), commands.len());
+            // A broadcast is recorded as a command to each other robot.
+            let others = self.simulator.barrier.roster().count() - 1;
+            let count = commands.iter().map(|sent| match sent.to {
+                Target::Robot(_) => 1,
+                Target::Others => others,
+            });
+            let count: usize = count.sum();
+            if count > 0 {
+                sent.insert(name.clone(), count);
             }
         }
         let passed_on = std::mem::take(&mut self.simulator.passed_on);

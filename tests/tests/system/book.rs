@@ -211,7 +211,7 @@ fn the_examples_of_files_are_right() {
     }
     files.extend(examples("launch-files.md"));
     files.extend(examples("first-experiment.md"));
-    assert_eq!(files.len(), 11);
+    assert_eq!(files.len(), 17);
 
     let lab = Lab::new();
     for file in files {

@@ -8,8 +8,9 @@ use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{
     Answer, Clock, Command, Control, ControlAnswer, FaultOrder, JoinAnswer, JoinRequest, LogRecord,
-    MAX_ENTRIES, MAX_LINE_BYTES, MAX_TEXT_BYTES, MAX_WIDGETS, Panel, PublicState, Report,
-    TickUpdate, Waiting, WorldFrame,
+    MAX_ENTRIES, MAX_LINE_BYTES, MAX_PAYLOAD_BYTES, MAX_PAYLOAD_DEPTH, MAX_SITE_ACTIONS,
+    MAX_SITE_VARIABLES, MAX_TEXT_BYTES, MAX_WIDGETS, Panel, PublicState, Report, TickUpdate,
+    Waiting, WorldFrame,
 };
 use protocol::name::MAX_NAME_LEN;
 use protocol::random::{MAX_SEED, stream, unit};
@@ -224,9 +225,17 @@ fn limits_times_and_version_are_those_of_the_code() {
     let limits: Vec<&str> = rows.iter().map(|row| row[1].as_str()).collect();
     let expected = [
         format!("{MAX_MESSAGE_BYTES} bytes"),
+        format!(
+            "{MAX_SITE_ACTIONS}, each with {MAX_SITE_VARIABLES} variables to set, to add to and to compare"
+        ),
+        format!("{MAX_NAME_LEN} bytes"),
         format!("{MAX_TEXT_BYTES} bytes"),
         format!("{MAX_LINE_BYTES} bytes"),
         MAX_ENTRIES.to_string(),
+        format!(
+            "{MAX_PAYLOAD_BYTES} bytes, {MAX_PAYLOAD_DEPTH} lists and objects within one another"
+        ),
+        "524288 bytes".to_owned(),
         MAX_WIDGETS.to_string(),
         format!("{MAX_NAME_LEN} bytes"),
         "below 2^53".to_owned(),
@@ -424,7 +433,7 @@ fn check_line(key: &str, line: &Value) -> Result<(), Malformed> {
     if key.contains("/alive/") {
         return Ok(());
     }
-    if key.contains("/command/") {
+    if key.contains("/command/") || key.ends_with("/outbox") {
         return check::<Command>(&message);
     }
     if key.contains("/join") {

@@ -446,7 +446,7 @@ const WRONG: [Wrong<'_>; 67] = [
         "event = \"behavior\", robot = \"Butler\", to = \"EXCHANGE\"",
         "event = \"blocked\", by = \"gest\"",
         "count",
-        "is never \"gest\": it is one of edge, obstacle, guest, too_fast, or a table",
+        "is never \"gest\": it is one of edge, wall, obstacle, guest, too_fast, or a table",
     ),
     (
         "count = {",
@@ -649,7 +649,12 @@ fn every_example_of_the_page_is_good() {
                     set: settings.into_iter().map(|setting| setting.change).collect(),
                     ..config::Changes::default()
                 };
-                let scenario = Scenario::load(&root.join("configs/hors_doeuvres.toml"), &changes);
+                // Examples with robots in bulk are about a scenario that has some.
+                let file = match block.contains("robot.S.count") {
+                    true => "configs/recruitment.toml",
+                    false => "configs/hors_doeuvres.toml",
+                };
+                let scenario = Scenario::load(&root.join(file), &changes);
                 let complete = scenario.and_then(|scenario| experiment.complete(scenario));
                 assert!(complete.is_ok(), "{block}: {:?}", complete.err());
             }

@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 use tempfile::NamedTempFile;
 
 use super::links::{Links, Start, own_path};
-use super::shape::{Flow, Shape};
+use super::shape::{Flow, LinkShape};
 use crate::child::{self, AtExit};
 use crate::error::LaunchError;
 
@@ -128,7 +128,7 @@ impl Links for Compose {
         Ok(command)
     }
 
-    fn set(&mut self, process: &str, shape: Shape) -> Result<(), LaunchError> {
+    fn set(&mut self, process: &str, shape: LinkShape) -> Result<(), LaunchError> {
         if shape.flow == Flow::Open {
             self.connect(process)
         } else {

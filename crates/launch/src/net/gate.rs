@@ -3,7 +3,7 @@
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use super::shape::{Flow, Shape};
+use super::shape::{Flow, LinkShape};
 
 /// The shape of a link. Threads can wait for it to change.
 #[derive(Debug, Default)]
@@ -14,7 +14,7 @@ pub(super) struct Gate {
 
 #[derive(Debug, Default)]
 struct GateState {
-    shape: Shape,
+    shape: LinkShape,
     /// When the first connection was accepted.
     first_use: Option<Instant>,
 }
@@ -25,12 +25,12 @@ impl Gate {
     }
 
     /// The current shape.
-    pub(super) fn shape(&self) -> Shape {
+    pub(super) fn shape(&self) -> LinkShape {
         self.state().shape
     }
 
     /// Changes the shape.
-    pub(super) fn set(&self, shape: Shape) {
+    pub(super) fn set(&self, shape: LinkShape) {
         self.state().shape = shape;
         self.changed.notify_all();
     }
@@ -81,7 +81,7 @@ impl LinkSchedule {
     }
 
     /// When a piece that arrives at `now` may leave a link with this shape. `luck`, from 0 to 1, is its part of the jitter.
-    pub(super) fn due(&mut self, now: Instant, shape: Shape, luck: f64) -> Instant {
+    pub(super) fn due(&mut self, now: Instant, shape: LinkShape, luck: f64) -> Instant {
         let due = now + shape.delay + shape.jitter.mul_f64(luck);
         // Never before the piece ahead, however small its own jitter: a stream keeps its order.
         self.last = self.last.max(due);
@@ -89,14 +89,14 @@ impl LinkSchedule {
     }
 
     /// When `bytes` that begin to leave at `now` have been sent.
-    pub(super) fn sent(&mut self, now: Instant, shape: Shape, bytes: usize) -> Instant {
+    pub(super) fn sent(&mut self, now: Instant, shape: LinkShape, bytes: usize) -> Instant {
         self.last = self.last.max(now) + transmission(shape, bytes);
         self.last
     }
 }
 
 /// How long a link takes to send this number of bytes.
-fn transmission(shape: Shape, bytes: usize) -> Duration {
+fn transmission(shape: LinkShape, bytes: usize) -> Duration {
     let Some(bps) = shape.bandwidth_bps else {
         return Duration::ZERO;
     };
@@ -115,10 +115,10 @@ mod tests {
         let ms = Duration::from_millis;
         let mut pace = LinkSchedule::new();
         let now = pace.last;
-        let shape = Shape {
+        let shape = LinkShape {
             delay: ms(50),
             jitter: ms(10),
-            ..Shape::default()
+            ..LinkShape::default()
         };
         assert_eq!(pace.due(now, shape, 1.0), now + ms(60));
         assert_eq!(
@@ -133,9 +133,9 @@ mod tests {
     fn bandwidth_limits_every_byte() {
         let mut pace = LinkSchedule::new();
         let now = pace.last;
-        let shape = Shape {
+        let shape = LinkShape {
             bandwidth_bps: Some(8000),
-            ..Shape::default()
+            ..LinkShape::default()
         };
         assert_eq!(pace.sent(now, shape, 500), now + Duration::from_millis(500));
         assert_eq!(pace.sent(now, shape, 500), now + Duration::from_secs(1));

@@ -6,7 +6,7 @@ use std::process::Command;
 
 use protocol::RunName;
 
-use super::shape::Shape;
+use super::shape::LinkShape;
 use crate::error::LaunchError;
 use crate::link::ProcessLink;
 use crate::options::RunOptions;
@@ -42,5 +42,5 @@ pub(super) trait Links {
     /// The command that starts the launch over these links.
     fn command(&self, start: &Start) -> Result<Command, LaunchError>;
     /// Changes the shape of a process's link.
-    fn set(&mut self, process: &str, shape: Shape) -> Result<(), LaunchError>;
+    fn set(&mut self, process: &str, shape: LinkShape) -> Result<(), LaunchError>;
 }

@@ -17,7 +17,7 @@ use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 
 use super::links::{Links, Start, own_path};
-use super::shape::{Flow, Shape};
+use super::shape::{Flow, LinkShape};
 use crate::child::{self, AtExit};
 use crate::error::LaunchError;
 use crate::file::Process;
@@ -154,7 +154,7 @@ impl Links for Namespaces {
         Ok(command)
     }
 
-    fn set(&mut self, process: &str, shape: Shape) -> Result<(), LaunchError> {
+    fn set(&mut self, process: &str, shape: LinkShape) -> Result<(), LaunchError> {
         let index = self.processes.iter().position(|name| name == process);
         let index = index.ok_or_else(|| LaunchError::refused(format!("no link of {process}")))?;
         let switch = self.switch();

@@ -13,7 +13,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 use toml::Spanned;
 
-use super::shape::{Flow, Shape, duration};
+use super::shape::{Flow, LinkShape, duration};
 
 /// A plan of faults that has been checked.
 #[derive(Debug, Clone)]
@@ -27,7 +27,7 @@ struct LinkFault {
     robot: RobotName,
     begin: Duration,
     end: Duration,
-    shape: Shape,
+    shape: LinkShape,
 }
 
 #[derive(Debug, Deserialize)]
@@ -143,7 +143,7 @@ impl FaultPlan {
                     robot: robot.clone(),
                     begin,
                     end,
-                    shape: Shape::of_flow(Flow::Cut),
+                    shape: LinkShape::of_flow(Flow::Cut),
                 });
             }
         }
@@ -171,8 +171,8 @@ impl FaultPlan {
     }
 
     /// The shape of a robot's link at a time: all current faults together.
-    pub(super) fn shape(&self, robot: &RobotName, at: Duration) -> Shape {
-        let mut shape = Shape::default();
+    pub(super) fn shape(&self, robot: &RobotName, at: Duration) -> LinkShape {
+        let mut shape = LinkShape::default();
         for fault in &self.faults {
             if fault.robot == *robot && (fault.begin..fault.end).contains(&at) {
                 shape = shape.and(fault.shape);
@@ -202,10 +202,10 @@ impl FaultPlan {
     pub fn play<E>(
         &self,
         begun: Instant,
-        mut apply: impl FnMut(&RobotName, Shape, Duration) -> Result<(), E>,
+        mut apply: impl FnMut(&RobotName, LinkShape, Duration) -> Result<(), E>,
         mut is_over: impl FnMut() -> bool,
     ) -> Result<(), E> {
-        let mut now: BTreeMap<&RobotName, Shape> = BTreeMap::new();
+        let mut now: BTreeMap<&RobotName, LinkShape> = BTreeMap::new();
         for at in self.changes() {
             while begun.elapsed() < at {
                 if is_over() {
@@ -300,24 +300,24 @@ fn time(source: &Source, time: &Spanned<Time>) -> Result<Duration, FileError> {
     duration(*time.get_ref()).map_err(|reason| FileError::at(source, Some(time.span()), &reason))
 }
 
-fn shape(raw: RawShape) -> Result<Shape, String> {
+fn shape(raw: RawShape) -> Result<LinkShape, String> {
     let slow = match raw {
-        RawShape::Word(PlanWord::Cut) => return Ok(Shape::of_flow(Flow::Cut)),
-        RawShape::Word(PlanWord::Close) => return Ok(Shape::of_flow(Flow::Closed)),
+        RawShape::Word(PlanWord::Cut) => return Ok(LinkShape::of_flow(Flow::Cut)),
+        RawShape::Word(PlanWord::Close) => return Ok(LinkShape::of_flow(Flow::Closed)),
         RawShape::Slow(slow) => slow,
     };
-    let shape = Shape {
+    let shape = LinkShape {
         delay: slow.delay.map_or(Ok(Duration::ZERO), duration)?,
         jitter: slow.jitter.map_or(Ok(Duration::ZERO), duration)?,
         bandwidth_bps: slow.bandwidth_bps,
-        ..Shape::default()
+        ..LinkShape::default()
     };
 
     if slow.bandwidth_bps == Some(0) {
         return Err("a bandwidth is above zero; to let nothing through, write \"cut\"".to_owned());
     }
 
-    if shape == Shape::default() {
+    if shape == LinkShape::default() {
         return Err("this fault does nothing".to_owned());
     }
 

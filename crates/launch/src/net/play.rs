@@ -22,7 +22,7 @@ use super::links::{Links, Start};
 use super::namespaces::{self, Namespaces};
 use super::plan::FaultPlan;
 use super::proxy::{self, Proxy};
-use super::shape::Shape;
+use super::shape::LinkShape;
 use crate::child::{self, AtExit};
 use crate::endpoint;
 use crate::error::LaunchError;
@@ -105,7 +105,7 @@ impl Links for Proxies {
         Ok(command)
     }
 
-    fn set(&mut self, process: &str, shape: Shape) -> Result<(), LaunchError> {
+    fn set(&mut self, process: &str, shape: LinkShape) -> Result<(), LaunchError> {
         let proxy = self.proxies.get(process);
         let proxy = proxy.ok_or_else(|| LaunchError::refused(format!("no link of {process}")))?;
         proxy.set(shape);
@@ -276,7 +276,7 @@ struct LinkRecord<'a> {
     /// Wall clock since the first tick, s.
     time_s: f64,
     robot: &'a RobotName,
-    link: Shape,
+    link: LinkShape,
     /// The last tick in the record at that time.
     tick: Option<u64>,
 }
@@ -300,7 +300,7 @@ impl LinkPlayer<'_> {
         let path = self.folder.file(LINKS);
         let mut record = File::create_new(&path).map_err(LaunchError::path("make", &path))?;
 
-        let apply = |robot: &RobotName, shape: Shape, _| {
+        let apply = |robot: &RobotName, shape: LinkShape, _| {
             links.set(&self.process_of[robot], shape)?;
 
             let entry = LinkRecord {

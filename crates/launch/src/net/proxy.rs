@@ -15,7 +15,7 @@ use protocol::random::{stream, unit};
 
 use super::gate::{Gate, LinkSchedule};
 use super::plan::FaultPlan;
-use super::shape::{Flow, Shape};
+use super::shape::{Flow, LinkShape};
 use crate::endpoint::NO_PORT;
 use crate::error::LaunchError;
 
@@ -114,14 +114,14 @@ impl Proxy {
 
     /// The current shape of the link.
     #[must_use]
-    pub fn shape(&self) -> Shape {
+    pub fn shape(&self) -> LinkShape {
         self.gate.shape()
     }
 
     /// Plays the faults of a plan, the times of which begin with the first connection. `apply` receives each shape and the
     /// time since then.
-    pub fn play(&self, plan: &FaultPlan, mut apply: impl FnMut(Shape, Duration)) {
-        let apply = |_: &RobotName, shape: Shape, at: Duration| {
+    pub fn play(&self, plan: &FaultPlan, mut apply: impl FnMut(LinkShape, Duration)) {
+        let apply = |_: &RobotName, shape: LinkShape, at: Duration| {
             apply(shape, at);
             Ok::<(), std::convert::Infallible>(())
         };
@@ -129,7 +129,7 @@ impl Proxy {
     }
 
     /// Changes the shape of the link.
-    pub fn set(&self, shape: Shape) {
+    pub fn set(&self, shape: LinkShape) {
         self.gate.set(shape);
         if shape.flow == Flow::Closed {
             self.open.close_all();
@@ -343,9 +343,9 @@ mod tests {
         client.write_all(b"one").unwrap();
         assert_eq!(receive(&mut server, 3), b"one");
 
-        proxy.set(Shape {
+        proxy.set(LinkShape {
             flow: Flow::Cut,
-            ..Shape::default()
+            ..LinkShape::default()
         });
         client.write_all(b"two").unwrap();
         server.write_all(b"back").unwrap();
@@ -354,7 +354,7 @@ mod tests {
             "nothing passes a cut"
         );
 
-        proxy.set(Shape::default());
+        proxy.set(LinkShape::default());
         assert_eq!(receive(&mut server, 3), b"two");
         assert_eq!(receive(&mut client, 4), b"back");
 
@@ -368,9 +368,9 @@ mod tests {
         let listener = TcpListener::bind(("127.0.0.1", 0)).unwrap();
         let proxy =
             Proxy::start(([127, 0, 0, 1], 0).into(), listener.local_addr().unwrap()).unwrap();
-        proxy.set(Shape {
+        proxy.set(LinkShape {
             flow: Flow::Cut,
-            ..Shape::default()
+            ..LinkShape::default()
         });
         let mut client = TcpStream::connect(proxy.local).unwrap();
         client.write_all(b"hello").unwrap();
@@ -378,7 +378,7 @@ mod tests {
         std::thread::sleep(SHORT);
         assert!(listener.accept().is_err(), "a connection passed the cut");
         listener.set_nonblocking(false).unwrap();
-        proxy.set(Shape::default());
+        proxy.set(LinkShape::default());
         assert_eq!(receive(&mut listener.accept().unwrap().0, 5), b"hello");
     }
 
@@ -388,9 +388,9 @@ mod tests {
         client.write_all(b"one").unwrap();
         assert_eq!(receive(&mut server, 3), b"one");
 
-        proxy.set(Shape {
+        proxy.set(LinkShape {
             flow: Flow::Closed,
-            ..Shape::default()
+            ..LinkShape::default()
         });
         assert_eq!(server.read(&mut [0]).unwrap(), 0);
         assert_eq!(client.read(&mut [0]).unwrap(), 0);
@@ -405,10 +405,10 @@ mod tests {
     fn delay_and_bandwidth_take_effect() {
         let (proxy, mut client, mut server) = link();
         let delay = Duration::from_millis(80);
-        proxy.set(Shape {
+        proxy.set(LinkShape {
             delay,
             jitter: delay / 8,
-            ..Shape::default()
+            ..LinkShape::default()
         });
         let sent = Instant::now();
         client.write_all(b"ping").unwrap();
@@ -418,9 +418,9 @@ mod tests {
         let took = sent.elapsed();
         assert!(took >= 2 * delay, "the round trip took {took:?}");
         // 4,000 bytes at 80 kbit/s: 0.4 s.
-        proxy.set(Shape {
+        proxy.set(LinkShape {
             bandwidth_bps: Some(80_000),
-            ..Shape::default()
+            ..LinkShape::default()
         });
         let sent = Instant::now();
         client.write_all(&[7; 4000]).unwrap();

@@ -20,7 +20,7 @@ pub enum Flow {
 
 /// The shape of a link; by default it is open and unlimited.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Shape {
+pub struct LinkShape {
     /// Whether bytes pass.
     pub flow: Flow,
     /// Delay of every byte in each direction.
@@ -31,7 +31,7 @@ pub struct Shape {
     pub bandwidth_bps: Option<u64>,
 }
 
-impl Shape {
+impl LinkShape {
     /// A link with this flow, without delay and limit.
     pub(super) fn of_flow(flow: Flow) -> Self {
         Self {
@@ -58,7 +58,7 @@ impl Shape {
     }
 }
 
-impl std::fmt::Display for Shape {
+impl std::fmt::Display for LinkShape {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         if *self == Self::default() {
             return f.write_str("whole");
@@ -84,7 +84,7 @@ impl std::fmt::Display for Shape {
     }
 }
 
-impl Serialize for Shape {
+impl Serialize for LinkShape {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_str(self)
     }
@@ -128,7 +128,7 @@ const ORDERS: &str = "cut, close, heal, delay TIME [JITTER], bandwidth BITS_PER_
 impl LinkOrder {
     /// The shape with this change.
     #[must_use]
-    pub fn apply(self, mut shape: Shape) -> Shape {
+    pub fn apply(self, mut shape: LinkShape) -> LinkShape {
         match self {
             Self::Flow(flow) => shape.flow = flow,
             Self::Delay { delay, jitter } => {
@@ -195,7 +195,7 @@ mod tests {
 
     #[test]
     fn an_order_changes_one_property_and_keeps_the_others() {
-        let mut shape = Shape::default();
+        let mut shape = LinkShape::default();
         for (line, shown) in [
             ("delay 50ms 10ms", "delay 50ms, jitter 10ms"),
             ("cut", "cut, delay 50ms, jitter 10ms"),
@@ -231,27 +231,27 @@ mod tests {
 
     #[test]
     fn two_faults_at_the_same_time_add_up() {
-        let slow = Shape {
+        let slow = LinkShape {
             delay: 50 * MS,
             bandwidth_bps: Some(1000),
-            ..Shape::default()
+            ..LinkShape::default()
         };
-        let cut = Shape {
+        let cut = LinkShape {
             flow: Flow::Cut,
             delay: MS,
             bandwidth_bps: Some(10),
-            ..Shape::default()
+            ..LinkShape::default()
         };
-        let both = Shape {
+        let both = LinkShape {
             flow: Flow::Cut,
             delay: 51 * MS,
             bandwidth_bps: Some(10),
-            ..Shape::default()
+            ..LinkShape::default()
         };
 
         assert_eq!(slow.and(cut), both);
         assert_eq!(cut.and(slow), both);
         assert!(!both.is_plain_cut());
-        assert!(Shape::of_flow(Flow::Cut).is_plain_cut());
+        assert!(LinkShape::of_flow(Flow::Cut).is_plain_cut());
     }
 }

@@ -3,7 +3,7 @@
 use config::units::Time;
 use serde::{Deserialize, Serialize};
 
-use crate::Setting;
+use crate::RunSetting;
 use crate::condition::{self, TickCondition};
 use crate::pattern::Pattern;
 use crate::words::Word;
@@ -332,7 +332,7 @@ impl Expectation {
     ///
     /// # Errors
     /// [`ExpectError::UnknownRobot`] and [`ExpectError::Condition`].
-    pub fn check(&self, setting: &Setting) -> Result<(), ExpectError> {
+    pub fn check(&self, setting: &RunSetting) -> Result<(), ExpectError> {
         let (conditions, patterns) = self.parts();
         for condition in conditions {
             condition.check(setting)?;
@@ -353,7 +353,7 @@ impl Expectation {
     }
 
     /// Checks it as an entry that follows others.
-    fn check_beside(&self, before: &[Self], setting: &Setting) -> Result<(), ExpectError> {
+    fn check_beside(&self, before: &[Self], setting: &RunSetting) -> Result<(), ExpectError> {
         if before.len() >= MAX_EXPECTATIONS {
             return Err(ExpectError::TooMany);
         }
@@ -410,7 +410,7 @@ pub struct WrongEntry {
 ///
 /// # Errors
 /// [`WrongEntry`], the first one.
-pub fn check_all(expectations: &[Expectation], setting: &Setting) -> Result<(), WrongEntry> {
+pub fn check_all(expectations: &[Expectation], setting: &RunSetting) -> Result<(), WrongEntry> {
     for (index, expectation) in expectations.iter().enumerate() {
         let before = &expectations[..index];
         expectation

@@ -7,7 +7,7 @@ use protocol::{Event, Tick};
 
 use super::rule::{Expectation, Rule};
 use crate::condition::{Evaluation, first_event, place, shortened};
-use crate::{Observation, Setting};
+use crate::{Observation, RunSetting};
 
 /// A verdict and its reason.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -68,7 +68,7 @@ struct OpenCheck {
 impl Monitor {
     /// Begins to watch a run.
     #[must_use]
-    pub fn new(expectation: &Expectation, setting: &Setting) -> Self {
+    pub fn new(expectation: &Expectation, setting: &RunSetting) -> Self {
         let rule = expectation.rule.clone();
         let condition = match &rule {
             Rule::Never(condition) | Rule::Always(condition) => condition,
@@ -329,7 +329,7 @@ struct Monitored {
 impl Monitors {
     /// Begins to watch a run.
     #[must_use]
-    pub fn new(expectations: &[Expectation], setting: &Setting) -> Self {
+    pub fn new(expectations: &[Expectation], setting: &RunSetting) -> Self {
         let mut watches = Vec::new();
         for expectation in expectations {
             watches.push(Monitored {

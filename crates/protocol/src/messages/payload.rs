@@ -30,9 +30,9 @@ pub const MAX_PAYLOAD_DEPTH: usize = 64;
 /// assert_eq!(bid.as_json(), r#"{"bid":0.1,"task":3}"#);
 /// ```
 #[derive(Clone)]
-pub struct Payload(Arc<Content>);
+pub struct Payload(Arc<PayloadContent>);
 
-struct Content {
+struct PayloadContent {
     value: Value,
     json: String,
 }
@@ -46,7 +46,7 @@ impl Payload {
         }
 
         let json = value.to_string();
-        Some(Self(Arc::new(Content { value, json })))
+        Some(Self(Arc::new(PayloadContent { value, json })))
     }
 
     /// The payload that a value is in JSON.

@@ -111,7 +111,8 @@ pub(crate) struct Stage {
 impl Stage {
     /// The field before tick 0.
     pub(crate) fn new(seed: u64, cast: Vec<Role>) -> Self {
-        let roster: Vec<RobotName> = cast.iter().map(|role| name(role.name)).collect();
+        let mut roster: Vec<RobotName> = cast.iter().map(|role| name(role.name)).collect();
+        roster.sort();
         let places = cast.iter().map(|role| (name(role.name), role.at)).collect();
         let with_bodies = cast
             .iter()

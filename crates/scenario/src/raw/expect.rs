@@ -2,14 +2,14 @@
 
 use config::{FileError, Source};
 use observe::expect::check_all;
-use observe::{Expectation, Setting, TickCondition};
+use observe::{Expectation, RunSetting, TickCondition};
 use serde::Deserialize;
 use toml::Spanned;
 
 /// Checks the expectations of a scenario.
 pub(super) fn check(
     raw: Vec<Spanned<Expectation>>,
-    setting: &Setting,
+    setting: &RunSetting,
     source: &Source,
 ) -> Result<Vec<Expectation>, FileError> {
     let mut expectations = Vec::new();
@@ -29,7 +29,7 @@ pub(super) fn check(
 /// Checks when the run of a scenario ends.
 pub(super) fn check_end(
     raw: Option<Spanned<TickCondition>>,
-    setting: &Setting,
+    setting: &RunSetting,
     source: &Source,
 ) -> Result<Option<TickCondition>, FileError> {
     let Some(raw) = raw else {
@@ -52,7 +52,7 @@ impl Expectations {
     pub(crate) fn check(
         self,
         source: &Source,
-        setting: &Setting,
+        setting: &RunSetting,
     ) -> Result<Vec<Expectation>, FileError> {
         check(self.entries, setting, source)
     }

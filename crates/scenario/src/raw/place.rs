@@ -25,25 +25,25 @@ pub(super) enum StartPlace {
     /// Any free one, by the seed.
     Random,
     /// One of a pattern.
-    Pattern(Box<Pattern>),
+    Pattern(Box<PlacePattern>),
 }
 
 /// A pattern of places. Exactly one of the first six keys is given.
 #[derive(Debug, Clone, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Pattern {
+pub(super) struct PlacePattern {
     #[serde(skip_serializing_if = "Option::is_none")]
     place: Option<Lengths>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    grid: Option<Grid>,
+    grid: Option<GridPlaces>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    line: Option<Line>,
+    line: Option<LinePlaces>,
     #[serde(skip_serializing_if = "Option::is_none")]
     circle: Option<Circle>,
     #[serde(skip_serializing_if = "Option::is_none")]
     cluster: Option<Circle>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    random: Option<Line>,
+    random: Option<LinePlaces>,
     /// How far along x and along y a place is moved at most, by the seed.
     #[serde(skip_serializing_if = "Option::is_none")]
     jitter: Option<Length>,
@@ -57,16 +57,16 @@ pub(super) struct Pattern {
 /// Rows of places, from one corner along x, row by row along y.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-struct Grid {
+struct GridPlaces {
     from: Lengths,
-    step: Step,
+    step: Spacing,
     columns: usize,
 }
 
 /// From the first to the last one; or the corners of a rectangle.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-struct Line {
+struct LinePlaces {
     from: Lengths,
     to: Lengths,
 }
@@ -80,7 +80,7 @@ struct Circle {
 
 /// A length along both axes, or one along each.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Step(pub(super) [Length; 2]);
+pub(super) struct Spacing(pub(super) [Length; 2]);
 
 impl StartPlace {
     /// A place, written out.
@@ -103,24 +103,24 @@ impl StartPlace {
 
         *self = match region {
             Region::Field => Self::Random,
-            Region::Rectangle(from, to) => Self::pattern(Pattern {
-                random: Some(Line {
+            Region::Rectangle(from, to) => Self::pattern(PlacePattern {
+                random: Some(LinePlaces {
                     from: lengths(from),
                     to: lengths(to),
                 }),
-                ..Pattern::none()
+                ..PlacePattern::none()
             }),
-            Region::Disc { center, radius_m } => Self::pattern(Pattern {
+            Region::Disc { center, radius_m } => Self::pattern(PlacePattern {
                 cluster: Some(Circle {
                     center: lengths(center),
                     radius: Length(radius_m),
                 }),
-                ..Pattern::none()
+                ..PlacePattern::none()
             }),
         };
     }
 
-    fn pattern(pattern: Pattern) -> Self {
+    fn pattern(pattern: PlacePattern) -> Self {
         Self::Pattern(Box::new(pattern))
     }
 
@@ -145,7 +145,7 @@ impl StartPlace {
     }
 }
 
-impl Pattern {
+impl PlacePattern {
     fn none() -> Self {
         Self {
             place: None,
@@ -206,7 +206,7 @@ impl Pattern {
             };
             return (Point::default(), Some(region));
         }
-        if let Some(Line { from, to }) = self.random {
+        if let Some(LinePlaces { from, to }) = self.random {
             let region = Region::Rectangle(point(from), point(to));
             return (Point::default(), Some(region));
         }
@@ -224,9 +224,9 @@ impl Pattern {
         let index = self.number.unwrap_or(1) - 1;
         let count = self.of.unwrap_or(1);
 
-        if let Some(Grid {
+        if let Some(GridPlaces {
             from,
-            step: Step([x, y]),
+            step: Spacing([x, y]),
             columns,
         }) = self.grid
         {
@@ -234,7 +234,7 @@ impl Pattern {
             let row = (index / columns) as f64;
             return point(from) + Point::new(x.0 * column, y.0 * row);
         }
-        if let Some(Line { from, to }) = self.line {
+        if let Some(LinePlaces { from, to }) = self.line {
             let share = match count {
                 1 => 0.0,
                 _ => index as f64 / (count - 1) as f64,
@@ -302,19 +302,19 @@ impl<'de> Visitor<'de> for StartPlaceVisitor {
     }
 
     fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<StartPlace, A::Error> {
-        let pattern = Pattern::deserialize(MapAccessDeserializer::new(map))?;
+        let pattern = PlacePattern::deserialize(MapAccessDeserializer::new(map))?;
         pattern.check().map_err(A::Error::custom)?;
         Ok(StartPlace::pattern(pattern))
     }
 }
 
-impl<'de> Deserialize<'de> for Step {
+impl<'de> Deserialize<'de> for Spacing {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         deserializer.deserialize_any(StepVisitor)
     }
 }
 
-impl Serialize for Step {
+impl Serialize for Spacing {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_seq(self.0)
     }
@@ -323,19 +323,19 @@ impl Serialize for Step {
 struct StepVisitor;
 
 impl<'de> Visitor<'de> for StepVisitor {
-    type Value = Step;
+    type Value = Spacing;
 
     fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str("a length such as \"2 m\", or a list of two, such as [\"2 m\", \"1 m\"]")
     }
 
-    fn visit_str<E: Error>(self, text: &str) -> Result<Step, E> {
+    fn visit_str<E: Error>(self, text: &str) -> Result<Spacing, E> {
         let length: Length = text.parse().map_err(E::custom)?;
-        Ok(Step([length; 2]))
+        Ok(Spacing([length; 2]))
     }
 
-    fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<Step, A::Error> {
+    fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<Spacing, A::Error> {
         let FixedList(lengths) = FixedList::deserialize(SeqAccessDeserializer::new(list))?;
-        Ok(Step(lengths))
+        Ok(Spacing(lengths))
     }
 }

@@ -11,7 +11,7 @@ use world::{Shape, WALLS_MAX, Wall};
 
 use super::super::checked::{Obstacle, to_wire, to_world};
 use super::super::floor_plan::{self, Placement};
-use super::place::{Lengths, StartPlace, Step, lengths, point};
+use super::place::{Lengths, Spacing, StartPlace, lengths, point};
 use super::unplaced::unplaced;
 
 /// `[[obstacle]]`: a fixed one, or as many as `count` says.
@@ -28,7 +28,7 @@ pub(super) struct ObstacleTable {
 }
 
 /// Sides along x and along y.
-pub(super) type Size = Step;
+pub(super) type Size = Spacing;
 
 /// `[[wall]]`: straight walls from point to point.
 #[derive(Debug, Deserialize, Serialize)]
@@ -191,7 +191,7 @@ pub(super) fn shape(
     match (size, radius) {
         (None, None) => Ok(None),
         (Some(size), None) => {
-            let Step([width, height]) = *size.get_ref();
+            let Spacing([width, height]) = *size.get_ref();
             Ok(Some(Shape::Rectangle {
                 width_m: width.0,
                 height_m: height.0,
@@ -212,7 +212,7 @@ pub(super) fn keys(shape: Option<Shape>) -> (Option<Spanned<Size>>, Option<Spann
     match shape {
         None => (None, None),
         Some(Shape::Rectangle { width_m, height_m }) => {
-            let size = Step([Length(width_m), Length(height_m)]);
+            let size = Spacing([Length(width_m), Length(height_m)]);
             (Some(unplaced(size)), None)
         }
         Some(Shape::Disc { radius_m }) => (None, Some(unplaced(Length(radius_m)))),

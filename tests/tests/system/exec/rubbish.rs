@@ -24,7 +24,7 @@ const MISHAPS: &[(&str, &str, &[&str])] = &[
         r#"say '{"type":"dance"}'"#,
         &[
             r#"there is no type "dance"; expected is"#,
-            "percept, random",
+            "percept, ranges, random",
         ],
     ),
     (

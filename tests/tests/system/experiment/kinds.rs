@@ -57,7 +57,8 @@ fn all_kinds_of_measures_of_teams_have_numbers() {
         assert!((0.0..=60.0).contains(&number("at_the_table")));
         // Bodies are 2 ft wide, and do not overlap.
         assert!(number("nearest") >= 0.6);
-        assert!(number("fairness_of_distances") > 1.0 / 3.0);
+        // A third if one of the three has walked alone.
+        assert!((0.333..=1.0).contains(&number("fairness_of_distances")));
     }
 }
 
