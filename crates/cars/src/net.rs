@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::{Args, Subcommand, ValueEnum};
-use launch::net::{self, FaultPlan, Flow, LinkOrder, Proxy, LinkShape, address};
+use launch::net::{self, FaultPlan, Flow, LinkOrder, LinkShape, Proxy, address};
 use protocol::RobotName;
 use terminal::OutputError;
 

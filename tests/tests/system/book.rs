@@ -195,6 +195,7 @@ fn examples(page: &str) -> Vec<String> {
 fn the_examples_of_files_are_right() {
     const WAIT: &str = "on_late = \"wait\"";
     const CONTINUE: &str = "on_late = \"continue\"";
+    const DURATION: &str = "duration = \"600 s\"\n";
 
     let mut parts = examples("scenario-files.md");
     let complete = parts.remove(0);
@@ -205,6 +206,8 @@ fn the_examples_of_files_are_right() {
         if part.contains(CONTINUE) {
             let rest = part.replace(CONTINUE, "");
             files.push(complete.replace(WAIT, CONTINUE) + "\n" + &rest);
+        } else if let Some(rest) = part.strip_prefix(DURATION) {
+            files.push(complete.replace(DURATION, &format!("{DURATION}{rest}\n")));
         } else {
             files.push(format!("{complete}\n{part}"));
         }
@@ -214,6 +217,11 @@ fn the_examples_of_files_are_right() {
     assert_eq!(files.len(), 17);
 
     let lab = Lab::new();
+    // A drawing that one of them names.
+    lab.write(
+        "plan.svg",
+        r#"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 900 900"><line x1="500" y1="100" x2="800" y2="100" stroke="black"/></svg>"#,
+    );
     for file in files {
         let path = lab.write("example.toml", &file);
         let (status, text) = lab.cars_without_out(&["check", path.to_str().unwrap()]);

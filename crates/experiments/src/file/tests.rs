@@ -650,7 +650,10 @@ fn every_example_of_the_page_is_good() {
                     ..config::Changes::default()
                 };
                 // Examples with robots in bulk are about a scenario that has some.
-                let file = match block.contains("robot.S.count") {
+                let file = match ["robot.S.", "\"S*\"", "\"S1\""]
+                    .iter()
+                    .any(|name| block.contains(name))
+                {
                     true => "configs/recruitment.toml",
                     false => "configs/hors_doeuvres.toml",
                 };
