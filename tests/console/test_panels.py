@@ -108,7 +108,7 @@ def test_all_of_a_why_can_be_read(launch, open_page, width, height):
     for words in (40, 300):
         why = " ".join(f"reason{number}" for number in range(words))
         run.put_panel("Vonda", [{"widget": "text", "label": "why", "text": why}])
-        expect(text).to_have_text(why)
+        expect(text).to_have_text(f"At 0.0 s, when this began: {why}")
         hidden = text.evaluate(
             "(p) => { p.scrollTop = p.scrollHeight; const range = document.createRange();"
             " const texts = [...p.childNodes].filter((node) => node.nodeType === 3 && node.length); const end = texts.at(-1);"

@@ -678,8 +678,8 @@ def test_the_legend_names_the_emotions_by_color(launch, open_page):
 
 
 MODULES = """async () => {
-  const [{Memory}, {Marks}, {History}, {TimeWindow}, {Store}, {LogView}] = await Promise.all(
-    ['memory', 'marks', 'history', 'window', 'store', 'log'].map((name) => import(`./assets/${name}.js`)));
+  const [{Memory}, {Marks}, {History}, {TimeWindow}, {Store}, {LogView}, {Units}] = await Promise.all(
+    ['memory', 'marks', 'history', 'window', 'store', 'log', 'units'].map((name) => import(`./assets/${name}.js`)));
   const BODY
 }"""
 
@@ -765,7 +765,7 @@ def test_lines_that_arrive_while_the_tick_moves_are_shown_once(page):
         const line = (tick) => ({epoch: 1, tick, time_s: tick / 2, source: 'Butler', kind: 'say', text: `m${tick}`});
         const place = document.createElement('div');
         const store = new Store();
-        const log = new LogView(place, store, () => {});
+        const log = new LogView(place, store, new Units(), () => {});
         const shown = (tick) => {
           log.showUntil({epoch: 1, tick});
           log.render();

@@ -91,7 +91,8 @@ class SiteResult(NamedTuple):
     """Why it was refused; None if it was carried out."""
 
 
-class Rays(NamedTuple):
+@dataclass(frozen=True)
+class Rays:
     """A fan of rays: the first in the direction of motion that the robot reported last, the others counter-clockwise."""
 
     count: int

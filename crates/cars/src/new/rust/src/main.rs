@@ -86,7 +86,7 @@ impl Robot for Stroller {
 
 impl Stroller {
     fn obey(&mut self, command: &ReceivedCommand, cars: &mut Cars<'_>) {
-        let ReceivedCommand { from, text } = command;
+        let ReceivedCommand { from, text, .. } = command;
         match text.as_str() {
             "rest" => self.is_resting = true,
             "stroll" => self.is_resting = false,
