@@ -73,7 +73,6 @@ mod shapes;
 mod sight;
 mod solids;
 mod triangular;
-mod wheels;
 
 pub use bodies::{Blocker, Body, Near};
 pub use error::{HallError, TriangularError};
@@ -88,4 +87,3 @@ pub use shape::{Shape, Wall};
 pub use shapes::Shapes;
 pub use sight::{Opaque, is_hidden};
 pub use triangular::Triangular;
-pub use wheels::{Pose, Velocity, Wheels};
