@@ -1,5 +1,6 @@
 //! A scenario file as written. Unknown keys are refused; errors show the place in the file.
 
+mod bulk_name;
 pub(super) mod change;
 mod expect;
 pub(super) mod fault;
@@ -8,7 +9,6 @@ pub(super) mod mood;
 mod network;
 mod numbers;
 mod place;
-mod robot_names;
 mod sensing;
 mod site;
 mod solids;
@@ -30,13 +30,13 @@ use protocol::{RobotName, Tick};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
+use bulk_name::BulkName;
 use change::{ChangeTable, ParentTable};
 use fault::FaultTable;
 use guests::GuestsTable;
 use network::NetworkTable;
 use numbers::positive;
 use place::StartPlace;
-use robot_names::RobotNames;
 use sensing::SensingTable;
 use site::SiteTable;
 use solids::{Fixed, FloorPlanTable, ObstacleTable, Size, WallTable};
@@ -121,7 +121,7 @@ struct RecordTable {
 #[derive(Debug, Clone, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 struct RawRobot {
-    name: RobotNames,
+    name: BulkName,
     /// So many robots, whose names are this one and a number.
     count: Option<usize>,
     class: Option<String>,
@@ -378,13 +378,7 @@ fn single_robots(
         let span = entry.span();
         let refuse = |reason: &str| FileError::at(source, Some(span.clone()), reason);
         let written = entry.get_ref();
-        let numbers = match (&written.name.numbers, written.count) {
-            (Some(_), Some(_)) => {
-                return Err(refuse("the name has a range of numbers: leave `count` out"));
-            }
-            (Some(numbers), None) => Some(numbers.clone()),
-            (None, count) => count.map(|count| 1..=count),
-        };
+        let numbers = written.name.numbers(written.count).map_err(refuse)?;
         let Some(numbers) = numbers else {
             if robots.len() == MAX_ROBOTS {
                 return Err(refuse(&too_many_robots()));

@@ -13,9 +13,9 @@ use toml::Spanned;
 
 use super::super::checked::{to_wire, to_world};
 use super::super::sites::{OnConflict, SiteSpec, SiteVariable};
+use super::bulk_name::BulkName;
 use super::numbers::positive;
 use super::place::StartPlace;
-use super::robot_names::RobotNames;
 use super::unplaced::unplaced;
 
 /// Kind of a site that names none.
@@ -24,7 +24,7 @@ const KIND: &str = "site";
 #[derive(Debug, Clone, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SiteTable {
-    name: RobotNames,
+    name: BulkName,
     /// So many sites, whose names are this one and a number.
     count: Option<usize>,
     kind: Option<Spanned<String>>,
@@ -65,13 +65,7 @@ pub(super) fn check(
         let table = entry.into_inner();
         let spec = table.check(sensing_range, source)?;
         let base = table.name.name.as_str();
-        let numbers = match (&table.name.numbers, table.count) {
-            (Some(_), Some(_)) => {
-                return Err(refuse("the name has a range of numbers: leave `count` out"));
-            }
-            (Some(numbers), None) => Some(numbers.clone()),
-            (None, count) => count.map(|count| 1..=count),
-        };
+        let numbers = table.name.numbers(table.count).map_err(refuse)?;
         let count = numbers.clone().map_or(1, Iterator::count);
         if count > MAX_SITES - sites.len() {
             return Err(refuse(&format!("more than {MAX_SITES} sites")));
