@@ -107,7 +107,7 @@ const MAX_DELIVERED_BYTES: usize = 512 * 1024;
 type Pair = (RobotName, RobotName);
 
 /// The decisions of the network at the beginning of a tick.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Default)]
 pub struct NetworkDecisions {
     /// Commands that arrive in this tick, by target, ordered by sender and number. A duplicated command is in the list twice.
     pub delivered: BTreeMap<RobotName, Vec<Arrival>>,
@@ -237,9 +237,9 @@ impl Medium {
     }
 
     /// The decisions at the beginning of `tick`, in which the robots of the roster stand at these places.
-    pub fn decide(&mut self, tick: Tick, places: &[Point]) -> NetworkDecisions {
+    pub fn decide(&mut self, tick: Tick, places: Vec<Point>) -> NetworkDecisions {
         let mut decision = NetworkDecisions::default();
-        self.places = places.to_vec();
+        self.places = places;
         // Cuts come first, so that a command which is sent or arrives in the tick in which a cut begins is lost. Bursts advance before
         // any command draws. What arrives in this tick includes what was decided in it.
         self.update_cuts(tick, &mut decision.events);

@@ -569,7 +569,7 @@ pub fn header(run: &RunName, simulation: &Simulation) -> Header {
             .iter()
             .map(|obstacle| [obstacle.at.x, obstacle.at.y])
             .collect(),
-        sites: crate::sites::at_start(scenario),
+        sites: crate::sites::Sites::new(scenario).frames(),
         robots: simulation.names().to_vec(),
     }
 }

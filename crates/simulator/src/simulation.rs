@@ -252,7 +252,7 @@ impl Simulation {
         self.note_moves(&verdicts);
 
         let places = self.world.robots().iter().copied().map(to_wire);
-        let decision = self.medium.decide(self.now, &places.collect::<Vec<_>>());
+        let decision = self.medium.decide(self.now, places.collect());
         self.events.extend(decision.events);
         self.arriving = decision.delivered;
         // Beside the network's decisions: robots that have no state of the last tick to answer with.
@@ -722,7 +722,7 @@ impl Simulation {
     fn compose_news(&mut self, verdicts: &[MoveOutcome]) {
         let mut all = BTreeMap::new();
         for (index, name) in self.names.iter().enumerate() {
-            let observer = self.observer(index);
+            let viewpoint = self.viewpoint(index);
             let is_refused = !verdicts.is_empty() && self.blocked[index];
             // What a robot proposed that has missed the last tick did not count. An incarnation that takes part from this tick
             // on is named: see `Self::news`.
@@ -738,10 +738,10 @@ impl Simulation {
                 }),
                 commands: self.deliveries(name),
                 unreachable: self.unreachable.get(name).cloned().unwrap_or_default(),
-                sensed: self.sensed_robots(index, &observer),
-                bodies: self.sensed_bodies(index, &observer),
+                sensed: self.sensed_robots(index, &viewpoint),
+                bodies: self.sensed_bodies(index, &viewpoint),
                 ranges: self.sensed_ranges(index),
-                sites: self.sensed_sites(index, &observer),
+                sites: self.sensed_sites(index, &viewpoint),
                 site_results: self.sites.results(name).to_vec(),
             };
             // A robot without news gets none: silence says that all is as it expects.
@@ -1086,7 +1086,7 @@ impl Simulation {
     }
 
     /// A robot as it looks around in the tick in progress.
-    fn observer(&self, of: usize) -> Viewpoint<'_> {
+    fn viewpoint(&self, of: usize) -> Viewpoint<'_> {
         let reach_m = self.scenario.sensing.range_m.max(self.sites.reach_m());
         Viewpoint::new(
             &self.scenario,
@@ -1119,12 +1119,12 @@ impl Simulation {
     }
 
     /// The sites that a robot senses, the first of them by name that fit into its news.
-    fn sensed_sites(&self, of: usize, observer: &Viewpoint<'_>) -> Vec<SensedSite> {
+    fn sensed_sites(&self, of: usize, viewpoint: &Viewpoint<'_>) -> Vec<SensedSite> {
         let mut sensed = Vec::new();
         let mut bytes = 0;
         for site in self.sites.near(to_wire(self.world.robots()[of])) {
             let what = format_args!("site/{}", site.name);
-            if let Some(at) = observer.senses(what, to_world(site.location), None) {
+            if let Some(at) = viewpoint.senses(what, to_world(site.location), None) {
                 bytes += most_bytes(&site);
                 if bytes > MAX_SITE_BYTES {
                     break;
@@ -1139,7 +1139,7 @@ impl Simulation {
     }
 
     /// All bodies within a robot's sensing range, if its news contain them.
-    fn sensed_bodies(&self, of: usize, observer: &Viewpoint<'_>) -> Vec<SensedBody> {
+    fn sensed_bodies(&self, of: usize, viewpoint: &Viewpoint<'_>) -> Vec<SensedBody> {
         if !self.with_bodies.contains(&self.names[of]) {
             return Vec::new();
         }
@@ -1153,14 +1153,14 @@ impl Simulation {
             let (kind, sensed_at) = match near.body {
                 Body::Obstacle(index) => {
                     let what = format_args!("obstacle/{index}");
-                    let at = observer.senses(what, at, Some(index));
+                    let at = viewpoint.senses(what, at, Some(index));
                     (SensedKind::Obstacle, at)
                 }
                 Body::Guest(index) => {
-                    let at = observer.senses(format_args!("guest/{index}"), at, None);
+                    let at = viewpoint.senses(format_args!("guest/{index}"), at, None);
                     (SensedKind::Guest, at)
                 }
-                Body::Robot(index) => (SensedKind::Robot, self.senses_robot(observer, index)),
+                Body::Robot(index) => (SensedKind::Robot, self.senses_robot(viewpoint, index)),
             };
             if let Some(at) = sensed_at {
                 sensed.push(SensedBody {
@@ -1173,9 +1173,9 @@ impl Simulation {
     }
 
     /// Where a robot senses another one that is within range.
-    fn senses_robot(&self, observer: &Viewpoint<'_>, other: usize) -> Option<world::Point> {
+    fn senses_robot(&self, viewpoint: &Viewpoint<'_>, other: usize) -> Option<world::Point> {
         let what = format_args!("robot/{}", self.names[other]);
-        observer.senses(what, self.world.robots()[other], None)
+        viewpoint.senses(what, self.world.robots()[other], None)
     }
 
     /// Robots among which are all that one senses, in the order of names. Of many robots these are those around it, so that a tick does
@@ -1196,7 +1196,7 @@ impl Simulation {
         near.filter_map(robot).collect()
     }
 
-    fn sensed_robots(&self, of: usize, observer: &Viewpoint<'_>) -> Vec<SensedRobot> {
+    fn sensed_robots(&self, of: usize, viewpoint: &Viewpoint<'_>) -> Vec<SensedRobot> {
         let robots = self.world.robots();
         let mut sensed = Vec::new();
         for other in self.robots_around(of) {
@@ -1204,7 +1204,7 @@ impl Simulation {
             if other == of || !is_near {
                 continue;
             }
-            if let Some(at) = self.senses_robot(observer, other) {
+            if let Some(at) = self.senses_robot(viewpoint, other) {
                 sensed.push(SensedRobot {
                     name: self.names[other].clone(),
                     location: to_wire(at),

@@ -204,7 +204,12 @@ impl Sites {
     pub fn frames(&self) -> Vec<SiteFrame> {
         let sites = self.sites.iter();
         sites
-            .map(|(name, site)| frame(name, &site.spec, site.state.clone()))
+            .map(|(name, site)| SiteFrame {
+                name: name.clone(),
+                kind: site.spec.kind.clone(),
+                location: site.spec.at,
+                state: site.state.clone(),
+            })
             .collect()
     }
 
@@ -212,7 +217,7 @@ impl Sites {
     #[must_use]
     pub fn changed(&self) -> BTreeMap<String, StateVariables> {
         let sites = self.sites.iter();
-        let changed = sites.filter(|(_, site)| site.state != start(&site.spec));
+        let changed = sites.filter(|(_, site)| site.has_changed());
         changed
             .map(|(name, site)| (name.clone(), site.state.clone()))
             .collect()
@@ -220,6 +225,14 @@ impl Sites {
 }
 
 impl Site {
+    fn has_changed(&self) -> bool {
+        let mut now = self.state.iter();
+        now.any(|(key, value)| {
+            let at_start = self.spec.state.get(key);
+            at_start.is_none_or(|variable| variable.start != *value)
+        })
+    }
+
     /// The state after an action.
     fn after(&self, action: &SiteAction) -> Result<StateVariables, SiteRefusal> {
         let mut state = self.state.clone();
@@ -285,24 +298,6 @@ pub(crate) fn most_bytes(site: &SensedSite) -> usize {
         bytes += VARIABLE + key.len() + ESCAPED * text;
     }
     bytes
-}
-
-/// The sites of a scenario at the start, for observers.
-#[must_use]
-pub fn at_start(scenario: &Scenario) -> Vec<SiteFrame> {
-    let sites = scenario.sites.iter();
-    sites
-        .map(|(name, spec)| frame(name, spec, start(spec)))
-        .collect()
-}
-
-fn frame(name: &str, spec: &SiteSpec, state: StateVariables) -> SiteFrame {
-    SiteFrame {
-        name: name.to_owned(),
-        kind: spec.kind.clone(),
-        location: spec.at,
-        state,
-    }
 }
 
 fn start(spec: &SiteSpec) -> StateVariables {

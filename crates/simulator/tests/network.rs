@@ -55,7 +55,7 @@ fn play(
     let one = |tick: u64| {
         medium.accept(command("A", "B", tick));
         also(tick, &mut medium);
-        (tick + 1, medium.decide(tick + 1, &[]))
+        (tick + 1, medium.decide(tick + 1, Vec::new()))
     };
     (1..=ticks).map(one).collect()
 }
@@ -362,7 +362,7 @@ fn lost_queries_are_one_verdict_for_asker_target_and_tick() {
 fn a_person_at_the_console_is_not_on_the_robots_network() {
     let mut medium = medium("network.commands = { loss = 1.0, delay = \"5 s\" }");
     medium.accept(command("operator", "A", 1));
-    let decision = medium.decide(2, &[]);
+    let decision = medium.decide(2, Vec::new());
     assert!(decision.events.is_empty() && decision.delivered[&name("A")].len() == 1);
 }
 
@@ -418,7 +418,7 @@ fn a_command_is_counted_from_the_beginning_of_the_run() {
             medium.set_network(later.clone());
         }
         medium.accept(command("A", "B", tick));
-        decisions.insert(tick + 1, medium.decide(tick + 1, &[]));
+        decisions.insert(tick + 1, medium.decide(tick + 1, Vec::new()));
     }
     assert_eq!(lost(&decisions), [(5, Cause::Scripted)]);
 }
@@ -519,17 +519,15 @@ fn a_message_passes_as_far_as_the_radios_reach_and_no_farther() {
     let [at_the_limit, beyond] = [3.0, 3.0 + 1e-9].map(|x| [Point::default(), Point::new(x, 4.0)]);
 
     medium.accept(command("A", "B", 1));
-    let decision = medium.decide(2, &at_the_limit);
+    let decision = medium.decide(2, at_the_limit.to_vec());
     assert_eq!(decision.delivered[&name("B")].len(), 1);
     assert!(decision.unreachable.is_empty() && decision.events.is_empty());
 
     medium.accept(command("A", "B", 2));
     medium.accept(command("operator", "B", 1));
-    let decision = medium.decide(3, &beyond);
-    assert_eq!(
-        lost(&BTreeMap::from([(3, decision.clone())])),
-        [(2, Cause::OutOfRange)]
-    );
+    let decisions = BTreeMap::from([(3, medium.decide(3, beyond.to_vec()))]);
+    assert_eq!(lost(&decisions), [(2, Cause::OutOfRange)]);
+    let decision = &decisions[&3];
     assert_eq!(decision.delivered[&name("B")].len(), 1, "the operator's");
     assert_eq!(decision.unreachable[&name("A")], [name("B")]);
     assert_eq!(decision.unreachable[&name("B")], [name("A")]);
@@ -540,13 +538,13 @@ fn distance_changes_no_chance_of_the_messages_that_are_in_range() {
     let rules = "network.commands = { loss = 0.5 }\nnetwork.queries = { loss = 0.5 }";
     let mut near = medium(rules);
     let mut moving = medium(&format!("{rules}\nnetwork.radio = {{ range = \"5 m\" }}"));
-    let places = |x| [Point::default(), Point::new(x, 0.0)];
+    let places = |x| vec![Point::default(), Point::new(x, 0.0)];
     let mut in_range = 0;
     for tick in 1..=200 {
         near.accept(command("A", "B", tick));
         moving.accept(command("A", "B", tick));
-        let one = near.decide(tick + 1, &places(1.0));
-        let other = moving.decide(tick + 1, &places(if tick % 2 == 0 { 1.0 } else { 6.0 }));
+        let one = near.decide(tick + 1, places(1.0));
+        let other = moving.decide(tick + 1, places(if tick % 2 == 0 { 1.0 } else { 6.0 }));
         if tick % 2 == 0 {
             assert_eq!(one.events, other.events);
             assert_eq!(one.unreachable, other.unreachable);
