@@ -2,6 +2,8 @@
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
+mod common;
+
 use std::collections::BTreeMap;
 use std::convert::Infallible;
 use std::path::Path;
@@ -10,7 +12,7 @@ use std::sync::Arc;
 use lockstep::{Bulletin, Exchange, Sent, TickOutcome};
 use protocol::event::Cause;
 use protocol::messages::{
-    CommandText, Cut, FaultKind, Intervention, OnLate, Point, Report, StateVariables, TickUpdate,
+    CommandText, Cut, FaultKind, Intervention, OnLate, Point, Report, TickUpdate,
 };
 use protocol::{RobotName, Tick};
 use scenario::Scenario;
@@ -73,18 +75,8 @@ impl Exchange<TickUpdate, Arc<Report>, CommandText> for Robots {
                 });
             }
             let report = Report {
-                epoch: 1,
-                tick,
-                generation: 1,
-                proposal: *at,
-                speed_mps: 0.0,
-                direction_rad: 0.0,
-                emotion_state: "CALM".to_owned(),
-                behavior_state: "IDLE".to_owned(),
-                state_variables: StateVariables::new(),
                 commands: commands.len() as u32,
-                log: Vec::new(),
-                site_actions: Vec::new(),
+                ..common::report(tick, *at)
             };
             outcome
                 .reports

@@ -2,6 +2,8 @@
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
+mod common;
+
 use std::collections::BTreeMap;
 use std::convert::Infallible;
 use std::path::Path;
@@ -9,9 +11,7 @@ use std::sync::Arc;
 
 use lockstep::{Bulletin, Exchange, IncarnationNotice, Sent, TickOutcome};
 use protocol::event::Cause;
-use protocol::messages::{
-    CommandText, MAX_PAYLOAD_BYTES, Payload, Report, StateVariables, Target, TickUpdate,
-};
+use protocol::messages::{CommandText, MAX_PAYLOAD_BYTES, Payload, Report, Target, TickUpdate};
 use protocol::{RobotName, Tick, encode};
 use record::Entry;
 use scenario::Scenario;
@@ -49,18 +49,8 @@ impl<F: Fn(&str, Tick) -> Commands> Exchange<TickUpdate, Arc<Report>, CommandTex
         for name in &self.names {
             let commands = (self.send)(name.as_str(), tick);
             let report = Report {
-                epoch: 1,
-                tick,
-                generation: 1,
-                proposal: Default::default(),
-                speed_mps: 0.0,
-                direction_rad: 0.0,
-                emotion_state: "CALM".into(),
-                behavior_state: "IDLE".into(),
-                state_variables: StateVariables::new(),
-                site_actions: Vec::new(),
                 commands: commands.len() as u32,
-                log: vec![],
+                ..common::report(tick, protocol::messages::Point::default())
             };
             outcome
                 .reports

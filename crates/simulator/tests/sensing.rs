@@ -2,6 +2,8 @@
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
+mod common;
+
 use std::collections::BTreeMap;
 use std::convert::Infallible;
 use std::path::Path;
@@ -9,7 +11,7 @@ use std::sync::Arc;
 
 use lockstep::{Bulletin, Exchange, IncarnationNotice, TickOutcome};
 use protocol::RobotName;
-use protocol::messages::{CommandText, Point, Report, SensedKind, StateVariables, TickUpdate};
+use protocol::messages::{CommandText, Point, Report, SensedKind, TickUpdate};
 use scenario::Scenario;
 use scenario::diagnostic::{FileError, Source};
 use simulator::Simulation;
@@ -68,18 +70,8 @@ impl Exchange<TickUpdate, Arc<Report>, CommandText> for Watchers {
                 self.news.push(news);
             }
             let report = Report {
-                epoch: 1,
-                tick,
-                generation: 1,
-                proposal: *proposal,
-                speed_mps: 0.0,
                 direction_rad: self.heading_rad,
-                emotion_state: String::new(),
-                behavior_state: String::new(),
-                state_variables: StateVariables::new(),
-                commands: 0,
-                log: Vec::new(),
-                site_actions: Vec::new(),
+                ..common::report(tick, *proposal)
             };
             let answer = (Arc::new(report), Vec::new());
             outcome.reports.insert(name.clone(), answer);

@@ -2,6 +2,8 @@
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
+mod common;
+
 use std::collections::BTreeMap;
 use std::convert::Infallible;
 use std::path::Path;
@@ -251,18 +253,8 @@ impl Exchange<TickUpdate, Arc<Report>, CommandText> for Actors {
         for name in &self.names {
             let actions = self.actions.get(&(tick, name.clone()));
             let report = Report {
-                epoch: 1,
-                tick,
-                generation: 1,
-                proposal: self.places[name],
-                speed_mps: 0.0,
-                direction_rad: 0.0,
-                emotion_state: String::new(),
-                behavior_state: String::new(),
-                state_variables: StateVariables::new(),
-                commands: 0,
-                log: Vec::new(),
                 site_actions: actions.cloned().unwrap_or_default(),
+                ..common::report(tick, self.places[name])
             };
             let answer = (Arc::new(report), Vec::new());
             outcome.reports.insert(name.clone(), answer);

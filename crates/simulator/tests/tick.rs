@@ -2,6 +2,8 @@
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
+mod common;
+
 use std::collections::BTreeMap;
 use std::convert::Infallible;
 use std::path::Path;
@@ -10,7 +12,7 @@ use std::sync::Arc;
 use lockstep::{Bulletin, Exchange, IncarnationNotice, Sent, TickOutcome};
 use protocol::event::{Blocker, Cause, log_line};
 use protocol::messages::{
-    CommandText, Delivery, End, Performative, Point, Report, SensedKind, StateVariables, TickUpdate,
+    CommandText, Delivery, End, Performative, Point, Report, SensedKind, TickUpdate,
 };
 use protocol::{RobotName, RunName, Tick};
 use scenario::Scenario;
@@ -50,20 +52,8 @@ impl<F: FnMut(&RobotName, &mut Report, &mut Commands)> Puppets<F> {
     fn stay(&self, name: &RobotName, tick: Tick, news: &AllNews) -> Report {
         let corrected = news.get(name).and_then(|news| news.correction);
 
-        Report {
-            epoch: 1,
-            tick,
-            generation: 1,
-            proposal: corrected.map_or(self.proposals[name], |correction| correction.location),
-            speed_mps: 0.0,
-            direction_rad: 0.0,
-            emotion_state: "CALM".into(),
-            behavior_state: "IDLE".into(),
-            state_variables: StateVariables::new(),
-            commands: 0,
-            log: vec![],
-            site_actions: Vec::new(),
-        }
+        let proposal = corrected.map_or(self.proposals[name], |correction| correction.location);
+        common::report(tick, proposal)
     }
 }
 
