@@ -13,6 +13,7 @@ use crate::transcript::{PlayedTick, Transcript};
 /// In a round of ticks: the robot senses another one, and it cannot query any other.
 const SENSES: Tick = 12;
 const CUT_OFF: Tick = 14;
+const OUT_OF_RANGE: Tick = 6;
 
 /// A command that arrives at the robot.
 #[derive(Debug, Clone)]
@@ -204,6 +205,9 @@ fn news_of(harness: &mut Harness<'_>, script: &PlayScript, tick: Tick) -> TickUp
         news.correction = harness.body.advance(tick, &harness.template);
         if tick % ROUND == SENSES {
             news.sensed = harness.fake_peers.sensed(epoch, tick).into_iter().collect();
+        }
+        if tick % ROUND == OUT_OF_RANGE {
+            news.in_range = Some(Vec::new());
         }
         if tick % ROUND == CUT_OFF {
             news.unreachable = harness.fake_peers.names().cloned().collect();

@@ -368,7 +368,7 @@ impl<'a> Cars<'a> {
         }
         // The simulator's verdict comes first: whether an answer could be had is not for the real
         // network to decide.
-        if self.news.unreachable.contains(&of) {
+        if !self.news.can_query(&of) {
             return Err(CallError::Unreachable(of));
         }
 

@@ -4,6 +4,7 @@
 //! changes the fate of another message.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::iter::{repeat_with, zip};
 
 use protocol::event::{Cause, Event};
 use protocol::messages::{CommandText, Cut, Delivery, Payload, Point};
@@ -111,7 +112,9 @@ type Pair = (RobotName, RobotName);
 pub struct NetworkDecisions {
     /// Commands that arrive in this tick, by target, ordered by sender and number. A duplicated command is in the list twice.
     pub delivered: BTreeMap<RobotName, Vec<Arrival>>,
-    /// Robots that each robot cannot query in this tick, in the order of names.
+    /// The robots that the radio of each reaches in this tick, in the order of names; `None` where distance does not matter.
+    pub in_range: Option<BTreeMap<RobotName, Vec<RobotName>>>,
+    /// Robots that each robot cannot query in this tick though its radio reaches them, in the order of names.
     pub unreachable: BTreeMap<RobotName, Vec<RobotName>>,
     /// All decisions in a fixed order.
     pub events: Vec<Event>,
@@ -488,12 +491,17 @@ impl Medium {
 
     /// Decides once for each asker, target and tick whether queries are answered, for which both directions are needed.
     fn decide_queries(&self, tick: Tick, decision: &mut NetworkDecisions) {
+        decision.in_range = self.in_range();
         let is_drawn = self.network.touches_queries();
-        if self.cut.is_empty() && !is_drawn && self.network.radio.is_none() {
+        if self.cut.is_empty() && !is_drawn {
             return;
         }
 
-        for (asker, target) in pairs(&self.roster) {
+        let pairs = match &decision.in_range {
+            Some(in_range) => pairs_of(in_range),
+            None => pairs(&self.roster),
+        };
+        for (asker, target) in pairs {
             // Nothing is drawn in turn, so it does not matter for which pairs, and in which ticks, this is reached.
             let answer_is_cut = self.is_cut(&target, &asker, MessageKind::Queries);
             let drawn = if is_drawn {
@@ -509,7 +517,7 @@ impl Medium {
                 continue;
             }
 
-            // A partition has its own events, and distance follows from places: only random losses are recorded.
+            // A partition has its own events: only random losses are recorded.
             if let Some(because @ (Cause::Loss | Cause::Burst)) = lost
                 && !answer_is_cut
             {
@@ -521,6 +529,35 @@ impl Medium {
             }
             decision.unreachable.entry(asker).or_default().push(target);
         }
+    }
+
+    /// The robots that the radio of each reaches. Costs the pairs that are near in x, not all pairs.
+    fn in_range(&self) -> Option<BTreeMap<RobotName, Vec<RobotName>>> {
+        let radio = self.network.radio?;
+        let mut from_left: Vec<(&RobotName, Point)> =
+            zip(&self.roster, self.places.iter().copied()).collect();
+        from_left.sort_by(|(_, one), (_, other)| one.x.total_cmp(&other.x));
+
+        let mut in_range: BTreeMap<RobotName, Vec<RobotName>> =
+            zip(self.roster.iter().cloned(), repeat_with(Vec::new)).collect();
+        for (index, (one, at)) in from_left.iter().enumerate() {
+            let right = &from_left[index + 1..];
+            let near = right
+                .iter()
+                .take_while(|(_, other)| other.x - at.x <= radio.range_m);
+            for (other, other_at) in near {
+                if at.distance_m(*other_at) <= radio.range_m {
+                    for (from, to) in [(*one, *other), (*other, *one)] {
+                        in_range.entry(from.clone()).or_default().push(to.clone());
+                    }
+                }
+            }
+        }
+
+        in_range
+            .values_mut()
+            .for_each(|names| names.sort_unstable());
+        Some(in_range)
     }
 
     /// Pairs of robots whose link is cut now.
@@ -548,6 +585,15 @@ impl BurstState {
             chance: stream(seed, &format!("medium/burst/{kind}/{from}/{to}")),
         }
     }
+}
+
+/// Each robot with each one that its radio reaches.
+fn pairs_of(in_range: &BTreeMap<RobotName, Vec<RobotName>>) -> Vec<Pair> {
+    let mut pairs = Vec::new();
+    for (from, names) in in_range {
+        pairs.extend(names.iter().map(|to| (from.clone(), to.clone())));
+    }
+    pairs
 }
 
 /// All ordered pairs of different robots.

@@ -90,6 +90,8 @@ pub struct Simulation {
     arriving: BTreeMap<RobotName, Vec<Arrival>>,
     /// Robots that each robot cannot query in the tick in progress.
     unreachable: BTreeMap<RobotName, Vec<RobotName>>,
+    /// The robots that the radio of each reaches in this tick; `None` where distance does not matter.
+    in_range: Option<BTreeMap<RobotName, Vec<RobotName>>>,
     /// News of the tick in progress; robots without any have no entry.
     news: BTreeMap<RobotName, TickUpdate>,
     /// Events of the tick in progress.
@@ -165,6 +167,7 @@ impl Simulation {
             with_ranges: BTreeSet::new(),
             arriving: BTreeMap::new(),
             unreachable: BTreeMap::new(),
+            in_range: None,
             news: BTreeMap::new(),
             events: Vec::new(),
             reports: BTreeMap::new(),
@@ -255,6 +258,7 @@ impl Simulation {
         let decision = self.medium.decide(self.now, places.collect());
         self.events.extend(decision.events);
         self.arriving = decision.delivered;
+        self.in_range = decision.in_range;
         // Beside the network's decisions: robots that have no state of the last tick to answer with.
         self.unreachable = self.join_unanswering(decision.unreachable);
         self.stopped.clear();
@@ -737,6 +741,7 @@ impl Simulation {
                     blocked: is_refused,
                 }),
                 commands: self.deliveries(name),
+                in_range: self.robots_in_range(name),
                 unreachable: self.unreachable.get(name).cloned().unwrap_or_default(),
                 sensed: self.sensed_robots(index, &viewpoint),
                 bodies: self.sensed_bodies(index, &viewpoint),
@@ -751,6 +756,11 @@ impl Simulation {
         }
 
         self.news = all;
+    }
+
+    fn robots_in_range(&self, of: &RobotName) -> Option<Vec<RobotName>> {
+        let in_range = self.in_range.as_ref()?;
+        Some(in_range.get(of).cloned().unwrap_or_default())
     }
 
     fn deliveries(&self, to: &RobotName) -> Vec<Delivery> {
@@ -1315,7 +1325,7 @@ impl Simulation {
         self.medium.cuts()
     }
 
-    /// Robots that each robot cannot query in this tick.
+    /// Robots that each robot cannot query in this tick, though its radio reaches them.
     #[must_use]
     pub fn unreachable(&self) -> &BTreeMap<RobotName, Vec<RobotName>> {
         &self.unreachable

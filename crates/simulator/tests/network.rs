@@ -3,10 +3,12 @@
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
 use std::collections::BTreeMap;
+use std::iter::zip;
 use std::path::Path;
 
 use protocol::event::Cause;
 use protocol::messages::{CommandText, Point};
+use protocol::random::{stream, unit};
 use protocol::{Event, RobotName};
 use scenario::Scenario;
 use scenario::diagnostic::{FileError, Source};
@@ -522,6 +524,9 @@ fn a_message_passes_as_far_as_the_radios_reach_and_no_farther() {
     let decision = medium.decide(2, at_the_limit.to_vec());
     assert_eq!(decision.delivered[&name("B")].len(), 1);
     assert!(decision.unreachable.is_empty() && decision.events.is_empty());
+    let in_range = decision.in_range.unwrap();
+    assert_eq!(in_range[&name("A")], [name("B")]);
+    assert_eq!(in_range[&name("B")], [name("A")]);
 
     medium.accept(command("A", "B", 2));
     medium.accept(command("operator", "B", 1));
@@ -529,8 +534,9 @@ fn a_message_passes_as_far_as_the_radios_reach_and_no_farther() {
     assert_eq!(lost(&decisions), [(2, Cause::OutOfRange)]);
     let decision = &decisions[&3];
     assert_eq!(decision.delivered[&name("B")].len(), 1, "the operator's");
-    assert_eq!(decision.unreachable[&name("A")], [name("B")]);
-    assert_eq!(decision.unreachable[&name("B")], [name("A")]);
+    assert!(decision.unreachable.is_empty());
+    let in_range = decision.in_range.as_ref().unwrap();
+    assert!(in_range.values().all(Vec::is_empty));
 }
 
 #[test]
@@ -538,7 +544,11 @@ fn distance_changes_no_chance_of_the_messages_that_are_in_range() {
     let rules = "network.commands = { loss = 0.5 }\nnetwork.queries = { loss = 0.5 }";
     let mut near = medium(rules);
     let mut moving = medium(&format!("{rules}\nnetwork.radio = {{ range = \"5 m\" }}"));
-    let places = |x| vec![Point::default(), Point::new(x, 0.0)];
+    let places = |x| {
+        [(0.0, 0.0), (x, 0.0), (x, 1.0)]
+            .map(|(x, y)| Point::new(x, y))
+            .to_vec()
+    };
     let mut in_range = 0;
     for tick in 1..=200 {
         near.accept(command("A", "B", tick));
@@ -562,5 +572,35 @@ fn a_radio_that_reaches_nobody_is_refused() {
         let error = parse(&format!("network.radio = {{ range = \"{range}\" }}")).unwrap_err();
         let words = error.in_words();
         assert!(words.contains("farther than 0 m"), "{words}");
+    }
+}
+
+#[test]
+fn radios_reach_whom_all_pairs_say() {
+    let scenario = parse("network.radio = { range = \"5 m\" }").unwrap();
+    let roster: Vec<RobotName> = (0..120)
+        .map(|number| name(&format!("R{number:03}")))
+        .collect();
+    let mut medium = Medium::new(
+        scenario.seed,
+        scenario.tick_s,
+        scenario.network,
+        roster.clone(),
+    );
+    let mut chance = stream(7, "places");
+
+    for tick in 1..=20 {
+        // In a field of 4 m all are near, in one of 80 m hardly any.
+        let side_m = 4.0 * tick as f64;
+        let mut place = || Point::new(side_m * unit(&mut chance), side_m * unit(&mut chance));
+        let places: Vec<Point> = roster.iter().map(|_| place()).collect();
+
+        let in_range = medium.decide(tick, places.clone()).in_range.unwrap();
+        for (one, at) in zip(&roster, &places) {
+            let others = zip(&roster, &places).filter(|(other, _)| *other != one);
+            let near = others.filter(|(_, other_at)| at.distance_m(**other_at) <= 5.0);
+            let near: Vec<RobotName> = near.map(|(other, _)| other.clone()).collect();
+            assert_eq!(in_range[one], near, "{one} in a field of {side_m} m");
+        }
     }
 }

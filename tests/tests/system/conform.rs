@@ -124,7 +124,7 @@ fn the_robots_of_the_project_conform_with_default_parameters() {
 }
 
 /// Further ways to break a rule, after the one that is named like the rule.
-const OTHERWISE: [&str; 50] = [
+const OTHERWISE: [&str; 51] = [
     "join.request:instance",
     "join.ready-last:first",
     "join.ready-last:queryables",
@@ -147,6 +147,7 @@ const OTHERWISE: [&str; 50] = [
     "query.asking:epoch",
     "query.asking:zero",
     "query.asking:unreachable",
+    "query.asking:range",
     "query.once:holds",
     "query.once:percept",
     "query.once:others",

@@ -348,10 +348,9 @@ impl Stage {
 
     /// Writes all queries that the robot can make in a tick, and the replies.
     fn write_queries(&mut self, turn: &Turn<TickUpdate>) {
-        let unreachable = turn.news.iter().flat_map(|news| &news.unreachable);
-        let unreachable: Vec<&RobotName> = unreachable.collect();
         for (name, other) in &self.processes {
-            if *name == self.robot || unreachable.contains(&name) {
+            let can_be_queried = turn.news.as_ref().is_none_or(|news| news.can_query(name));
+            if *name == self.robot || !can_be_queried {
                 continue;
             }
             let state = other.participant.query(query_in(turn));

@@ -481,8 +481,11 @@ pub(super) fn asking(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailu
             return Err(RuleFailure::new(expected, came));
         }
         let entry = played.iter().find(|entry| entry.tick == tick);
-        if entry.is_some_and(|entry| entry.news.unreachable.contains(&query.of)) {
-            let expected = format!("no query of {} in tick {tick}: unreachable", query.of);
+        if entry.is_some_and(|entry| !entry.news.can_query(&query.of)) {
+            let expected = format!(
+                "no query of {} in tick {tick}: unreachable, or not in range",
+                query.of
+            );
             return Err(RuleFailure::new(expected, came));
         }
     }

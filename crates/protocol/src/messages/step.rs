@@ -251,6 +251,9 @@ pub struct TickUpdate {
     /// that the medium has doubled is listed twice.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub commands: Vec<Delivery>,
+    /// The robots that its radio reaches, by name: it can query no others in this tick. Absent where distance does not matter.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub in_range: Option<Vec<RobotName>>,
     /// Robots that it cannot query in this tick: the medium has cut the link between the two, or they missed the tick before.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub unreachable: Vec<RobotName>,
@@ -274,6 +277,13 @@ pub struct TickUpdate {
 }
 
 impl TickUpdate {
+    /// Whether another robot can be queried in this tick.
+    #[must_use]
+    pub fn can_query(&self, robot: &RobotName) -> bool {
+        let in_range = self.in_range.as_ref();
+        in_range.is_none_or(|names| names.contains(robot)) && !self.unreachable.contains(robot)
+    }
+
     /// Whether there is nothing to send.
     #[must_use]
     pub fn is_empty(&self) -> bool {
@@ -284,6 +294,7 @@ impl TickUpdate {
             rejoin,
             correction,
             commands,
+            in_range,
             unreachable,
             sensed,
             bodies,
@@ -296,6 +307,7 @@ impl TickUpdate {
             && rejoin.is_none()
             && correction.is_none()
             && commands.is_empty()
+            && in_range.is_none()
             && unreachable.is_empty()
             && sensed.is_empty()
             && bodies.is_empty()

@@ -64,6 +64,7 @@ fn news() -> TickUpdate {
             command: "refill".into(),
             payload: Payload::new(serde_json::json!({ "level": 0.1 })),
         }],
+        in_range: Some(vec![name("Leguin")]),
         unreachable: vec![name("Vonda")],
         sensed: vec![SensedRobot {
             name: name("Vonda"),

@@ -23,7 +23,7 @@ pub struct LinkSummary {
     /// Counts of its commands.
     #[serde(flatten)]
     pub counts: LinkCounts,
-    /// Ticks in which the sender could not query the target.
+    /// Ticks in which the sender could not query the target, other than for the range of radios.
     pub unreachable_ticks: u64,
     /// Longest time for which the sender could not query the target, simulated seconds.
     pub longest_stale_s: f64,

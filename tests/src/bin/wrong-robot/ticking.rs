@@ -213,14 +213,20 @@ impl Host {
             self.query(other, tick, epoch)?;
             return Ok(None);
         }
-        let is_unreachable = news.unreachable.contains(&other);
+        let is_unreachable = !news.can_query(&other);
         // The participant does not know of a tick that is run a second time.
         let is_running = self.shared.is_in(Phase::Computing);
         if tick == 0 || !tick.is_multiple_of(2) || !is_running {
             return Ok(None);
         }
         if is_unreachable {
-            if self.wrong.is("query.asking:unreachable") {
+            let is_cut = news.unreachable.contains(&other);
+            let wrong = if is_cut {
+                "query.asking:unreachable"
+            } else {
+                "query.asking:range"
+            };
+            if self.wrong.is(wrong) {
                 self.query(other, tick, epoch)?;
             }
             return Ok(None);
