@@ -190,6 +190,7 @@ impl Kit {
             rays: None,
             location: role.location,
             roster: fake_peers.into_keys().collect(),
+            known_sites: Vec::new(),
             parameters: role.parameters,
             earlier_parameters: Vec::new(),
             later_parameters: Vec::new(),

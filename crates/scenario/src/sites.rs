@@ -17,6 +17,8 @@ pub struct SiteSpec {
     pub drawn: Option<Region>,
     /// Distance within which robots sense it and may act on it, meters.
     pub range_m: f64,
+    /// Whether every robot knows of it from the start: its name, its kind and its place.
+    pub is_known: bool,
     /// What happens where two robots change the same variable of it in a tick.
     pub on_conflict: OnConflict,
     /// The variables of its state, by name.

@@ -4,7 +4,9 @@
 
 use std::path::Path;
 
-use protocol::messages::{MAX_SITE_TEXT_BYTES, MAX_SITE_VARIABLES, MAX_SITES, Point, Variable};
+use protocol::messages::{
+    MAX_KNOWN_SITES, MAX_SITE_TEXT_BYTES, MAX_SITE_VARIABLES, MAX_SITES, Point, Variable,
+};
 use scenario::diagnostic::{FileError, Source};
 use scenario::{Changes, OnConflict, Scenario};
 
@@ -47,10 +49,13 @@ fn a_site_has_defaults_and_is_kept() {
     assert_eq!((site.range_m, site.on_conflict), (3.0, OnConflict::First));
     assert!(site.state.is_empty() && site.drawn.is_none());
 
+    assert!(!site.is_known);
+
     let text = text.to_owned()
-        + "on_conflict = \"refuse\"\nkind = \"task\"\nrange = \"1 m\"\n\
+        + "known = true\non_conflict = \"refuse\"\nkind = \"task\"\nrange = \"1 m\"\n\
            state = { n = 7, x = { start = 0.5, max = 1 }, done = true, label = \"7 m\" }\n";
     let scenario = parse(&text).unwrap();
+    assert!(scenario.sites["T"].is_known);
     let state = &scenario.sites["T"].state;
     assert_eq!(state["n"].start, Variable::Number(7.0));
     assert_eq!((state["x"].min, state["x"].max), (None, Some(1.0)));
@@ -151,6 +156,14 @@ fn a_site_that_cannot_be_is_refused_where_it_is_written() {
             BULK.replace("count = 3", &format!("count = {}", MAX_SITES + 1)),
             1,
             "more than 1024",
+        ),
+        (
+            BULK.replace(
+                "count = 3",
+                &format!("count = {}\nknown = true", MAX_KNOWN_SITES + 1),
+            ),
+            4,
+            "more than 512 sites with known = true",
         ),
         (
             format!("{BULK}[[site]]\nname = \"T2\"\nat = \"random\"\n"),

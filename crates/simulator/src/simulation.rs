@@ -1067,6 +1067,7 @@ impl Simulation {
             rays: self.scenario.sensing.rays,
             location,
             roster: self.names.clone(),
+            known_sites: self.sites.known(),
             parameters: parameters.clone(),
             earlier_parameters: within_message(earlier),
             later_parameters: within_message(later),

@@ -7,8 +7,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::mem::discriminant;
 
 use protocol::messages::{
-    MAX_SITE_TEXT_BYTES, Point, SensedSite, SiteAction, SiteFrame, SiteRefusal, SiteResult,
-    StateVariables, Variable,
+    KnownSite, MAX_SITE_TEXT_BYTES, Point, SensedSite, SiteAction, SiteFrame, SiteRefusal,
+    SiteResult, StateVariables, Variable,
 };
 use protocol::{Event, RobotName};
 use scenario::{OnConflict, Scenario, SiteSpec};
@@ -178,6 +178,22 @@ impl Sites {
             }
         }
         near
+    }
+
+    /// The sites that every robot knows of, by name.
+    #[must_use]
+    pub fn known(&self) -> Vec<KnownSite> {
+        let mut known = Vec::new();
+        for (name, site) in &self.sites {
+            if site.spec.is_known {
+                known.push(KnownSite {
+                    name: name.clone(),
+                    kind: site.spec.kind.clone(),
+                    location: site.spec.at,
+                });
+            }
+        }
+        known
     }
 
     /// The greatest distance at which a site is sensed, meters.

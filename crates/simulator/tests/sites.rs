@@ -11,11 +11,11 @@ use std::sync::Arc;
 
 use lockstep::{Bulletin, Exchange, IncarnationNotice, TickOutcome};
 use proptest::prelude::*;
-use protocol::RobotName;
 use protocol::messages::{
-    CommandText, MAX_SITE_TEXT_BYTES, Point, Report, SiteAction, SiteRefusal, StateVariables,
-    TickUpdate, Variable,
+    CommandText, KnownSite, MAX_SITE_TEXT_BYTES, Point, Report, SiteAction, SiteRefusal,
+    StateVariables, TickUpdate, Variable,
 };
+use protocol::{RobotName, RunName};
 use scenario::Scenario;
 use scenario::diagnostic::Source;
 use simulator::sites::{SiteOrders, Sites};
@@ -420,4 +420,20 @@ fn news_hold_as_many_sites_as_fit() {
     );
     let bytes = protocol::encode(&news).len();
     assert!((20 * 1024..70 * 1024).contains(&bytes), "{bytes}");
+}
+
+#[test]
+fn every_robot_is_told_of_the_sites_that_are_known() {
+    let file = FILE.replace("kind = \"task\"", "kind = \"task\"\nknown = true");
+    let simulation = Simulation::new(scenario(&file), 1).unwrap();
+    let run = RunName::new("r").unwrap();
+    for robot in ["A", "C"] {
+        let welcome = simulation.welcome(&run, &name(robot), 1, None).unwrap();
+        let known = KnownSite {
+            name: "T".to_owned(),
+            kind: "task".to_owned(),
+            location: Point::new(2.0, 2.0),
+        };
+        assert_eq!(welcome.known_sites, [known], "{robot}");
+    }
 }

@@ -9,7 +9,7 @@ from forager import Forager
 from lab import Lab, assert_same
 
 import cars
-from cars import Action, Cars, Rays, Robot, SensedSite, SiteAction, SiteResult
+from cars import Action, Cars, KnownSite, Rays, Robot, SensedSite, SiteAction, SiteResult
 
 SCENARIO = """
 seed = 3
@@ -103,6 +103,25 @@ def test_a_robot_sees_sites_and_what_became_of_its_actions(scenario: Path, tmp_p
     assert of_a[0] == ((site,), (), Rays(8, 4.0), 8)
     assert of_a[1][1] == (SiteResult("U", "conflict"),)
     assert of_a[1][0] == (site,)
+
+
+class Informed(Robot):
+    """Keeps what it knows when it joins."""
+
+    known: tuple[KnownSite, ...] = ()
+
+    def init(self, cars: Cars) -> None:
+        Informed.known = cars.welcome.known_sites
+
+    def tick(self, cars: Cars) -> Action:
+        return Action.stay(cars)
+
+
+def test_a_robot_knows_of_known_sites_wherever_it_is(scenario: Path, tmp_path: Path) -> None:
+    known = "name = \"U\"\nkind = \"task\"\nknown = true"
+    scenario.write_text(SCENARIO.replace('name = "U"', known).replace('at = ["4 m", "4 m"]', 'at = ["9 m", "7 m"]'))
+    cars.run(scenario, robots={"A": Informed, "B": Looker}, out=tmp_path, duration="1 s", set={"expect": []})
+    assert Informed.known == (KnownSite("U", "task", cars.Point(9.0, 7.0)),)
 
 
 class Careless(Robot):

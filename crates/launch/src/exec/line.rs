@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use protocol::Message;
 use protocol::messages::{
-    End, MAX_TEXT_BYTES, Panel, Parameters, Payload, Performative, Point, PublicState, Rays,
-    SensedRobot, SensedSite, SiteAction, SiteResult, StateVariables, Variable,
+    End, KnownSite, MAX_TEXT_BYTES, Panel, Parameters, Payload, Performative, Point, PublicState,
+    Rays, SensedRobot, SensedSite, SiteAction, SiteResult, StateVariables, Variable,
 };
 use protocol::plain::escape_line;
 use protocol::{RobotName, RunName, Tick};
@@ -58,6 +58,8 @@ pub(super) enum ToProgram<'a> {
         rays: Option<Rays>,
         location: Point,
         roster: &'a [RobotName],
+        #[serde(skip_serializing_if = "<[_]>::is_empty")]
+        known_sites: &'a [KnownSite],
         parameters: &'a Parameters,
         sensed: &'a [SensedRobot],
         #[serde(skip_serializing_if = "<[_]>::is_empty")]
@@ -157,6 +159,7 @@ impl<'a> ToProgram<'a> {
             rays: welcome.rays,
             location: welcome.location,
             roster: &welcome.roster,
+            known_sites: &welcome.known_sites,
             parameters: &welcome.parameters,
             sensed,
             sites,
@@ -449,13 +452,23 @@ mod tests {
         let welcome = r#"{"answer":"welcome","protocol":2,"run":"r","name":"A","generation":2,"epoch":3,"tick":4,"seed":5,
             "stream":"robot/A#2","tick_s":0.5,"field_m":[9,8.5],"body_m":0.6,"sensing_range_m":2,"location":{"x":1,"y":2},
             "roster":["A","B"],"parameters":{"v_mps":1e-7}}"#;
-        let welcome: Welcome = serde_json::from_str(welcome).unwrap();
+        let mut welcome: Welcome = serde_json::from_str(welcome).unwrap();
         assert_eq!(
             line(&ToProgram::init(&welcome, 6, &[], &[])),
             "{\"type\":\"init\",\"protocol\":2,\"run\":\"r\",\"name\":\"A\",\"generation\":2,\"epoch\":3,\"tick\":6,\"seed\":5,\
              \"stream\":\"robot/A#2\",\"tick_s\":0.5,\"field_m\":[9.0,8.5],\"body_m\":0.6,\"sensing_range_m\":2.0,\
              \"location\":{\"x\":1.0,\"y\":2.0},\"roster\":[\"A\",\"B\"],\"parameters\":{\"v_mps\":1e-7},\"sensed\":[]}\n"
         );
+
+        welcome.known_sites.push(KnownSite {
+            name: "T1".to_owned(),
+            kind: "task".to_owned(),
+            location: Point::new(3.0, 4.0),
+        });
+        let known = line(&ToProgram::init(&welcome, 6, &[], &[]));
+        let expected = "\"roster\":[\"A\",\"B\"],\"known_sites\":[{\"name\":\"T1\",\"kind\":\"task\",\
+                        \"location\":{\"x\":3.0,\"y\":4.0}}],\"parameters\"";
+        assert!(known.contains(expected), "{known}");
     }
 
     #[test]

@@ -33,8 +33,8 @@ pub use performative::Performative;
 pub use point::Point;
 pub use sensing::{MAX_RAYS, Rays};
 pub use site::{
-    MAX_SITE_ACTIONS, MAX_SITE_TEXT_BYTES, MAX_SITE_VARIABLES, MAX_SITES, SensedSite, SiteAction,
-    SiteFrame, SiteRefusal, SiteResult,
+    KnownSite, MAX_KNOWN_SITES, MAX_SITE_ACTIONS, MAX_SITE_TEXT_BYTES, MAX_SITE_VARIABLES,
+    MAX_SITES, SensedSite, SiteAction, SiteFrame, SiteRefusal, SiteResult,
 };
 pub use state::{Answer, PublicState};
 pub use step::{

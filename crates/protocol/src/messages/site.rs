@@ -13,12 +13,25 @@ use crate::name::MAX_NAME_LEN;
 
 /// Most sites of a scenario.
 pub const MAX_SITES: usize = 1024;
+/// Most sites that every robot knows of: with the longest names they are an eighth of a message.
+pub const MAX_KNOWN_SITES: usize = 512;
 /// Most variables of the state of a site.
 pub const MAX_SITE_VARIABLES: usize = 16;
 /// Longest text in the state of a site, in bytes.
 pub const MAX_SITE_TEXT_BYTES: usize = 256;
 /// Most actions on sites in a report.
 pub const MAX_SITE_ACTIONS: usize = 64;
+
+/// A site that every robot knows of: where it is, and not its state.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct KnownSite {
+    /// Its name.
+    pub name: String,
+    /// A word for what it is, from the scenario.
+    pub kind: String,
+    /// Where it is, meters.
+    pub location: Point,
+}
 
 /// A site that a robot senses.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

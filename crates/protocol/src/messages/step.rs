@@ -11,7 +11,7 @@ use super::payload::Payload;
 use super::performative::Performative;
 use super::point::Point;
 use super::sensing::Rays;
-use super::site::{SensedSite, SiteAction, SiteResult, check_site_actions};
+use super::site::{KnownSite, SensedSite, SiteAction, SiteResult, check_site_actions};
 use super::state::PublicState;
 use super::target::Target;
 use super::variables::{StateVariables, check_variables};
@@ -151,6 +151,9 @@ pub struct Welcome {
     pub location: Point,
     /// Names of all robots of the scenario, itself included, in the order of their bytes.
     pub roster: Vec<RobotName>,
+    /// The sites that every robot knows of, by name. Their states are sensed within range ([`TickUpdate::sites`]).
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub known_sites: Vec<KnownSite>,
     /// Its parameters.
     pub parameters: Parameters,
     /// If its parameters have changed in this epoch: those before, the last first. A robot that refuses its parameters when it

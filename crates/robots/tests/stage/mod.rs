@@ -381,6 +381,7 @@ pub(crate) fn welcome(
         rays: None,
         location: at,
         roster: roster.to_vec(),
+        known_sites: Vec::new(),
         parameters,
         earlier_parameters: Vec::new(),
         later_parameters: Vec::new(),

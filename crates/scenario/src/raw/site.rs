@@ -7,7 +7,9 @@ use config::bulk::member;
 use config::units::Length;
 use config::{FileError, Source};
 use protocol::RobotName;
-use protocol::messages::{MAX_SITE_TEXT_BYTES, MAX_SITE_VARIABLES, MAX_SITES, Point, Variable};
+use protocol::messages::{
+    MAX_KNOWN_SITES, MAX_SITE_TEXT_BYTES, MAX_SITE_VARIABLES, MAX_SITES, Point, Variable,
+};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
@@ -30,6 +32,8 @@ pub(super) struct SiteTable {
     kind: Option<Spanned<String>>,
     at: Spanned<StartPlace>,
     range: Option<Spanned<Length>>,
+    /// Whether every robot knows where it is.
+    known: Option<Spanned<bool>>,
     on_conflict: Option<OnConflict>,
     solid: Option<Spanned<bool>>,
     #[serde(default)]
@@ -57,6 +61,7 @@ pub(super) fn check(
     source: &Source,
 ) -> Result<(BTreeMap<String, SiteSpec>, SiteSpans), FileError> {
     let mut sites = BTreeMap::new();
+    let mut known = 0;
     let mut spans = SiteSpans::new();
 
     for entry in raw {
@@ -69,6 +74,14 @@ pub(super) fn check(
         let count = numbers.clone().map_or(1, Iterator::count);
         if count > MAX_SITES - sites.len() {
             return Err(refuse(&format!("more than {MAX_SITES} sites")));
+        }
+        known += if spec.is_known { count } else { 0 };
+        if known > MAX_KNOWN_SITES {
+            let reason = format!(
+                "more than {MAX_KNOWN_SITES} sites with known = true: robots can only sense the others"
+            );
+            let span = table.known.as_ref().map(Spanned::span);
+            return Err(FileError::at(source, span, &reason));
         }
 
         for number in 1..=count {
@@ -114,6 +127,7 @@ impl SiteTable {
             at: Point::default(),
             drawn: None,
             range_m: range.0,
+            is_known: self.known.as_ref().is_some_and(|known| *known.get_ref()),
             on_conflict: self.on_conflict.unwrap_or_default(),
             state: self.check_state(source)?,
         })
@@ -148,6 +162,7 @@ impl SiteTable {
             kind: Some(unplaced(spec.kind.clone())),
             at: unplaced(StartPlace::of(to_world(spec.at), spec.drawn)),
             range: Some(unplaced(Length(spec.range_m))),
+            known: spec.is_known.then_some(unplaced(true)),
             on_conflict: Some(spec.on_conflict),
             solid: None,
             state,

@@ -11,6 +11,7 @@ from . import panel
 from ._cars import Cars, Stream, __version__, published_angle, stream
 from ._data import (
     Command,
+    KnownSite,
     Point,
     PublicState,
     Rays,
@@ -63,6 +64,7 @@ __all__ = [
     "HostError",
     "Hunt",
     "Interrupted",
+    "KnownSite",
     "Page",
     "Panel",
     "Picture",

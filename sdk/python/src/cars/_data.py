@@ -61,6 +61,14 @@ class SensedBody(NamedTuple):
     location: Point
 
 
+class KnownSite(NamedTuple):
+    """A site that every robot knows of: where it is, and not its state."""
+
+    name: str
+    kind: str
+    location: Point
+
+
 class SensedSite(NamedTuple):
     """A site within its range: a thing at a place, of a kind, with a state."""
 
@@ -140,6 +148,8 @@ class Welcome:
     """Its parameters, as the scenario says, lengths and times in SI units."""
     rays: Optional[Rays] = None
     """The fan of rays of ``cars.ranges``, if the scenario has one."""
+    known_sites: tuple[KnownSite, ...] = ()
+    """The sites that every robot knows of, by name. Their states are sensed within range: ``cars.sites``."""
     last_state: Optional[Mapping[str, Any]] = None
     """What its previous incarnation reported last in this epoch."""
 
@@ -154,4 +164,7 @@ def read_welcome(text: str) -> Welcome:
     if "rays" in given:
         known["rays"] = Rays(**given["rays"])
     known["roster"] = tuple(given["roster"])
+    known["known_sites"] = tuple(
+        KnownSite(site["name"], site["kind"], Point(**site["location"])) for site in given.get("known_sites", [])
+    )
     return Welcome(**known)
