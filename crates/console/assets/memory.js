@@ -6,8 +6,9 @@ import { spread } from "./history.js";
 
 /** @typedef {import("./types/messages.js").WorldFrame} WorldFrame */
 /** @typedef {import("./widgets.js").Panel} Panel */
-/** A frame without its guests, whose places are packed, and the panels of its tick.
- * @typedef {{frame: WorldFrame, guests_m: Float64Array, panels: Map<string, Panel>}} Seen */
+/** @typedef {import("./flights.js").Flights} Flights */
+/** A frame without its guests, whose places are packed, the panels of its tick, and what is known of commands around it.
+ * @typedef {{frame: WorldFrame, guests_m: Float64Array, panels: Map<string, Panel>, flights: Flights}} Seen */
 
 /** Most frames; beyond, older ones are dropped where they are close together, so that the whole time stays in reach. */
 const MOST_FRAMES = 3000;
@@ -31,13 +32,14 @@ export class Memory {
   /**
    * @param {WorldFrame} frame
    * @param {Map<string, Panel>} panels of its tick; one that comes later is added by the caller
+   * @param {Flights} flights
    */
-  add(frame, panels) {
+  add(frame, panels, flights) {
     const last = this.seen.at(-1);
     if (last && frame.tick <= last.frame.tick) return;
 
     const guests_m = new Float64Array(frame.guests.flat());
-    const seen = { frame: { ...frame, guests: [] }, guests_m, panels };
+    const seen = { frame: { ...frame, guests: [] }, guests_m, panels, flights };
     this.seen.push(seen);
     this.bodies += weight(seen);
     if (this.seen.length > MOST_FRAMES || this.bodies > MOST_BODIES) this.thin();
@@ -68,18 +70,18 @@ export class Memory {
   /**
    * The newest frame of a tick or before; the oldest one if all are later.
    * @param {number} tick
-   * @returns {{frame: WorldFrame, panels: Map<string, Panel>} | null}
+   * @returns {{frame: WorldFrame, panels: Map<string, Panel>, flights: Flights} | null}
    */
   at(tick) {
     const later = this.seen.findIndex(({ frame }) => frame.tick > tick);
     const seen = this.seen[later < 0 ? this.seen.length - 1 : Math.max(0, later - 1)];
     if (!seen) return null;
 
-    const { frame, guests_m, panels } = seen;
+    const { frame, guests_m, panels, flights } = seen;
     /** @type {[number, number][]} */
     const guests = [];
     for (let i = 0; i < guests_m.length; i += 2) guests.push([guests_m[i], guests_m[i + 1]]);
-    return { frame: { ...frame, guests }, panels };
+    return { frame: { ...frame, guests }, panels, flights };
   }
 
   /** The frames after a tick, without guests. @param {number} tick */

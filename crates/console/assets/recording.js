@@ -488,7 +488,7 @@ export class Player {
     const seen = memory.at(tick);
     if (!live || !seen) return;
     this.chosen = seen.frame.tick;
-    this.store.showPast({ ...seen.frame, phase: live.phase, speed: live.speed, awaiting: [], flights: [] }, seen.panels, this.store.liveFlights);
+    this.store.showPast({ ...seen.frame, phase: live.phase, speed: live.speed, awaiting: [], flights: [] }, seen.panels, seen.flights);
   }
 
   /**

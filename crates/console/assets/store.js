@@ -174,6 +174,8 @@ export class Store {
     this.live = frame;
     this.frameAt_ms = performance.now();
     if (isBackward) this.forget();
+    // The frame of a replay that has been moved has all that is under way.
+    else if ((frame.jumps ?? 0) !== (last?.jumps ?? 0)) this.liveFlights = new Flights();
     // Another run of the name, or a replay that has been moved.
     if (last && compare(frame, last) < 0) this.marks.restart(this.log);
 
@@ -182,7 +184,7 @@ export class Store {
     this.liveFlights.push(frame.flights ?? []);
     if (!this.isBack) this.flights = this.liveFlights;
     this.liveHistory.see(frame.time_s, frame.tick_s, frame.robots);
-    this.memory.add(frame, this.livePanels);
+    this.memory.add(frame, this.livePanels, this.liveFlights);
     if (!this.isBack) this.emit("panel");
     if (!this.isBack) this.show(frame);
     else if (isChanged && this.frame) this.show({ ...this.frame, phase: frame.phase, speed: frame.speed, flights: [] });

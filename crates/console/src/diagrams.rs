@@ -1,18 +1,12 @@
-//! Space-time diagrams of a recorded run. What is in progress at the beginning of a window is known from all events before it,
-//! so it is kept for some ticks once it has been read.
-
-use std::sync::{Mutex, PoisonError};
+//! Space-time diagrams of a recorded run.
 
 use pictures::diagram::{Diagram, DiagramOptions, TooMuch};
 use protocol::{Epoch, Tick};
-use recording::{Header, Recording, RecordingError};
+use recording::{Header, Recording, RecordingError, Timelines};
 use serde::Deserialize;
-use timeline::Timeline;
 
 /// Most ticks in a diagram.
 pub(crate) const MAX_WINDOW_TICKS: u64 = 4096;
-/// Ticks from one timeline that is kept to the next.
-const KEPT_TICKS: Tick = 512;
 /// Least and most width of a diagram, pixels.
 const WIDTHS_PX: std::ops::RangeInclusive<f64> = 300.0..=4800.0;
 
@@ -50,68 +44,30 @@ pub(crate) enum DiagramError {
     TooMuch(#[from] TooMuch),
 }
 
-/// The timelines that are kept: before tick 0, before tick [`KEPT_TICKS`] and so on, as far as was needed.
-#[derive(Debug)]
-pub(crate) struct Diagrams {
-    timelines: Mutex<Vec<Timeline>>,
-}
+/// The diagram of a window, which ends with the last tick of the recording at the latest.
+///
+/// # Errors
+/// [`DiagramError`] if the file is damaged or the window has too much.
+pub(crate) fn draw(
+    file: &Recording,
+    timelines: &Timelines,
+    window: WindowQuery,
+) -> Result<String, DiagramError> {
+    let from = window.from.min(file.len().saturating_sub(1));
+    let to = from.saturating_add(window.count).min(file.len());
+    let Header { run, seed, .. } = file.header();
+    let options = DiagramOptions {
+        title: format!("{run}, seed {seed}"),
+        queries: window.queries,
+        max_width_px: window.width,
+        has_style: false,
+        ..DiagramOptions::default()
+    };
 
-impl Diagrams {
-    /// Those of a recording that has not been read yet.
-    pub(crate) fn of(file: &Recording) -> Self {
-        let first = Timeline::new(&file.header().robots);
-        Self {
-            timelines: Mutex::new(vec![first]),
-        }
-    }
-
-    /// The diagram of a window, which ends with the last tick of the recording at the latest.
-    ///
-    /// # Errors
-    /// [`DiagramError`] if the file is damaged or the window has too much.
-    pub(crate) fn draw(
-        &self,
-        file: &Recording,
-        window: WindowQuery,
-    ) -> Result<String, DiagramError> {
-        let from = window.from.min(file.len().saturating_sub(1));
-        let to = from.saturating_add(window.count).min(file.len());
-        let Header { run, seed, .. } = file.header();
-        let options = DiagramOptions {
-            title: format!("{run}, seed {seed}"),
-            queries: window.queries,
-            max_width_px: window.width,
-            has_style: false,
-            ..DiagramOptions::default()
-        };
-
-        let timeline = self.before(file, from)?;
-        let mut diagram = Diagram::new(timeline, file.header().tick_s, from, options);
-        file.for_events(from, to, |tick| {
-            diagram.tick(tick.tick, &tick.events, &tick.awaited);
-        })?;
-        Ok(diagram.to_svg()?)
-    }
-
-    /// What is in progress before a tick of the recording.
-    ///
-    /// # Errors
-    /// [`RecordingError`] if the file is damaged.
-    pub(crate) fn before(&self, file: &Recording, tick: Tick) -> Result<Timeline, RecordingError> {
-        let mut timelines = self
-            .timelines
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
-        let kept = usize::try_from(tick / KEPT_TICKS).unwrap_or(usize::MAX);
-        let index = kept.min(timelines.len() - 1);
-        let mut timeline = timelines[index].clone();
-
-        file.for_events(index as Tick * KEPT_TICKS, tick, |tick| {
-            timeline.tick(tick.tick, &tick.events);
-            if tick.tick + 1 == timelines.len() as Tick * KEPT_TICKS {
-                timelines.push(timeline.clone());
-            }
-        })?;
-        Ok(timeline)
-    }
+    let timeline = timelines.before(file, from)?;
+    let mut diagram = Diagram::new(timeline, file.header().tick_s, from, options);
+    file.for_events(from, to, |tick| {
+        diagram.tick(tick.tick, &tick.events, &tick.awaited);
+    })?;
+    Ok(diagram.to_svg()?)
 }

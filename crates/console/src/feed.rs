@@ -196,8 +196,11 @@ impl FeedState {
     fn put_frame(&mut self, encoded: EncodedFrame) {
         let frame = &encoded.frame;
         let previous = self.frame.as_ref().map(|previous| &previous.frame);
-        // Ticks of a new epoch begin at 0 again: a flight of the one before would be shown in it.
-        if previous.is_some_and(|previous| previous.epoch != frame.epoch) {
+        // Ticks of a new epoch begin at 0 again, and a replay that has been moved tells all anew: a flight of
+        // before would be shown in it.
+        if previous
+            .is_some_and(|previous| previous.epoch != frame.epoch || previous.jumps != frame.jumps)
+        {
             self.flights.clear();
         }
 
@@ -336,12 +339,14 @@ impl FeedState {
         }
         cursor.frame = self.frame_count;
 
-        // A browser that has just connected gets the flights of the newest frame only.
-        let has_skipped = seen != 0 && seen + 1 < self.frame_count;
+        // A browser that has just connected to a run in progress finds in its recording what was sent
+        // before. Of a replay there is only what is kept here.
+        let has_skipped = seen + 1 < self.frame_count;
+        let is_told = has_skipped && (seen != 0 || encoded.frame.replay_of.is_some());
         let flights = self
             .flights
             .iter()
-            .filter(|flight| has_skipped && flight.number > seen)
+            .filter(|flight| is_told && flight.number > seen)
             .map(|flight| flight.value.clone())
             .collect();
         Some(NewFrame {
@@ -442,6 +447,7 @@ mod tests {
             tick_s: 1.0,
             seed: 1,
             replay_of: None,
+            jumps: 0,
             speed: None,
             phase: Phase::Running,
             awaiting: Vec::new(),
@@ -561,6 +567,35 @@ mod tests {
 
         let new = take_new(&feed, &mut cursor);
         assert_eq!(flights(&new[0]).len(), 1);
+    }
+
+    #[test]
+    fn a_replay_that_has_been_moved_tells_nothing_of_before() {
+        let feed = Feed::new();
+        let replayed = |tick, jumps| WorldFrame {
+            replay_of: Some(protocol::RunName::new("r").unwrap()),
+            jumps,
+            ..frame(tick)
+        };
+        let mut cursor = Cursor::default();
+        feed.put_frame(replayed(1, 0));
+        take_new(&feed, &mut cursor);
+
+        // The frame of the jump is skipped.
+        for (tick, jumps) in [(2, 0), (50, 1), (51, 1)] {
+            feed.put_frame(replayed(tick, jumps));
+        }
+
+        for mut cursor in [cursor, Cursor::default()] {
+            let new = take_new(&feed, &mut cursor);
+            let newest = new.last().unwrap();
+            assert_eq!(newest["frame"]["jumps"], 1);
+            let told: Vec<_> = flights(newest)
+                .iter()
+                .map(|flight| &flight["tick"])
+                .collect();
+            assert_eq!(told, [50, 51]);
+        }
     }
 
     fn ticks(messages: &[Value]) -> Vec<u64> {

@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::{PoisonError, RwLock, RwLockReadGuard};
 
-use protocol::messages::{Fate, Flight, HeldProcess, LogRecord, Point, Presence};
+use protocol::messages::{Flight, HeldProcess, LogRecord, Point, Presence};
 use protocol::{Epoch, Event, RobotName, Tick};
-use recording::{Header, Json, PlacedRobot, RawTick, RecordingError};
+use recording::{Header, Json, PlacedRobot, RawTick, RecordingError, Timelines};
 use serde::Serialize;
-use timeline::{CommandSpan, StateKind, Timeline};
+use timeline::{StateKind, Timeline};
 
-use crate::diagrams::{DiagramError, Diagrams, WindowQuery};
+use crate::diagrams::{self, DiagramError, WindowQuery};
 
 /// Most ticks in one answer.
 pub(crate) const MAX_TICKS: u64 = 512;
@@ -18,11 +18,6 @@ pub(crate) const MAX_TICKS: u64 = 512;
 pub(crate) const MAX_SAMPLED_TICKS: u64 = 4096;
 /// Most bytes in one answer, as they are recorded; an answer has at least one tick.
 const MAX_BYTES: u64 = 32 << 20;
-
-/// How long before a range commands are told of: the page shows for 2 s what became of a command (`assets/flights.js`).
-const TOLD_S: f64 = 2.0;
-/// Most ticks of it.
-const MOST_TOLD_TICKS: u64 = 4096;
 
 /// Why a recording cannot be shown.
 #[derive(Debug, thiserror::Error)]
@@ -56,7 +51,7 @@ pub(crate) struct RecordedEpoch {
     /// Which one of the recordings with this epoch it is: a run may be started anew.
     number: u64,
     file: RwLock<recording::Recording>,
-    diagrams: Diagrams,
+    timelines: Timelines,
 }
 
 /// The header of a recording, and its length.
@@ -90,7 +85,7 @@ struct EncodedRange {
     ticks: List,
     /// Panels of these ticks.
     panels: List,
-    /// Commands under way before the range, and what became of those of the last [`TOLD_S`] before it.
+    /// What is known of commands before the range.
     earlier_flights: Vec<Flight>,
     flights: Vec<Flight>,
     log: Vec<LogRecord>,
@@ -160,7 +155,7 @@ impl RecordedEpoch {
         Ok(Self {
             header: file.header().clone(),
             number,
-            diagrams: Diagrams::of(&file),
+            timelines: Timelines::of(&file),
             file: RwLock::new(file),
         })
     }
@@ -219,19 +214,13 @@ impl RecordedEpoch {
             ..EncodedRange::default()
         };
         // Whether a robot is lost in the first tick depends on ticks before the range.
-        let told_from = from.saturating_sub(self.told_ticks());
-        let mut timeline = self.diagrams.before(&file, told_from)?;
-        if every.is_none() {
-            range.earlier_flights = timeline.commands().map(sent).collect();
-        }
-        file.for_events(told_from, from, |recorded| {
-            timeline.tick(recorded.tick, &recorded.events);
-            if every.is_none() {
-                let told = recorded.events.iter();
-                let flights = told.filter_map(|event| event.flight(recorded.tick));
-                range.earlier_flights.extend(flights);
-            }
-        })?;
+        let mut timeline = if every.is_some() {
+            self.timelines.before(&file, from)?
+        } else {
+            let (timeline, flights) = self.timelines.with_flights(&file, from)?;
+            range.earlier_flights = flights;
+            timeline
+        };
         let mut last_reports = BTreeMap::new();
         for mut recorded in file.read_raw(from, to)? {
             let tick = recorded.tick();
@@ -256,24 +245,13 @@ impl RecordedEpoch {
         Ok(range.into_json())
     }
 
-    /// The ticks in [`TOLD_S`].
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a float becomes the nearest tick, at most MOST_TOLD_TICKS"
-    )]
-    fn told_ticks(&self) -> Tick {
-        let ticks = (TOLD_S / self.header.tick_s).ceil();
-        (ticks as Tick).min(MOST_TOLD_TICKS)
-    }
-
     /// The emotions and behaviors so far, as JSON, in the order in which they first occurred: by it they have their colors.
     ///
     /// # Errors
     /// [`RecordingError`] if the file is damaged.
     pub(crate) fn names(&self) -> Result<Vec<u8>, RecordingError> {
         let file = self.file();
-        let timeline = self.diagrams.before(&file, file.len())?;
+        let timeline = self.timelines.before(&file, file.len())?;
         let names = timeline.names();
         Ok(to_json(&RecordedNames {
             emotion: names.of(StateKind::Emotion),
@@ -286,19 +264,7 @@ impl RecordedEpoch {
     /// # Errors
     /// [`DiagramError`] if the file is damaged or the window has too much.
     pub(crate) fn diagram(&self, window: WindowQuery) -> Result<String, DiagramError> {
-        self.diagrams.draw(&self.file(), window)
-    }
-}
-
-/// A command under way, as the tick in which it was sent shows it.
-fn sent(command: &CommandSpan) -> Flight {
-    Flight {
-        tick: command.sent,
-        from: command.from.clone(),
-        to: command.to.clone(),
-        seq: command.seq,
-        command: command.text.clone(),
-        fate: Fate::Sent,
+        diagrams::draw(&self.file(), &self.timelines, window)
     }
 }
 

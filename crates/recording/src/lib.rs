@@ -15,6 +15,7 @@ mod protobuf;
 mod read;
 mod shown;
 mod ticks;
+mod timelines;
 mod topic;
 mod viewers;
 mod write;
@@ -26,6 +27,7 @@ pub use damage::RecordingError;
 pub use read::Recording;
 pub use shown::LastReports;
 pub use ticks::Ticks;
+pub use timelines::Timelines;
 pub use write::{WriteError, Writer};
 
 /// Name of the file in the folder of a run.

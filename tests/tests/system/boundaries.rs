@@ -18,7 +18,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("statistics", &["protocol"]),
     ("observe", &["config", "protocol", "timeline"]),
     ("bus", &["protocol", "workspace-hack"]),
-    ("recording", &["protocol"]),
+    ("recording", &["protocol", "timeline"]),
     (
         "export",
         &[

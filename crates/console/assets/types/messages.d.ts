@@ -651,6 +651,11 @@ export interface WorldFrame {
    */
   guests: [number, number][];
   /**
+   * How often a replay has been moved to another tick so far; 0 in a run in progress. With each move, observers forget what
+   * they know of commands: `flights` then has all that is under way.
+   */
+  jumps?: number;
+  /**
    * Centers of the fixed obstacles, meters.
    */
   obstacles: [number, number][];

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::control::{Awaited, FaultKind, Phase, Presence};
-use super::limits::{counted, few, finite, short};
+use super::limits::{counted, few, finite, is_zero, short};
 use super::numbers::{Epoch, Generation, Seq, Tick};
 use super::point::Point;
 use super::site::SiteFrame;
@@ -34,6 +34,10 @@ pub struct WorldFrame {
     /// The recorded run of which this is a replay; none in a run in progress.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub replay_of: Option<RunName>,
+    /// How often a replay has been moved to another tick so far; 0 in a run in progress. With each move, observers forget what
+    /// they know of commands: `flights` then has all that is under way.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub jumps: u32,
     /// Real-time factor; `null` is as fast as the barrier goes.
     pub speed: Option<f64>,
     /// What the simulator is doing.

@@ -66,6 +66,7 @@ pub(super) fn empty_frame(status: &Status, field_m: [f64; 2], body_m: f64) -> Wo
         tick_s: status.tick_s,
         seed: status.seed,
         replay_of: status.replay_of.clone(),
+        jumps: 0,
         speed: status.speed,
         phase: status.phase,
         awaiting: status.awaiting.clone(),

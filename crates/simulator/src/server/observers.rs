@@ -45,6 +45,8 @@ pub(super) struct Observers {
     past_lines: PastLines,
     /// What became of commands since the last frame.
     flights: VecDeque<Flight>,
+    /// How often a replay has been moved.
+    jumps: u32,
 }
 
 impl Observers {
@@ -56,6 +58,7 @@ impl Observers {
             panels_at: None,
             past_lines: PastLines::default(),
             flights: VecDeque::new(),
+            jumps: 0,
         })
     }
 
@@ -84,15 +87,19 @@ impl Observers {
         self.frame_at = None;
     }
 
-    /// Forgets what the next frame would show of earlier ticks.
-    pub(super) fn forget(&mut self) {
+    /// A replay has been moved: observers forget what they know of commands, and the next frame has what is known before its
+    /// tick.
+    pub(super) fn jump(&mut self, known: Vec<Flight>) {
         self.flights.clear();
+        self.jumps += 1;
+        self.add_flights(known);
     }
 
     /// Puts a frame, with the flights since the one before.
     pub(super) fn put(&mut self, mut frame: WorldFrame) {
         // Also those of ticks that no frame has shown: what became of a command is seen once.
         frame.flights = std::mem::take(&mut self.flights).into();
+        frame.jumps = self.jumps;
         put_lossy(&self.world, encode(&frame));
     }
 
@@ -102,7 +109,11 @@ impl Observers {
         if !self.world.has_subscribers() {
             return;
         }
-        for flight in events.iter().filter_map(|event| event.flight(tick)) {
+        self.add_flights(events.iter().filter_map(|event| event.flight(tick)));
+    }
+
+    fn add_flights(&mut self, flights: impl IntoIterator<Item = Flight>) {
+        for flight in flights {
             if self.flights.len() == MAX_FLIGHTS {
                 self.flights.pop_front();
             }

@@ -3,15 +3,20 @@
 use std::collections::BTreeMap;
 
 use lockstep::{NoState, RecentStates, StateQuery};
-use protocol::messages::{LogRecord, PublicState, RobotFrame, Status, TickPanel, WorldFrame};
+use protocol::messages::{
+    Flight, LogRecord, PublicState, RobotFrame, Status, TickPanel, WorldFrame,
+};
 use protocol::{Event, RobotName, Tick};
-use recording::{Header, LastReports, PlacedRobot, RecordedTick, Recording, RecordingError, Ticks};
+use recording::{
+    Header, LastReports, PlacedRobot, RecordedTick, Recording, RecordingError, Ticks, Timelines,
+};
 
 use super::frame::empty_frame;
 
 /// A recording, and the tick of it that is shown.
 pub(super) struct Player {
     ticks: Ticks,
+    timelines: Timelines,
     last_reports: LastReports,
     shown: ShownTick,
 }
@@ -29,11 +34,13 @@ impl Player {
     pub(super) fn open(recording: Recording) -> Result<Self, RecordingError> {
         let mut last_reports = LastReports::default();
         let shown = ShownTick::at(0, &recording, &mut last_reports)?;
+        let timelines = Timelines::of(&recording);
         let mut ticks = Ticks::of(recording);
         ticks.seek(1);
 
         Ok(Self {
             ticks,
+            timelines,
             last_reports,
             shown,
         })
@@ -95,6 +102,20 @@ impl Player {
     /// The events of the tick.
     pub(super) fn events(&self) -> &[Event] {
         &self.shown.recorded.events
+    }
+
+    /// What observers know of commands before the tick. Damage there costs no more than that.
+    pub(super) fn earlier_flights(&self) -> Vec<Flight> {
+        match self.timelines.with_flights(self.recording(), self.tick()) {
+            Ok((_, flights)) => flights,
+            Err(error) => {
+                tracing::warn!(
+                    "commands sent before tick {} are not shown: {error}",
+                    self.tick()
+                );
+                Vec::new()
+            }
+        }
     }
 
     /// The lines of the log about the tick.

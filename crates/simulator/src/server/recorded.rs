@@ -368,8 +368,12 @@ impl RecordedRun {
         // Before anything is changed: where the tick cannot be read, the replay stays as it is.
         self.player.seek(tick).map_err(|error| error.to_string())?;
 
-        // What was under way before would be shown as if it led to the ticks after.
-        frontend.observers.forget();
+        let known = if frontend.observers.has_subscribers() {
+            self.player.earlier_flights()
+        } else {
+            Vec::new()
+        };
+        frontend.observers.jump(known);
         frontend.pace.pending_steps = 0;
         frontend.pace.due = Instant::now();
         self.answer_stepping(frontend);
