@@ -3,7 +3,7 @@
 import pytest
 from playwright.sync_api import expect
 
-from lab import eventually
+from lab import FITS, eventually, until
 
 pytestmark = pytest.mark.thorough
 
@@ -51,6 +51,24 @@ def test_the_run_waits_for_its_browser_and_begins_there(launched, open_page, fak
     expect(page.get_by_test_id("tick")).to_have_text("60")
     page.context.close()
     ended(run)
+
+
+@pytest.mark.parametrize(("width", "height"), [(1024, 700), (1280, 720), (1440, 900)])
+def test_most_of_the_plan_is_seen_beside_the_guide(launched, open_page, fake_browser, width, height, screenshots):
+    run = launched("--open", "--duration", "30 s")
+    page = open_page(run.address, width=width, height=height)
+    guide, plan = page.get_by_test_id("guide"), page.get_by_test_id("plan")
+    expect(guide.get_by_role("listitem")).to_have_count(5)
+    expect(page.get_by_test_id("tick")).to_have_text("0")
+    until(page, FITS)
+    # What is left of its height, and no step has to be scrolled to.
+    seen = plan.bounding_box()["height"]
+    assert guide.evaluate("(guide) => guide.scrollHeight <= guide.clientHeight")
+    page.screenshot(path=screenshots / f"guide-{width}x{height}.png")
+    page.get_by_test_id("guide-close").click()
+    expect(guide).to_be_hidden()
+    until(page, FITS)
+    assert seen >= 0.6 * plan.bounding_box()["height"]
 
 
 def test_the_guide_is_put_away_for_good(launched, open_page, fake_browser, screenshots):

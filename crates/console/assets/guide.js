@@ -49,10 +49,10 @@ function guide(place, store) {
  */
 function steps(hasNotBegun, run) {
   return html`<ol>
-      <li><b>Look.</b> ${hasNotBegun ? html`The run waits: press <i>Start</i> at the top. ` : nothing}The ring around a robot is its emotion, an envelope is a command under way, an arrow one that was received.</li>
-      <li><b>Cut a link.</b> The tab <i>Experiment</i>, one robot <i>from</i>, the other one <i>to</i>, <i>Cut</i>.</li>
-      <li><b>Why?</b> The panel beside the plan says <i>why</i> a robot feels so; the log has each change.</li>
-      <li><b>Go back.</b> Drag the time line to any moment; <i>Back to now</i> goes on with the run.</li>
-      <li><b>Verify.</b> After the end, in a terminal: <code data-testid="guide-verify">cars verify ${run}</code> executes it again, and compares.</li>
+      <li><b>Look.</b> ${hasNotBegun ? html`The run waits: press <i>Start</i>. ` : nothing}A robot's ring is its emotion.</li>
+      <li><b>Cut a link.</b> The tab <i>Experiment</i>, robots <i>from</i> and <i>to</i>, <i>Cut</i>.</li>
+      <li><b>Why?</b> The panel beside the plan says <i>why</i> a robot feels so.</li>
+      <li><b>Go back.</b> Drag the time line; after that <i>Back to now</i>.</li>
+      <li><b>Verify.</b> In the end, in a terminal: <code data-testid="guide-verify">cars verify ${run}</code></li>
     </ol>`;
 }
