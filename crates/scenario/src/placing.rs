@@ -2,7 +2,7 @@
 //! here name them.
 
 use protocol::RobotName;
-use world::{HallError, Placer, Region, World};
+use world::{Footprint, HallError, Placer, Region, World};
 
 use super::checked::{Obstacle, Scenario, to_wire};
 
@@ -85,7 +85,8 @@ pub(super) fn place_at_random(scenario: &mut Scenario) -> Result<(), PlacingErro
         // Counted from 1, as people count the tables.
         let name = format!("at/obstacle/{}", index + 1);
         let mut stream = protocol::random::stream(scenario.seed, &name);
-        let Some(at) = placer.place(obstacle.shape, region, &mut stream) else {
+        let footprint = obstacle.shape.map(Footprint::from);
+        let Some(at) = placer.place(footprint, region, &mut stream) else {
             return Err(PlacingError::no_room(region, None, Some(index)));
         };
         obstacle.at = to_wire(at);
@@ -97,7 +98,8 @@ pub(super) fn place_at_random(scenario: &mut Scenario) -> Result<(), PlacingErro
             continue;
         };
         let region = robot.drawn.unwrap_or(Region::Field);
-        let Some(at) = placer.place(robot.shape, region, &mut stream) else {
+        let footprint = robot.shape.map(Footprint::from);
+        let Some(at) = placer.place(footprint, region, &mut stream) else {
             return Err(PlacingError::no_room(region, Some(name), None));
         };
         robot.at = to_wire(at);

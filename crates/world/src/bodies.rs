@@ -3,12 +3,14 @@
 //! Bodies share one sequence of numbers: obstacles first, then robots, then guests. The first body in the order
 //! of [`Body`] is therefore the one with the smallest number, and every kind goes through the same test.
 
+use crate::footprint::Footprint;
 use crate::grid::Grid;
 use crate::hall::Field;
 use crate::point::Point;
 use crate::shape::{Shape, Wall};
 use crate::shapes::Shapes;
 use crate::solids::{SolidBlocker, Solids};
+use crate::way::Way;
 
 /// A body, identified by its kind and its index among bodies of that kind.
 ///
@@ -80,16 +82,16 @@ impl Bodies {
         self.solids = Some(Box::new(solids));
     }
 
-    /// Adds the next body, a robot of this shape; see [`Self::push`].
-    pub(crate) fn push_shaped(&mut self, center: Point, shape: Option<Shape>) {
-        if let Some(shape) = shape {
+    /// Adds the next body, a robot with this footprint; see [`Self::push`].
+    pub(crate) fn push_shaped(&mut self, center: Point, footprint: Option<Footprint>) {
+        if let Some(footprint) = footprint {
             let id = self.centers.len();
             let field = self.field;
             let obstacles = &self.centers[..self.robots_from];
             let solids = self
                 .solids
                 .get_or_insert_with(|| Box::new(Solids::new(field, &Shapes::default(), obstacles)));
-            solids.set_shape(id, shape);
+            solids.set_footprint(id, footprint);
         }
         self.push(center);
     }
@@ -98,20 +100,20 @@ impl Bodies {
         self.solids.as_ref().map_or(&[], |solids| solids.walls())
     }
 
-    /// The shape of a body.
-    pub(crate) fn shape(&self, body: Body) -> Shape {
+    /// The footprint of a body.
+    pub(crate) fn footprint(&self, body: Body) -> Footprint {
         let id = match body {
             Body::Obstacle(index) => index,
             Body::Robot(index) => self.robots_from + index,
             Body::Guest(index) => self.guests_from + index,
         };
-        self.shape_of(id)
+        self.footprint_of(id)
     }
 
-    fn shape_of(&self, id: usize) -> Shape {
+    fn footprint_of(&self, id: usize) -> Footprint {
         match &self.solids {
-            Some(solids) => solids.shape(id),
-            None => Shape::square(self.field.body_m),
+            Some(solids) => solids.footprint(id),
+            None => Shape::square(self.field.body_m).into(),
         }
     }
 
@@ -150,14 +152,14 @@ impl Bodies {
         &self.centers[self.guests_from..]
     }
 
-    /// What a new body of this shape at this center would overlap; a square of the field if it has none of its own.
-    pub(crate) fn hit(&self, center: Point, shape: Option<Shape>) -> Option<Blocker> {
-        if self.solids.is_none() && shape.is_none() {
+    /// What a new body with this footprint at this center would overlap; a square of the field if it has none of its own.
+    pub(crate) fn hit(&self, center: Point, footprint: Option<Footprint>) -> Option<Blocker> {
+        if self.solids.is_none() && footprint.is_none() {
             let id = self.first_hit(center, usize::MAX)?;
             return Some(Blocker::Body(self.body(id)));
         }
-        let shape = shape.unwrap_or(Shape::square(self.field.body_m));
-        self.first_blocker(shape, center, center, usize::MAX)
+        let footprint = footprint.unwrap_or(Shape::square(self.field.body_m).into());
+        self.first_blocker(&Way::straight(footprint, center, center), usize::MAX)
     }
 
     /// The largest x, in meters, of the centers that a new square at this center would overlap. Anything but a square counts as
@@ -184,16 +186,16 @@ impl Bodies {
     #[cold]
     #[inline(never)]
     fn rightmost_solid_x_m(&self, solids: &Solids, center: Point) -> Option<f64> {
-        let square = Shape::square(self.field.body_m);
+        let square = Footprint::from(Shape::square(self.field.body_m));
         let half_m = self.field.body_m * 0.5;
         let mut rightmost_x_m = solids.rightmost_x_m(center).map(|x_m| x_m - half_m);
 
         self.grid
             .visit_around(center, solids.reach_m(square), |id| {
-                let shape = solids.shape(id);
+                let footprint = solids.footprint(id);
                 let at = self.centers[id];
-                if square.overlaps(center, shape, at) {
-                    let x_m = at.x + shape.half_m().0 - half_m;
+                if square.overlaps(center, footprint, at) {
+                    let x_m = at.x + footprint.half_m().0 - half_m;
                     rightmost_x_m =
                         Some(rightmost_x_m.map_or(x_m, |other_m: f64| other_m.max(x_m)));
                 }
@@ -205,6 +207,30 @@ impl Bodies {
     /// Moves a robot to `to`, or leaves it in place and returns what blocks it.
     pub(crate) fn advance_robot(&mut self, index: usize, to: Point) -> Result<(), Blocker> {
         self.advance(self.robots_from + index, to)
+    }
+
+    /// Moves a robot that turns to `to`, or leaves it in place and returns what blocks it. `footprint` is the robot as it lies after
+    /// it has turned by `turn_rad`.
+    pub(crate) fn turn_robot(
+        &mut self,
+        index: usize,
+        to: Point,
+        footprint: Footprint,
+        turn_rad: f64,
+    ) -> Result<(), Blocker> {
+        let id = self.robots_from + index;
+        let way = Way {
+            from: self.centers[id],
+            to,
+            footprint,
+            turn_rad,
+        };
+        self.advance_along(id, &way)?;
+
+        if let Some(solids) = &mut self.solids {
+            solids.set_footprint(id, footprint);
+        }
+        Ok(())
     }
 
     /// Moves a guest by `step`, or leaves it in place and returns what blocks it.
@@ -241,41 +267,40 @@ impl Bodies {
     #[cold]
     #[inline(never)]
     fn advance_shaped(&mut self, id: usize, to: Point) -> Result<(), Blocker> {
-        let shape = self.shape_of(id);
-        if !shape.is_inside(to, self.field.size_m) {
+        let way = Way::straight(self.footprint_of(id), self.centers[id], to);
+        self.advance_along(id, &way)
+    }
+
+    fn advance_along(&mut self, id: usize, way: &Way) -> Result<(), Blocker> {
+        if !way.footprint.is_inside(way.to, self.field.size_m) {
             return Err(Blocker::Edge);
         }
 
-        if let Some(by) = self.first_blocker(shape, self.centers[id], to, id) {
+        if let Some(by) = self.first_blocker(way, id) {
             return Err(by);
         }
 
-        self.centers[id] = to;
-        self.grid.relocate(id, to);
+        self.centers[id] = way.to;
+        self.grid.relocate(id, way.to);
         Ok(())
     }
 
-    /// What is in the way of a body of this shape, other than `except`.
-    fn first_blocker(
-        &self,
-        shape: Shape,
-        from: Point,
-        to: Point,
-        except: usize,
-    ) -> Option<Blocker> {
-        let default = Shape::square(self.field.body_m);
+    /// What is in the way of a body other than `except`.
+    fn first_blocker(&self, way: &Way, except: usize) -> Option<Blocker> {
+        let &Way { to, footprint, .. } = way;
+        let default = Footprint::from(Shape::square(self.field.body_m));
         let mut first = usize::MAX;
         let mut reach_m = 0.0;
 
         if let Some(solids) = &self.solids {
-            match solids.blocker(shape, from, to) {
+            match solids.blocker(way) {
                 Some(SolidBlocker::Wall(index)) => return Some(Blocker::Wall(index)),
                 Some(SolidBlocker::Obstacle(id)) => first = id,
                 None => {}
             }
-            reach_m = solids.reach_m(shape);
+            reach_m = solids.reach_m(footprint);
         } else {
-            let (half_x_m, half_y_m) = shape.half_m();
+            let (half_x_m, half_y_m) = footprint.half_m();
             reach_m += half_x_m.max(half_y_m) + self.field.body_m * 0.5;
         }
 
@@ -283,8 +308,8 @@ impl Bodies {
             let other = self
                 .solids
                 .as_ref()
-                .map_or(default, |solids| solids.shape(id));
-            if id < first && id != except && shape.overlaps(to, other, self.centers[id]) {
+                .map_or(default, |solids| solids.footprint(id));
+            if id < first && id != except && footprint.overlaps(to, other, self.centers[id]) {
                 first = id;
             }
         });

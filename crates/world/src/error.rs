@@ -98,6 +98,11 @@ pub enum HallError {
         /// Its extent, m.
         value_m: f64,
     },
+    /// A limit of a robot with wheels is not more than zero, or its heading is not finite.
+    RobotWheels {
+        /// Index of the robot.
+        index: usize,
+    },
     /// A fixed obstacle is not entirely inside the field.
     ObstacleOffField {
         /// Index of the obstacle.
@@ -194,6 +199,12 @@ impl fmt::Display for HallError {
             }
             Self::ObstacleSize { index, value_m } => size(f, "obstacle", index, value_m),
             Self::RobotSize { index, value_m } => size(f, "robot", index, value_m),
+            Self::RobotWheels { index } => {
+                write!(
+                    f,
+                    "the limits of the wheels of robot {index} must be more than zero, and its heading finite"
+                )
+            }
             Self::RobotOnWall { index, at, wall } => {
                 write!(f, "robot {index} at {at} m stands on wall {wall}")
             }

@@ -16,6 +16,10 @@
 //! As in the paper, only the proposed location is tested, and not the path to it. Walls, and obstacles with a shape of their
 //! own, are tested against the straight path: no body passes through one, however fast it is.
 //!
+//! A robot with [`Wheels`] (chosen here) proposes no location but a [`Velocity`], and its body turns with it: it moves and turns, or
+//! it stands still and turns, or, where the turned body has no room either, it stays as it is. On the way it turns evenly, and
+//! walls and obstacles with a shape of their own are tested against the whole of it.
+//!
 //! # Random draws
 //!
 //! All draws come from one stream, in this order:
@@ -60,6 +64,7 @@
 
 mod bodies;
 mod error;
+mod footprint;
 mod grid;
 mod guests;
 mod hall;
@@ -73,9 +78,12 @@ mod shapes;
 mod sight;
 mod solids;
 mod triangular;
+mod way;
+mod wheels;
 
 pub use bodies::{Blocker, Body, Near};
 pub use error::{HallError, TriangularError};
+pub use footprint::Footprint;
 pub use guests::Course;
 pub use hall::{Field, Guests, Hall};
 pub use limits::{BODIES_MAX, BODY_MIN_M, SIDE_MAX_M, TOLERANCE_M, WALLS_MAX};
@@ -87,3 +95,4 @@ pub use shape::{Shape, Wall};
 pub use shapes::Shapes;
 pub use sight::{Opaque, is_hidden};
 pub use triangular::Triangular;
+pub use wheels::{Pose, Velocity, Wheels};

@@ -2,6 +2,7 @@
 
 use crate::bodies::{Blocker, Bodies, Body, Near};
 use crate::error::HallError;
+use crate::footprint::Footprint;
 use crate::guests::{Course, Crowd};
 use crate::hall::{Field, Hall};
 use crate::limits::TOLERANCE_M;
@@ -9,7 +10,9 @@ use crate::placing::place;
 use crate::point::Point;
 use crate::reactions::{Reaction, directions};
 use crate::shape::{Shape, Wall};
+use crate::wheels::{Drive, Pose, Velocity, Wheels};
 use rand::Rng;
+use std::collections::BTreeMap;
 
 /// The outcome of a robot's proposal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,9 +40,21 @@ pub enum MoveOutcome {
 pub struct World<R> {
     bodies: Bodies,
     crowd: Crowd,
+    /// Robots with wheels, by index.
+    driven: BTreeMap<usize, Driven>,
     tick_s: f64,
     stride_m: f64,
     rng: R,
+}
+
+/// A robot with wheels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Driven {
+    wheels: Wheels,
+    shape: Shape,
+    pose: Pose,
+    /// The velocity that it wants.
+    wanted: Velocity,
 }
 
 impl<R: Rng> World<R> {
@@ -57,9 +72,24 @@ impl<R: Rng> World<R> {
         let bodies = place(hall, &mut rng)?;
         let crowd = Crowd::new(hall.guests, hall.tick_s, &mut rng);
 
+        let mut driven = BTreeMap::new();
+        for (&index, wheels) in &hall.shapes.wheels {
+            let Some(&center) = hall.robots.get(index) else {
+                continue;
+            };
+            let robot = Driven {
+                wheels: wheels.within(hall.max_speed_mps),
+                shape: bodies.footprint(Body::Robot(index)).shape(),
+                pose: Pose::at_rest(center, wheels.heading_rad),
+                wanted: Velocity::default(),
+            };
+            driven.insert(index, robot);
+        }
+
         Ok(Self {
             bodies,
             crowd,
+            driven,
             tick_s: hall.tick_s,
             stride_m: hall.max_speed_mps * hall.tick_s,
             rng,
@@ -83,6 +113,9 @@ impl<R: Rng> World<R> {
     ///
     /// Guests react to robots where these stand after their moves.
     ///
+    /// A robot with [`Wheels`] drives as [`World::drive`] says, whatever its proposal. A blocked one stands still, and turns as far
+    /// as it has room to turn: all of the turn, or nothing.
+    ///
     /// # Panics
     ///
     /// Panics unless there is exactly one proposal for each robot, and on a reaction to a robot that does not exist.
@@ -97,14 +130,18 @@ impl<R: Rng> World<R> {
             "there is one proposal for each robot"
         );
 
+        let drives = self.drives();
         // A robot that is blocked means to move all the same, so where it heads is known before the moves only.
         let headings = match reactions {
             [] => Vec::new(),
-            _ => self.headings(proposals),
+            _ => self.headings(proposals, &drives),
         };
         let mut verdicts = Vec::with_capacity(proposals.len());
         for (index, &proposal) in proposals.iter().enumerate() {
-            verdicts.push(self.advance_robot(index, proposal));
+            verdicts.push(match drives.get(&index) {
+                Some(drive) => self.drive_robot(index, drive),
+                None => self.advance_robot(index, proposal),
+            });
         }
 
         let directions = match reactions {
@@ -117,14 +154,73 @@ impl<R: Rng> World<R> {
         verdicts
     }
 
-    /// The displacement that each robot proposes; none where it proposes no place.
-    fn headings(&self, proposals: &[Option<Point>]) -> Vec<Point> {
-        let robots = self.robots().iter().zip(proposals);
-        let headings = robots.map(|(&at, to)| {
-            to.filter(|to| to.is_finite())
-                .map_or_else(Point::default, |to| to - at)
-        });
-        headings.collect()
+    /// Has a robot with [`Wheels`] want a velocity from the next tick on. At first it wants none. Without effect on other robots.
+    pub fn drive(&mut self, robot: usize, wanted: Velocity) {
+        if let Some(driven) = self.driven.get_mut(&robot) {
+            driven.wanted = wanted;
+        }
+    }
+
+    /// Where the robots with wheels drive in the tick.
+    fn drives(&self) -> BTreeMap<usize, Drive> {
+        let drive = |driven: &Driven| {
+            driven
+                .pose
+                .drive(&driven.wheels, driven.wanted, self.tick_s)
+        };
+        let robots = self.driven.iter();
+        robots
+            .map(|(&index, driven)| (index, drive(driven)))
+            .collect()
+    }
+
+    /// The displacement that each robot means; none where it proposes no place.
+    fn headings(&self, proposals: &[Option<Point>], drives: &BTreeMap<usize, Drive>) -> Vec<Point> {
+        let mut headings = Vec::with_capacity(proposals.len());
+        for (index, (&at, &proposal)) in self.robots().iter().zip(proposals).enumerate() {
+            let to = drives
+                .get(&index)
+                .map_or(proposal, |drive| Some(drive.pose.center));
+            let to = to.filter(|to| to.is_finite());
+            headings.push(to.map_or_else(Point::default, |to| to - at));
+        }
+        headings
+    }
+
+    fn drive_robot(&mut self, index: usize, drive: &Drive) -> MoveOutcome {
+        let Some(driven) = self.driven.get_mut(&index) else {
+            return MoveOutcome::Stayed;
+        };
+        let before = driven.pose;
+        if drive.pose.center == before.center && drive.turn_rad == 0.0 {
+            driven.pose = drive.pose;
+            return MoveOutcome::Stayed;
+        }
+
+        let footprint = Footprint::turned(driven.shape, drive.pose.heading_rad);
+        let bodies = &mut self.bodies;
+        let blocked = bodies.turn_robot(index, drive.pose.center, footprint, drive.turn_rad);
+        let Err(by) = blocked else {
+            driven.pose = drive.pose;
+            return MoveOutcome::Advanced;
+        };
+
+        let has_room = bodies.turn_robot(index, before.center, footprint, drive.turn_rad);
+        driven.pose = match has_room {
+            Ok(()) => Pose {
+                center: before.center,
+                velocity: Velocity {
+                    linear_mps: 0.0,
+                    ..drive.pose.velocity
+                },
+                ..drive.pose
+            },
+            Err(_) => Pose {
+                velocity: Velocity::default(),
+                ..before
+            },
+        };
+        MoveOutcome::Blocked { by }
     }
 
     fn advance_robot(&mut self, index: usize, proposal: Option<Point>) -> MoveOutcome {
@@ -193,7 +289,19 @@ impl<R> World<R> {
     /// The shape of a body. One that does not exist is a square of the field.
     #[must_use]
     pub fn shape(&self, body: Body) -> Shape {
-        self.bodies.shape(body)
+        self.footprint(body).shape()
+    }
+
+    /// The shape of a body as it lies.
+    #[must_use]
+    pub fn footprint(&self, body: Body) -> Footprint {
+        self.bodies.footprint(body)
+    }
+
+    /// The pose of a robot with [`Wheels`]; `None` for another robot.
+    #[must_use]
+    pub fn pose(&self, robot: usize) -> Option<Pose> {
+        Some(self.driven.get(&robot)?.pose)
     }
 
     /// The largest half extent of a body that moves, or of an obstacle without a shape of its own, m.

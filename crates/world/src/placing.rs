@@ -2,10 +2,10 @@
 
 use crate::bodies::{Blocker, Bodies, Body};
 use crate::error::HallError;
+use crate::footprint::Footprint;
 use crate::hall::{Field, Hall};
 use crate::limits::TOLERANCE_M;
 use crate::point::Point;
-use crate::shape::Shape;
 use crate::solids::Solids;
 use rand::{Rng, RngExt};
 
@@ -55,15 +55,15 @@ impl Placer {
     }
 
     /// Places one more body, uniformly in a region where it overlaps no other body: draws x, then y, for each attempt. `None` if
-    /// all [`Self::TRIES`] attempts overlap one, or the edge. Without a shape it is a square of the field.
+    /// all [`Self::TRIES`] attempts overlap one, or the edge. Without a footprint it is a square of the field.
     pub fn place(
         &mut self,
-        shape: Option<Shape>,
+        footprint: Option<Footprint>,
         region: Region,
         rng: &mut impl Rng,
     ) -> Option<Point> {
-        let at = random_free_place(&self.bodies, shape, region, rng)?;
-        self.bodies.push_shaped(at, shape);
+        let at = random_free_place(&self.bodies, footprint, region, rng)?;
+        self.bodies.push_shaped(at, footprint);
         Some(at)
     }
 }
@@ -83,7 +83,7 @@ fn place_given(hall: &Hall, guests: usize) -> Result<Bodies, HallError> {
 
     for (index, &at) in hall.obstacles.iter().enumerate() {
         let shape = hall.shapes.obstacles.get(&index).copied();
-        if !is_inside(&hall.field, shape, at) {
+        if !is_inside(&hall.field, shape.map(Footprint::from), at) {
             return Err(HallError::ObstacleOffField { index, at });
         }
 
@@ -94,16 +94,16 @@ fn place_given(hall: &Hall, guests: usize) -> Result<Bodies, HallError> {
     }
 
     for (index, &at) in hall.robots.iter().enumerate() {
-        let shape = hall.shapes.robots.get(&index).copied();
-        check_robot(&bodies, index, shape, at)?;
+        let footprint = hall.shapes.robot(index, hall.field.body_m);
+        check_robot(&bodies, index, footprint, at)?;
         bodies.push(at);
     }
     Ok(bodies)
 }
 
-fn is_inside(field: &Field, shape: Option<Shape>, at: Point) -> bool {
-    match shape {
-        Some(shape) => shape.is_inside(at, field.size_m),
+fn is_inside(field: &Field, footprint: Option<Footprint>, at: Point) -> bool {
+    match footprint {
+        Some(footprint) => footprint.is_inside(at, field.size_m),
         None => field.contains(at),
     }
 }
@@ -112,14 +112,14 @@ fn is_inside(field: &Field, shape: Option<Shape>, at: Point) -> bool {
 fn check_robot(
     bodies: &Bodies,
     index: usize,
-    shape: Option<Shape>,
+    footprint: Option<Footprint>,
     at: Point,
 ) -> Result<(), HallError> {
-    if !is_inside(bodies.field(), shape, at) {
+    if !is_inside(bodies.field(), footprint, at) {
         return Err(HallError::RobotOffField { index, at });
     }
 
-    match bodies.hit(at, shape) {
+    match bodies.hit(at, footprint) {
         None => Ok(()),
         Some(Blocker::Wall(wall)) => Err(HallError::RobotOnWall { index, at, wall }),
         Some(Blocker::Body(Body::Obstacle(obstacle))) => Err(HallError::RobotOnObstacle {
@@ -166,20 +166,20 @@ fn scatter(bodies: &mut Bodies, guests: usize, rng: &mut impl Rng) -> bool {
 
 fn random_free_place(
     bodies: &Bodies,
-    shape: Option<Shape>,
+    footprint: Option<Footprint>,
     region: Region,
     rng: &mut impl Rng,
 ) -> Option<Point> {
     for _ in 0..TRIES {
         let at = match region {
-            Region::Field => random_place(bodies.field(), shape, rng),
+            Region::Field => random_place(bodies.field(), footprint, rng),
             Region::Rectangle(from, to) => random_between(from, to, rng),
             Region::Disc { center, radius_m } => random_in_disc(center, radius_m, rng),
         };
 
         // On the field a place is inside by itself, and the first bodies of the paper's hall are drawn often.
-        let is_on_field = region == Region::Field || is_inside(bodies.field(), shape, at);
-        if is_on_field && bodies.hit(at, shape).is_none() {
+        let is_on_field = region == Region::Field || is_inside(bodies.field(), footprint, at);
+        if is_on_field && bodies.hit(at, footprint).is_none() {
             return Some(at);
         }
     }
@@ -187,11 +187,12 @@ fn random_free_place(
     None
 }
 
-fn random_place(field: &Field, shape: Option<Shape>, rng: &mut impl Rng) -> Point {
+fn random_place(field: &Field, footprint: Option<Footprint>, rng: &mut impl Rng) -> Point {
     let (width_m, height_m) = field.size_m;
     let body_m = field.body_m;
-    let (half_x_m, half_y_m) = shape.map_or((body_m * 0.5, body_m * 0.5), Shape::half_m);
-    let (x_m, y_m) = shape.map_or((body_m, body_m), |_| (half_x_m * 2.0, half_y_m * 2.0));
+    let square_m = (body_m * 0.5, body_m * 0.5);
+    let (half_x_m, half_y_m) = footprint.map_or(square_m, Footprint::half_m);
+    let (x_m, y_m) = footprint.map_or((body_m, body_m), |_| (half_x_m * 2.0, half_y_m * 2.0));
 
     let x = half_x_m + rng.random::<f64>() * (width_m - x_m);
     let y = half_y_m + rng.random::<f64>() * (height_m - y_m);

@@ -3,8 +3,10 @@
 use std::collections::BTreeMap;
 
 use crate::error::HallError;
+use crate::footprint::Footprint;
 use crate::limits::{BODY_MIN_M, SIDE_MAX_M, TOLERANCE_M, WALLS_MAX};
 use crate::shape::{Shape, Wall};
+use crate::wheels::Wheels;
 
 /// Walls, and the bodies of a [`Hall`](crate::Hall) that are not squares of [`Field::body_m`](crate::Field::body_m).
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -15,11 +17,26 @@ pub struct Shapes {
     pub obstacles: BTreeMap<usize, Shape>,
     /// Robots of a shape of their own, by index.
     pub robots: BTreeMap<usize, Shape>,
+    /// Robots that drive like wheels, by index. Their bodies turn with them.
+    pub wheels: BTreeMap<usize, Wheels>,
 }
 
 impl Shapes {
     pub(crate) fn is_empty(&self) -> bool {
-        self.walls.is_empty() && self.obstacles.is_empty() && self.robots.is_empty()
+        self.walls.is_empty()
+            && self.obstacles.is_empty()
+            && self.robots.is_empty()
+            && self.wheels.is_empty()
+    }
+
+    /// The footprint of a robot at its start; `None` for a square of the field along the axes.
+    pub(crate) fn robot(&self, index: usize, body_m: f64) -> Option<Footprint> {
+        let shape = self.robots.get(&index).copied();
+        let Some(wheels) = self.wheels.get(&index) else {
+            return shape.map(Footprint::from);
+        };
+        let shape = shape.unwrap_or(Shape::square(body_m));
+        Some(Footprint::turned(shape, wheels.heading_rad))
     }
 
     /// Checks everything that needs no place.
@@ -45,6 +62,11 @@ impl Shapes {
         }
         for (&index, &shape) in &self.robots {
             check_size(shape).map_err(|value_m| HallError::RobotSize { index, value_m })?;
+        }
+        for (&index, wheels) in &self.wheels {
+            if !wheels.is_valid() {
+                return Err(HallError::RobotWheels { index });
+            }
         }
         Ok(())
     }

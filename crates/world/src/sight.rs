@@ -1,6 +1,7 @@
 //! What is seen from a place: what hides what, and how far it is to the next thing in a direction.
 
 use crate::bodies::Body;
+use crate::footprint::Footprint;
 use crate::motion::World;
 use crate::point::Point;
 use crate::shape::{Shape, Wall};
@@ -10,8 +11,8 @@ use crate::shape::{Shape, Wall};
 pub enum Opaque {
     /// A body.
     Body {
-        /// Its shape.
-        shape: Shape,
+        /// Its shape, as it lies.
+        footprint: Footprint,
         /// Its center, m.
         at: Point,
     },
@@ -25,8 +26,13 @@ impl Opaque {
     #[must_use]
     pub fn entered_after(&self, from: Point, to: Point) -> Option<f64> {
         let (enter, leave) = match *self {
-            Self::Body { shape, at } => match shape {
-                Shape::Rectangle { .. } => crossed_rectangle(from, to, at, shape.half_m()),
+            Self::Body { footprint, at } => match footprint.shape() {
+                shape @ Shape::Rectangle { .. } if footprint.is_turned() => {
+                    let one = footprint.to_local(from - at);
+                    let other = footprint.to_local(to - at);
+                    crossed_rectangle(one, other, Point::default(), shape.half_m())
+                }
+                shape @ Shape::Rectangle { .. } => crossed_rectangle(from, to, at, shape.half_m()),
                 Shape::Disc { radius_m } => crossed_disc(from, to, at, radius_m)?,
             },
             Self::Wall(wall) => return crossed_wall(from, to, &wall),
@@ -162,7 +168,7 @@ impl<R> World<R> {
         let near = self.near(from, reach_m).into_iter();
         near.map(|near| {
             let opaque = Opaque::Body {
-                shape: self.shape(near.body),
+                footprint: self.footprint(near.body),
                 at: near.center,
             };
             (near.body, opaque)

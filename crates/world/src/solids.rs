@@ -4,10 +4,12 @@
 
 use std::collections::BTreeMap;
 
+use crate::footprint::Footprint;
 use crate::hall::Field;
 use crate::point::Point;
 use crate::shape::{Shape, Wall};
 use crate::shapes::Shapes;
+use crate::way::Way;
 
 /// Cells along each side of the index of what stands still.
 const CELLS: usize = 64;
@@ -17,10 +19,10 @@ const CELLS: usize = 64;
 pub(crate) struct Solids {
     field: Field,
     walls: Vec<Wall>,
-    /// Shapes by number of the body; all others are squares.
-    shapes: BTreeMap<usize, Shape>,
+    /// Footprints by number of the body; all others are squares.
+    footprints: BTreeMap<usize, Footprint>,
     /// The obstacles with a shape of their own.
-    obstacles: Vec<(usize, Shape, Point)>,
+    obstacles: Vec<(usize, Footprint, Point)>,
     /// The largest half extent of a body that is not among [`Self::obstacles`], m.
     half_max_m: f64,
     /// For each cell, row by row: walls, then obstacles, by their index in one sequence.
@@ -33,28 +35,31 @@ impl Solids {
         let mut solids = Self {
             field,
             walls: shapes.walls.clone(),
-            shapes: BTreeMap::new(),
+            footprints: BTreeMap::new(),
             obstacles: Vec::new(),
             half_max_m: field.body_m * 0.5,
             cells: vec![Vec::new(); CELLS * CELLS],
         };
         for (&index, &shape) in &shapes.obstacles {
-            solids.shapes.insert(index, shape);
+            let footprint = Footprint::from(shape);
+            solids.footprints.insert(index, footprint);
             let at = obstacles.get(index).copied().unwrap_or_default();
-            solids.obstacles.push((index, shape, at));
+            solids.obstacles.push((index, footprint, at));
         }
-        for (&index, &shape) in &shapes.robots {
-            solids.set_shape(obstacles.len() + index, shape);
+        for &index in shapes.robots.keys().chain(shapes.wheels.keys()) {
+            if let Some(footprint) = shapes.robot(index, field.body_m) {
+                solids.set_footprint(obstacles.len() + index, footprint);
+            }
         }
         solids.fill_cells();
         solids
     }
 
-    /// Gives a body that is no obstacle a shape.
-    pub(crate) fn set_shape(&mut self, id: usize, shape: Shape) {
-        let (half_x_m, half_y_m) = shape.half_m();
-        self.half_max_m = self.half_max_m.max(half_x_m).max(half_y_m);
-        self.shapes.insert(id, shape);
+    /// Gives a body that is no obstacle a footprint.
+    pub(crate) fn set_footprint(&mut self, id: usize, footprint: Footprint) {
+        // Whatever its heading becomes.
+        self.half_max_m = self.half_max_m.max(footprint.radius_m());
+        self.footprints.insert(id, footprint);
     }
 
     fn fill_cells(&mut self) {
@@ -75,8 +80,8 @@ impl Solids {
             }
         }
 
-        for (index, (_, shape, at)) in self.obstacles.iter().enumerate() {
-            let (half_x_m, half_y_m) = shape.half_m();
+        for (index, (_, footprint, at)) in self.obstacles.iter().enumerate() {
+            let (half_x_m, half_y_m) = footprint.half_m();
             let half = Point::new(half_x_m, half_y_m);
             for cell in cells_between(&self.field, *at - half, *at + half) {
                 self.cells[cell].push((self.walls.len() + index) as u32);
@@ -92,34 +97,36 @@ impl Solids {
         self.half_max_m
     }
 
-    /// The shape of a body.
-    pub(crate) fn shape(&self, id: usize) -> Shape {
-        let shape = self.shapes.get(&id).copied();
-        shape.unwrap_or(Shape::square(self.field.body_m))
+    /// The footprint of a body.
+    pub(crate) fn footprint(&self, id: usize) -> Footprint {
+        let footprint = self.footprints.get(&id).copied();
+        footprint.unwrap_or(Shape::square(self.field.body_m).into())
     }
 
-    /// How far the center of a body that moves can be from that of a body of this shape that it overlaps, m.
-    pub(crate) fn reach_m(&self, shape: Shape) -> f64 {
-        let (half_x_m, half_y_m) = shape.half_m();
+    /// How far the center of a body that moves can be from that of a body of this footprint that it overlaps, m.
+    pub(crate) fn reach_m(&self, footprint: Footprint) -> f64 {
+        let (half_x_m, half_y_m) = footprint.half_m();
         half_x_m.max(half_y_m) + self.half_max_m
     }
 
     /// The first wall, or else the first obstacle of a shape of its own, that a body meets on its way.
-    pub(crate) fn blocker(&self, shape: Shape, from: Point, to: Point) -> Option<SolidBlocker> {
-        let (half_x_m, half_y_m) = shape.half_m();
-        let half = Point::new(half_x_m, half_y_m);
-        let low = Point::new(from.x.min(to.x), from.y.min(to.y)) - half;
-        let high = Point::new(from.x.max(to.x), from.y.max(to.y)) + half;
-
+    pub(crate) fn blocker(&self, way: &Way) -> Option<SolidBlocker> {
         let mut first = usize::MAX;
-        for cell in cells_between(&self.field, low, high) {
-            for &index in &self.cells[cell] {
-                let index = index as usize;
-                if index < first && self.is_met(index, shape, from, to) {
-                    first = index;
+        way.visit_parts(|footprint, from, to| {
+            let (half_x_m, half_y_m) = footprint.half_m();
+            let half = Point::new(half_x_m, half_y_m);
+            let low = Point::new(from.x.min(to.x), from.y.min(to.y)) - half;
+            let high = Point::new(from.x.max(to.x), from.y.max(to.y)) + half;
+
+            for cell in cells_between(&self.field, low, high) {
+                for &index in &self.cells[cell] {
+                    let index = index as usize;
+                    if index < first && self.is_met(index, footprint, from, to) {
+                        first = index;
+                    }
                 }
             }
-        }
+        });
 
         if first == usize::MAX {
             None
@@ -132,18 +139,18 @@ impl Solids {
         }
     }
 
-    fn is_met(&self, index: usize, shape: Shape, from: Point, to: Point) -> bool {
+    fn is_met(&self, index: usize, footprint: Footprint, from: Point, to: Point) -> bool {
         if let Some(wall) = self.walls.get(index) {
-            return shape.meets(from, to, wall);
+            return footprint.meets(from, to, wall);
         }
         let (_, other, at) = self.obstacles[index - self.walls.len()];
-        shape.overlaps(to, other, at) || shape.sweeps(from, to, other, at)
+        footprint.overlaps(to, other, at) || footprint.sweeps(from, to, other, at)
     }
 
     /// The largest x of the walls and of the obstacles of a shape of their own that a square of the field at this center
     /// overlaps, m.
     pub(crate) fn rightmost_x_m(&self, center: Point) -> Option<f64> {
-        let square = Shape::square(self.field.body_m);
+        let square = Footprint::from(Shape::square(self.field.body_m));
         let half_m = self.field.body_m * 0.5;
         let half = Point::new(half_m, half_m);
         let mut rightmost_x_m: Option<f64> = None;
@@ -158,8 +165,8 @@ impl Solids {
                 let x_m = match self.walls.get(index) {
                     Some(wall) => wall.rightmost_x_m(center.y - half_m, center.y + half_m),
                     None => {
-                        let (_, shape, at) = self.obstacles[index - self.walls.len()];
-                        Some(at.x + shape.half_m().0)
+                        let (_, footprint, at) = self.obstacles[index - self.walls.len()];
+                        Some(at.x + footprint.half_m().0)
                     }
                 };
                 // `None` is less than any number.
@@ -176,7 +183,7 @@ impl Solids {
         let near = self
             .obstacles
             .iter()
-            .filter(|(_, shape, at)| shape.distance_m(*at, point) <= range_m);
+            .filter(|(_, footprint, at)| footprint.distance_m(*at, point) <= range_m);
         near.map(|(id, ..)| *id).collect()
     }
 }

@@ -13,3 +13,4 @@ mod placing;
 mod reactions;
 mod shapes;
 mod sight;
+mod wheels;

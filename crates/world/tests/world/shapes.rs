@@ -6,8 +6,8 @@ use crate::halls::{FT, TestWorld, reception, rng, triangular};
 use proptest::prelude::*;
 use rand::{Rng, RngExt};
 use world::{
-    Blocker, Body, Field, Guests, Hall, HallError, MoveOutcome, Placer, Point, Region, Shape,
-    Shapes, WALLS_MAX, Wall, World,
+    Blocker, Body, Field, Footprint, Guests, Hall, HallError, MoveOutcome, Placer, Point, Region,
+    Shape, Shapes, WALLS_MAX, Wall, World,
 };
 
 /// Whether two shapes overlap by more than 2 nm, implemented independently: by the smallest distance from the center of the disc
@@ -141,7 +141,7 @@ type Share = (f64, f64);
 
 prop_compose! {
     /// A field of 4 to 20 m with walls, obstacles, robots and guests; robots cross it in a tick.
-    fn any_hall()(
+    pub(crate) fn any_hall()(
         size_m in (4.0..20.0, 4.0..20.0),
         body_m in 0.1..1.0,
         walls in prop::collection::vec(((0.0..=1.0, 0.0..=1.0), (0.0..=1.0, 0.0..=1.0)), 0..8),
@@ -184,7 +184,7 @@ prop_compose! {
 
         let mut placer = Placer::new(&hall).unwrap();
         for shape in robots {
-            if let Some(at) = placer.place(shape, Region::Field, &mut rng(seed ^ hall.robots.len() as u64)) {
+            if let Some(at) = placer.place(shape.map(Footprint::from), Region::Field, &mut rng(seed ^ hall.robots.len() as u64)) {
                 if let Some(shape) = shape {
                     hall.shapes.robots.insert(hall.robots.len(), shape);
                 }
@@ -486,7 +486,7 @@ fn places_are_drawn_within_their_region() {
         center,
         radius_m: 2.0,
     };
-    let shape = Some(Shape::Disc { radius_m: 0.1 });
+    let shape = Some(Footprint::from(Shape::Disc { radius_m: 0.1 }));
     let mut xs_m = Vec::new();
     for seed in 0..60 {
         let at = placer.place(shape, disc, &mut rng(seed)).unwrap();

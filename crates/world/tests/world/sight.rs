@@ -4,22 +4,23 @@ use proptest::prelude::*;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use world::{
-    Field, Guests, Hall, Opaque, Point, Shape, Shapes, Triangular, Wall, World, is_hidden,
+    Field, Footprint, Guests, Hall, Opaque, Point, Shape, Shapes, Triangular, Wall, World,
+    is_hidden,
 };
 
 fn block(x: f64, y: f64, half_x: f64, half_y: f64) -> Opaque {
     Opaque::Body {
-        shape: Shape::Rectangle {
+        footprint: Footprint::from(Shape::Rectangle {
             width_m: 2.0 * half_x,
             height_m: 2.0 * half_y,
-        },
+        }),
         at: Point::new(x, y),
     }
 }
 
 fn disc(x: f64, y: f64, radius_m: f64) -> Opaque {
     Opaque::Body {
-        shape: Shape::Disc { radius_m },
+        footprint: Footprint::from(Shape::Disc { radius_m }),
         at: Point::new(x, y),
     }
 }
@@ -134,6 +135,7 @@ fn discs_and_walls_hide_and_end_rays_where_they_are() {
         }],
         obstacles: [(0, Shape::Disc { radius_m: 1.5 })].into(),
         robots: [(0, Shape::Disc { radius_m: 0.25 })].into(),
+        ..Shapes::default()
     };
     let world = shaped(&[Point::new(6.0, 5.0)], &[Point::new(3.0, 5.0)], shapes);
     let directions = [(1.0, 0.0), (0.0, 1.0), (0.6, 0.8)].map(|(x, y)| Point::new(x, y));
