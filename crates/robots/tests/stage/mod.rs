@@ -299,8 +299,6 @@ impl Stage {
         TickUpdate {
             epoch: 1,
             tick: self.tick,
-            joined: None,
-            rejoin: None,
             correction: Some(Correction {
                 location: at,
                 blocked: is_blocked,
@@ -309,9 +307,7 @@ impl Stage {
             unreachable,
             sensed,
             bodies: self.bodies(robot),
-            ranges: Vec::new(),
-            sites: Vec::new(),
-            site_results: Vec::new(),
+            ..TickUpdate::default()
         }
     }
 
