@@ -18,7 +18,8 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
-PROGRAMS = ("cars", "cars-sim", "cars-console", "cars-butler", "cars-leguin", "cars-vonda")
+ROBOTS = ("cars-butler", "cars-leguin", "cars-vonda", "cars-bidder", "cars-scout")
+PROGRAMS = ("cars", "cars-sim", "cars-console", *ROBOTS)
 WITH_PROGRAMS = """
 data = "cars_simulator.data"
 """

@@ -61,13 +61,15 @@ pub fn cargo() -> Command {
 }
 
 /// The programs of the project.
-pub const PROGRAMS: [&str; 6] = [
+pub const PROGRAMS: [&str; 8] = [
     "cars",
     "cars-sim",
     "cars-console",
     "cars-butler",
     "cars-leguin",
     "cars-vonda",
+    "cars-bidder",
+    "cars-scout",
 ];
 
 /// The folder of the project's programs, built in the profile of this test; examples are in `examples` there.

@@ -74,14 +74,14 @@ fn taxonomy(args: &EmotionsArgs) -> Result<String> {
                 .iter()
                 .find(|(name, _)| name.as_str() == robot);
             let class = found.map_or(robot.as_str(), |(_, spec)| spec.class.as_str());
-            if !robots::CLASSES.contains(&class) {
+            if !robots::AFFECTIVE.contains(&class) {
                 return Err(unknown_robot(robot, class, &scenario));
             }
             whose.push(robot.clone());
         }
         None => {
             for (name, spec) in &scenario.robots {
-                if robots::CLASSES.contains(&spec.class.as_str()) {
+                if robots::AFFECTIVE.contains(&spec.class.as_str()) {
                     whose.push(name.to_string());
                 }
             }
@@ -90,7 +90,7 @@ fn taxonomy(args: &EmotionsArgs) -> Result<String> {
     if whose.is_empty() {
         return Err(refusal!(
             help = "what robots of your own feel is known in a recorded run: cars emotions --at latest@100",
-            "no robot of {} is of a class that comes with the programs",
+            "no robot of {} is of a class with emotions that comes with the programs",
             args.scenario.display()
         ));
     }
@@ -112,9 +112,9 @@ fn unknown_robot(robot: &str, class: &str, scenario: &Scenario) -> Box<dyn Error
         refusal!(
             help =
                 "--scenario names the scenario of a robot, and --at a run in which it was recorded",
-            "{robot} is neither a robot of the scenario ({}) nor a class that comes with the programs ({})",
+            "{robot} is neither a robot of the scenario ({}) nor a class with emotions that comes with the programs ({})",
             names.join(", "),
-            robots::CLASSES.join(", ")
+            robots::AFFECTIVE.join(", ")
         )
     } else {
         refusal!(

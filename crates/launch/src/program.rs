@@ -3,12 +3,14 @@
 use std::path::{Path, PathBuf};
 
 /// The programs that come with `cars`, and the packages that they are of.
-pub const SIBLINGS: [(&str, &str); 5] = [
+pub const SIBLINGS: [(&str, &str); 7] = [
     ("cars-sim", "simulator"),
     ("cars-console", "console"),
     ("cars-butler", "robots"),
     ("cars-leguin", "robots"),
     ("cars-vonda", "robots"),
+    ("cars-bidder", "robots"),
+    ("cars-scout", "robots"),
 ];
 
 /// The path of a program that comes with `cars`: beside this one, or in a folder of `PATH`.

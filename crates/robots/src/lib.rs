@@ -1,7 +1,7 @@
 //! The robots of the paper's experiment: Butler, who serves a reception, Leguin, who refills his tray, and Vonda, who is
-//! Leguin under another name.
+//! Leguin under another name. [`Bidder`] and [`Scout`] are of other fields, have no emotion, and share nothing with these.
 //!
-//! Each robot is a set of parameters, an appraisal of its measures, a table for its behavior, and a panel. They share how they
+//! Each of the three is a set of parameters, an appraisal of its measures, a table for its behavior, and a panel. They share how they
 //! move ([`drive`]), what they know of one another ([`peer`]), the random streams ([`chance`]), what counts as progress
 //! ([`input`]), what they believe of themselves ([`belief`]), and the emotion that an experiment can switch off.
 //!
@@ -14,6 +14,7 @@
 //! every chosen number is a parameter.
 
 pub mod belief;
+mod bidder;
 mod bounds;
 pub mod butler;
 pub mod chance;
@@ -32,12 +33,15 @@ pub mod peer;
 pub mod policy;
 mod published;
 pub mod recruitment;
+mod scout;
 pub mod script;
 pub mod switch;
 mod units;
 
+pub use bidder::Bidder;
 pub use butler::Butler;
-pub use classes::{CLASSES, make};
+pub use classes::{AFFECTIVE, CLASSES, make};
 pub use commands::{ACCEPT, GO_HOME, HELP, HURRY, OFFER, REFILL};
 pub use leguin::Leguin;
+pub use scout::Scout;
 pub use units::FT_M;

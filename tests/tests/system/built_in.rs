@@ -224,6 +224,8 @@ fn a_manual_page_is_written_for_every_program() {
         "cars-butler",
         "cars-leguin",
         "cars-vonda",
+        "cars-bidder",
+        "cars-scout",
     ] {
         let page = std::fs::read_to_string(pages.join(format!("{name}.1"))).unwrap();
         assert!(page.contains(&format!(".TH {name} 1")), "{name}: {page}");

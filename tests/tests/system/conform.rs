@@ -36,10 +36,12 @@ const ROBOTS: [Passing; 4] = [
     ),
 ];
 
-const WITH_DEFAULT_PARAMETERS: [Passing; 3] = [
+const WITH_DEFAULT_PARAMETERS: [Passing; 5] = [
     ("Vonda", &[], &["cars-vonda"]),
     ("Butler", &[], &["cars-butler"]),
     ("Leguin", &[], &["cars-leguin"]),
+    ("Bidder", &[], &["cars-bidder"]),
+    ("Scout", &[], &["cars-scout"]),
 ];
 
 /// A rule that a robot breaks whose parent process ignores signals.

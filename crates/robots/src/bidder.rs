@@ -1,0 +1,312 @@
+//! A robot that shares tasks with others in an auction without an auctioneer: the consensus-based auction algorithm, CBAA (Choi,
+//! Brunet and How 2009).
+//!
+//! Each robot bids for the nearest task for which no higher bid is known, and sends its table of highest bids to the others. Each
+//! keeps the higher bid of its own table and a received one, so the tables agree in the end, and a robot that is outbid takes
+//! another task. While messages are lost, two robots may go to the same task, until a table arrives or one sees that it is done.
+//!
+//! The robot has no emotion. `sdk/python/examples/bidder.py` is the same in Python, to the last bit.
+
+use rand::Rng as _;
+use robot::{Action, BadParameters, Cars, KnownSite, Payload, Point, Robot, SiteAction};
+use serde::{Deserialize, Serialize};
+
+/// Kind of the sites that are tasks.
+const TASK: &str = "task";
+/// Name of the commands with tables.
+const TABLE: &str = "table";
+/// Bid of a robot that has begun to work: no robot that still has to go bids more.
+const BID_AT_WORK: f64 = 1.0;
+/// Ticks for which a robot goes to one side after it was blocked \[I\].
+const ASIDE_TICKS: u32 = 4;
+/// Distance that it goes toward its goal meanwhile, for each meter to the side \[I\].
+const FORWARD_M: f64 = 0.3;
+
+/// The parameters of a bidder, as in the scenario.
+#[derive(Debug, Clone, Copy, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct Parameters {
+    /// Speed, m/s.
+    speed: f64,
+    /// Time that a task takes, seconds.
+    work: f64,
+    /// When it sends its table.
+    sends: Sends,
+    /// Time between two tables, if it sends periodically, seconds.
+    period: f64,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self {
+            speed: 1.0,
+            work: 3.0,
+            sends: Sends::Periodically,
+            period: 0.5,
+        }
+    }
+}
+
+/// When a bidder sends its table.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Sends {
+    /// Once a period.
+    Periodically,
+    /// When it has changed.
+    OnChange,
+    /// Never: each robot does every task of which it has not seen that it is done.
+    Never,
+}
+
+/// What a robot knows of a task.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+struct Entry {
+    /// Highest bid, 0 for none.
+    bid: f64,
+    /// The robot that has made it.
+    by: String,
+    /// Whether the task is done.
+    done: bool,
+}
+
+/// A robot that shares tasks.
+#[derive(Debug, Default)]
+pub struct Bidder {
+    parameters: Parameters,
+    tasks: Vec<KnownSite>,
+    /// What is known of each task.
+    table: Vec<Entry>,
+    /// The task that it does, by its index.
+    task: Option<usize>,
+    /// Time that it has worked on the task, seconds.
+    worked_s: f64,
+    /// When it sends its table next, seconds.
+    sends_s: f64,
+    /// Whether its table has changed since it was sent.
+    has_changed: bool,
+    /// Ticks that are left of going aside.
+    aside_ticks: u32,
+    /// The side: 1 for left, -1 for right.
+    side: f64,
+}
+
+impl Robot for Bidder {
+    fn init(&mut self, cars: &mut Cars<'_>) -> Result<(), BadParameters> {
+        let mut tasks = cars.welcome().known_sites.clone();
+        tasks.retain(|site| site.kind == TASK);
+        *self = Self {
+            parameters: cars.parameters()?,
+            table: vec![Entry::default(); tasks.len()],
+            tasks,
+            ..Self::default()
+        };
+        Ok(())
+    }
+
+    fn tick(&mut self, cars: &mut Cars<'_>) -> Action {
+        self.receive(cars);
+        self.look(cars);
+        self.drop_lost_task(cars);
+        self.bid(cars);
+        let action = self.work(cars);
+        self.send(cars);
+
+        let task = self.task.map(|task| self.tasks[task].name.as_str());
+        action.variable("task", task.unwrap_or_default())
+    }
+
+    fn is_quick(&self) -> bool {
+        true
+    }
+}
+
+impl Bidder {
+    /// Takes over what is news in the tables of others.
+    fn receive(&mut self, cars: &Cars<'_>) {
+        for command in cars.commands() {
+            let Some(payload) = command.payload.as_ref().filter(|_| command.text == TABLE) else {
+                continue;
+            };
+            // An operator may send anything.
+            let Ok(received) = payload.read::<Vec<Entry>>() else {
+                continue;
+            };
+            for (own, received) in self.table.iter_mut().zip(received) {
+                self.has_changed |= own.merge(received);
+            }
+        }
+    }
+
+    /// Sees which tasks within range are done.
+    fn look(&mut self, cars: &Cars<'_>) {
+        for (entry, task) in self.table.iter_mut().zip(&self.tasks) {
+            let mut seen = cars.sites().iter().filter(|site| site.name == task.name);
+            let is_done = seen.any(|site| site.state.get("done") == Some(&true.into()));
+            if is_done && !entry.done {
+                entry.done = true;
+                self.has_changed = true;
+            }
+        }
+    }
+
+    /// Gives up its task if that is done, or another robot bids more for it.
+    fn drop_lost_task(&mut self, cars: &Cars<'_>) {
+        let Some(task) = self.task else {
+            return;
+        };
+        let entry = &self.table[task];
+        if entry.done || entry.by != cars.name().as_str() {
+            self.task = None;
+            self.worked_s = 0.0;
+        }
+    }
+
+    /// Bids for the nearest task that it can get, if it has none: the nearer, the more.
+    fn bid(&mut self, cars: &Cars<'_>) {
+        if self.task.is_some() {
+            return;
+        }
+
+        let mut best: Option<(usize, f64)> = None;
+        for (task, (entry, site)) in self.table.iter().zip(&self.tasks).enumerate() {
+            let bid = 1.0 / (1.0 + cars.location().distance_m(site.location));
+            if !entry.done && bid > entry.bid && best.is_none_or(|(_, other)| bid > other) {
+                best = Some((task, bid));
+            }
+        }
+        if let Some((task, bid)) = best {
+            self.task = Some(task);
+            self.has_changed = true;
+            self.table[task].bid = bid;
+            self.table[task].by = cars.name().to_string();
+        }
+    }
+
+    /// Goes to its task and does it.
+    fn work(&mut self, cars: &mut Cars<'_>) -> Action {
+        let Some(task) = self.task else {
+            return Action::stay(cars).behavior("IDLE");
+        };
+        let KnownSite { name, location, .. } = self.tasks[task].clone();
+        let is_there = cars.sites().iter().any(|site| site.name == name);
+        if !is_there {
+            return self.go(cars, location).behavior("GO");
+        }
+
+        if self.worked_s == 0.0 {
+            self.table[task].bid = BID_AT_WORK;
+            self.has_changed = true;
+        }
+        self.worked_s += cars.tick_s();
+        let action = Action::stay(cars).behavior("WORK");
+        if self.worked_s < self.parameters.work {
+            return action;
+        }
+        action.on_site(SiteAction::set(name, "done", true).only_if("done", false))
+    }
+
+    /// A step toward a goal; after it was blocked, for some ticks around what is in the way.
+    fn go(&mut self, cars: &mut Cars<'_>, goal: Point) -> Action {
+        if cars.was_blocked() && self.aside_ticks == 0 {
+            self.aside_ticks = ASIDE_TICKS;
+            let is_left = cars.random().next_u64() >> 63 == 0;
+            self.side = if is_left { 1.0 } else { -1.0 };
+        }
+        let here = cars.location();
+        let distance_m = here.distance_m(goal);
+        if self.aside_ticks == 0 || distance_m == 0.0 {
+            return Action::go(cars, goal, self.parameters.speed);
+        }
+
+        self.aside_ticks -= 1;
+        let x = (goal.x - here.x) / distance_m;
+        let y = (goal.y - here.y) / distance_m;
+        let aside = Point::new(
+            here.x - self.side * y + FORWARD_M * x,
+            here.y + self.side * x + FORWARD_M * y,
+        );
+        Action::go(cars, aside, self.parameters.speed)
+    }
+
+    /// Sends its table to all others, when it is time.
+    fn send(&mut self, cars: &mut Cars<'_>) {
+        let is_due = match self.parameters.sends {
+            Sends::Periodically => cars.time_s() >= self.sends_s,
+            Sends::OnChange => self.has_changed,
+            Sends::Never => false,
+        };
+        if is_due {
+            self.sends_s = cars.time_s() + self.parameters.period;
+            self.has_changed = false;
+            // Numbers and texts always are JSON.
+            let table = Payload::of(&self.table).unwrap_or_default();
+            cars.broadcast(TABLE, table);
+        }
+    }
+}
+
+impl Entry {
+    /// Takes over what is news in another robot's entry for the same task: of two bids the higher one, of equal ones that of the
+    /// robot that comes first by name. Returns whether there was any.
+    fn merge(&mut self, received: Self) -> bool {
+        let before = self.clone();
+        self.done |= received.done;
+        let is_higher = received.bid > self.bid;
+        if is_higher || (received.bid == self.bid && received.by < self.by) {
+            self.bid = received.bid;
+            self.by = received.by;
+        }
+        *self != before
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn entry(bid: f64, by: &str, done: bool) -> Entry {
+        Entry {
+            bid,
+            by: by.to_owned(),
+            done,
+        }
+    }
+
+    #[test]
+    fn the_higher_bid_counts_and_of_equal_ones_the_first_name() {
+        for (received, merged, is_news) in [
+            (entry(0.6, "C", false), entry(0.6, "C", false), true),
+            (entry(0.5, "A", false), entry(0.5, "A", false), true),
+            (entry(0.5, "C", false), entry(0.5, "B", false), false),
+            (entry(0.4, "A", true), entry(0.5, "B", true), true),
+        ] {
+            let mut own = entry(0.5, "B", false);
+            assert_eq!(own.merge(received), is_news);
+            assert_eq!(own, merged);
+        }
+    }
+
+    #[test]
+    fn tables_agree_whatever_the_order_in_which_they_arrive() {
+        let tables = [
+            entry(0.5, "B", false),
+            entry(0.5, "A", true),
+            entry(0.7, "C", false),
+        ];
+        for order in [
+            [0, 1, 2],
+            [0, 2, 1],
+            [1, 0, 2],
+            [1, 2, 0],
+            [2, 0, 1],
+            [2, 1, 0],
+        ] {
+            let mut own = Entry::default();
+            for index in order {
+                own.merge(tables[index].clone());
+            }
+            assert_eq!(own, entry(0.7, "C", true));
+        }
+    }
+}
