@@ -21,7 +21,7 @@ pub use pattern::{Pattern, PatternError};
 pub use places::FieldRegion;
 pub use probe::Probe;
 pub use quantity::{
-    By, OfRobot, OfValues, QuantityError, RunQuantity, StateNames, Team, ValueBounds,
+    By, Goal, OfRobot, OfValues, QuantityError, RunQuantity, StateNames, Team, ValueBounds,
 };
 pub use words::Words;
 
@@ -36,6 +36,8 @@ pub struct RunSetting {
     pub field_m: [f64; 2],
     /// Side of every body, meters.
     pub body_m: f64,
+    /// Range of the radios at the start, meters; `None` where distance does not matter.
+    pub radio_range_m: Option<f64>,
     /// The robots, in the order of their names.
     pub roster: Vec<RobotName>,
 }

@@ -94,6 +94,12 @@ impl CoveredArea {
         }
     }
 
+    /// Begins anew, with nothing covered.
+    pub(crate) fn clear(&mut self) {
+        self.cells.fill(false);
+        self.covered = 0;
+    }
+
     /// Takes a robot at a place into account. Costs the cells of the square around it.
     pub(crate) fn cover(&mut self, at: Point) {
         let rows = self.cells.len() / self.columns.max(1);

@@ -36,10 +36,12 @@ pub enum RunQuantity {
         /// The number of the distances: the least, their mean, or the largest.
         by: By,
     },
-    /// Share of the field that was within sensing range of a robot up to the tick, 0 to 1.
+    /// Share of the field that was within sensing range of a robot, 0 to 1.
     Covered {
         /// The robots.
         team: Team,
+        /// Whether it is of the tick alone, and not of all ticks up to it.
+        is_now: bool,
         /// Sensing radius, meters.
         radius_m: f64,
         /// Side of the cells that are counted, meters.
@@ -49,8 +51,8 @@ pub enum RunQuantity {
     Components {
         /// The robots.
         team: Team,
-        /// Range, meters.
-        range_m: f64,
+        /// Range, meters; `None` for that of the scenario's radios.
+        range_m: Option<f64>,
     },
 }
 
@@ -63,10 +65,19 @@ pub enum OfRobot {
     Variable(String, ValueBounds),
     /// Distance that it has walked, meters.
     Walked,
-    /// Distance to a point, meters.
-    DistanceTo(Point),
+    /// Distance to a point or a robot, meters.
+    DistanceTo(Goal),
     /// Whether it is within a region.
     Inside(FieldRegion),
+}
+
+/// To where a distance is.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Goal {
+    /// A point.
+    Point(Point),
+    /// A robot.
+    Robot(RobotName),
 }
 
 /// Emotions or behaviors.
@@ -203,6 +214,9 @@ pub enum QuantityError {
     /// There is no pair.
     #[error("`distance` between robots needs two of them at least")]
     NoPair,
+    /// The radios of the scenario reach everywhere.
+    #[error("`components` needs a `range`, or a scenario whose `[network.radio]` has one")]
+    NoRange,
     /// The field would have too many cells, or none.
     #[error("{0}")]
     Cells(String),
@@ -229,7 +243,7 @@ pub(crate) struct PlaceTable {
     #[serde(skip_serializing_if = "Option::is_none")]
     by: Option<By>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    to: Option<Place>,
+    to: Option<GoalTable>,
     #[serde(skip_serializing_if = "Option::is_none")]
     rectangle: Option<FixedList<Place, 2>>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -238,6 +252,8 @@ pub(crate) struct PlaceTable {
     radius: Option<Length>,
     #[serde(skip_serializing_if = "Option::is_none")]
     cell: Option<Length>,
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    now: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
     range: Option<Length>,
     /// In measures only: a condition is about each tick.
@@ -246,6 +262,16 @@ pub(crate) struct PlaceTable {
 }
 
 type Place = FixedList<Length, 2>;
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(
+    untagged,
+    expecting = "a place such as [\"3 m\", \"4 m\"], or the name of a robot"
+)]
+enum GoalTable {
+    Point(Place),
+    Robot(RobotName),
+}
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -280,7 +306,7 @@ impl PlaceKind {
             Self::Walked => &[],
             Self::Distance => &["to"],
             Self::Inside => &["rectangle", "disc"],
-            Self::Covered => &["radius", "cell"],
+            Self::Covered => &["radius", "cell", "now"],
             Self::Components => &["range"],
         }
     }
@@ -295,6 +321,7 @@ impl PlaceTable {
             ("disc", self.disc.is_some()),
             ("radius", self.radius.is_some()),
             ("cell", self.cell.is_some()),
+            ("now", self.now),
             ("range", self.range.is_some()),
         ] {
             if is_given && !kind.keys().contains(&name) {
@@ -308,13 +335,14 @@ impl PlaceTable {
             }
             PlaceKind::Distance => {
                 if let Some(to) = self.to {
-                    let of = OfRobot::DistanceTo(point(to));
+                    let of = OfRobot::DistanceTo(to.into());
                     return RunQuantity::each(key, self.robot, self.robots, self.by, of);
                 }
                 let by = match self.by {
                     Some(by @ (By::Min | By::Mean | By::Max)) => by,
                     _ => {
-                        let these = "\"min\", \"mean\" or \"max\" of all pairs, or `to` a point";
+                        let these =
+                            "\"min\", \"mean\" or \"max\" of all pairs, or `to` a point or a robot";
                         return Err(QuantityError::WrongBy(key, these));
                     }
                 };
@@ -338,10 +366,14 @@ impl PlaceTable {
             PlaceKind::Covered => Ok(RunQuantity::Covered {
                 radius_m: positive("radius", self.radius)?,
                 cell_m: positive("cell", self.cell)?,
+                is_now: self.now,
                 team: whole(key, self.robot.as_ref(), self.robots, self.by)?,
             }),
             PlaceKind::Components => Ok(RunQuantity::Components {
-                range_m: positive("range", self.range)?,
+                range_m: match self.range {
+                    Some(_) => Some(positive("range", self.range)?),
+                    None => None,
+                },
                 team: whole(key, self.robot.as_ref(), self.robots, self.by)?,
             }),
         }
@@ -361,7 +393,7 @@ impl PlaceTable {
                     OfRobot::State(_) | OfRobot::Variable(..) => return None,
                     OfRobot::Walked => PlaceKind::Walked,
                     OfRobot::DistanceTo(to) => {
-                        table.to = Some(lengths(*to));
+                        table.to = Some(to.into());
                         PlaceKind::Distance
                     }
                     OfRobot::Inside(FieldRegion::Rectangle { least, most }) => {
@@ -386,15 +418,17 @@ impl PlaceTable {
                 team,
                 radius_m,
                 cell_m,
+                is_now,
             } => {
                 table.robots = Some(team.clone());
+                table.now = *is_now;
                 table.radius = Some(Length(*radius_m));
                 table.cell = Some(Length(*cell_m));
                 PlaceKind::Covered
             }
             RunQuantity::Components { team, range_m } => {
                 table.robots = Some(team.clone());
-                table.range = Some(Length(*range_m));
+                table.range = range_m.map(Length);
                 PlaceKind::Components
             }
         };
@@ -439,6 +473,24 @@ fn point(FixedList([x, y]): Place) -> Point {
 
 fn lengths(at: Point) -> Place {
     FixedList([Length(at.x), Length(at.y)])
+}
+
+impl From<GoalTable> for Goal {
+    fn from(table: GoalTable) -> Self {
+        match table {
+            GoalTable::Point(place) => Self::Point(point(place)),
+            GoalTable::Robot(robot) => Self::Robot(robot),
+        }
+    }
+}
+
+impl From<&Goal> for GoalTable {
+    fn from(goal: &Goal) -> Self {
+        match goal {
+            Goal::Point(at) => Self::Point(lengths(*at)),
+            Goal::Robot(robot) => Self::Robot(robot.clone()),
+        }
+    }
 }
 
 impl Team {
@@ -647,6 +699,15 @@ impl RunQuantity {
             Self::Covered { cell_m, .. } => {
                 CoveredArea::check(setting.field_m, *cell_m).map_err(QuantityError::Cells)
             }
+            Self::Components { range_m, .. } if range_m.or(setting.radio_range_m).is_none() => {
+                Err(QuantityError::NoRange)
+            }
+            Self::Each {
+                of: OfRobot::DistanceTo(Goal::Robot(robot)),
+                ..
+            } if !setting.roster.contains(robot) => {
+                Err(QuantityError::UnknownRobot(robot.to_string()))
+            }
             _ => Ok(()),
         }
     }
@@ -684,8 +745,11 @@ impl fmt::Display for RunQuantity {
                     }
                     OfRobot::Variable(name, _) => write!(f, "`{name}` of {team}"),
                     OfRobot::Walked => write!(f, "the distance walked by {team}"),
-                    OfRobot::DistanceTo(to) => {
+                    OfRobot::DistanceTo(Goal::Point(to)) => {
                         write!(f, "the distance of {team} to {} m, {} m", to.x, to.y)
+                    }
+                    OfRobot::DistanceTo(Goal::Robot(to)) => {
+                        write!(f, "the distance of {team} to {to}")
                     }
                     OfRobot::Inside(_) => write!(f, "{team} within the region"),
                 }?;
@@ -697,7 +761,11 @@ impl fmt::Display for RunQuantity {
             Self::Between { team, by } => write!(f, "the distance between {team} ({by})"),
             Self::Covered { team, .. } => write!(f, "the share of the field covered by {team}"),
             Self::Components { team, range_m } => {
-                write!(f, "the number of components of {team} within {range_m} m")
+                write!(f, "the number of components of {team} within ")?;
+                match range_m {
+                    Some(range_m) => write!(f, "{range_m} m"),
+                    None => f.write_str("the range of radios"),
+                }
             }
         }
     }
@@ -727,6 +795,8 @@ pub(crate) struct QuantityGauge {
     robots: Vec<RobotName>,
     walked: Vec<Walk>,
     coverage: Option<CoveredArea>,
+    /// Range of the scenario's radios, meters.
+    radio_range_m: Option<f64>,
 }
 
 /// How far a robot has walked.
@@ -749,6 +819,7 @@ impl QuantityGauge {
             quantity: quantity.clone(),
             walked: vec![Walk::default(); robots.len()],
             coverage,
+            radio_range_m: setting.radio_range_m,
             robots,
         }
     }
@@ -773,17 +844,20 @@ impl QuantityGauge {
                     _ => between(&places, *by).ok_or(Undefined::NoRobot),
                 }
             }
-            RunQuantity::Covered { .. } => {
+            RunQuantity::Covered { is_now, .. } => {
                 let Some(coverage) = &mut self.coverage else {
                     return Err(Undefined::NoRobot);
                 };
+                if *is_now {
+                    coverage.clear();
+                }
                 for (robot, walk) in self.robots.iter().zip(&mut self.walked) {
                     let state = (seen.state)(robot);
                     let Some(at) = state.map(|state| state.location) else {
                         continue;
                     };
                     // One that stands still covers nothing more.
-                    if walk.at != Some(at) {
+                    if *is_now || walk.at != Some(at) {
                         coverage.cover(at);
                         walk.at = Some(at);
                     }
@@ -791,7 +865,8 @@ impl QuantityGauge {
                 Ok(coverage.share())
             }
             RunQuantity::Components { range_m, .. } => {
-                Ok(components(&places(&self.robots, seen)?, *range_m) as f64)
+                let range_m = range_m.or(self.radio_range_m).ok_or(Undefined::NoRobot)?;
+                Ok(components(&places(&self.robots, seen)?, range_m) as f64)
             }
         }
     }
@@ -861,7 +936,11 @@ impl OfRobot {
         Ok(match self {
             Self::State(names) => truth(names.hold(state)),
             Self::Inside(region) => truth(region.contains(state.location)),
-            Self::DistanceTo(to) => state.location.distance_m(*to),
+            Self::DistanceTo(Goal::Point(to)) => state.location.distance_m(*to),
+            Self::DistanceTo(Goal::Robot(to)) => {
+                let goal = (seen.state)(to).ok_or_else(|| Undefined::NotReported(to.clone()))?;
+                state.location.distance_m(goal.location)
+            }
             Self::Walked | Self::Variable(..) => walk.walked_m,
         })
     }

@@ -46,6 +46,7 @@ fn setting() -> RunSetting {
         ticks: 1000,
         field_m: [10.0, 10.0],
         body_m: BODY_M,
+        radio_range_m: None,
         roster: roster(),
     }
 }

@@ -40,6 +40,7 @@ fn setting(robots: usize) -> RunSetting {
         ticks: 20,
         field_m: [4.0, 2.0],
         body_m: 0.5,
+        radio_range_m: Some(3.0),
         roster: (0..robots).map(robot).collect(),
     }
 }
@@ -220,6 +221,8 @@ fn places_are_measured() {
             "distance = { robots = '*', by = 'max', to = ['0 m', '0 m'] }",
             5.0,
         ),
+        ("distance = { robot = 'R0', to = 'R1' }", 4.0),
+        ("distance = { robots = '*', by = 'min', to = 'R1' }", 0.0),
         ("distance = { robots = '*', by = 'min' }", 4.0),
         ("distance = { robots = '*', by = 'mean', as = 'max' }", 4.0),
         ("distance = { robots = '*', by = 'max', as = 'min' }", 0.0),
@@ -241,6 +244,8 @@ fn places_are_measured() {
             0.0,
         ),
         ("components = { robots = '*', range = '3 m' }", 2.0),
+        // That of the radios.
+        ("components = { robots = '*' }", 2.0),
         (
             "components = { robots = '*', range = '4 m', as = 'max' }",
             1.0,
@@ -254,6 +259,15 @@ fn places_are_measured() {
             "covered = { robots = 'R0', radius = '0.8 m', cell = '1 m' }",
             3.0 / 8.0,
         ),
+        // In the end it is outside.
+        (
+            "covered = { robots = 'R0', radius = '0.8 m', cell = '1 m', now = true }",
+            0.0,
+        ),
+        (
+            "covered = { robots = 'R0', radius = '0.8 m', cell = '1 m', now = true, as = 'max' }",
+            2.0 / 8.0,
+        ),
         (
             "covered = { robots = 'R1', radius = '0.8 m', cell = '1 m', as = 'min' }",
             2.0 / 8.0,
@@ -265,6 +279,17 @@ fn places_are_measured() {
     ] {
         assert_eq!(run.measure(text), value(expected), "{text}");
     }
+}
+
+#[test]
+fn components_have_a_range_or_that_of_radios() {
+    let measure: Measure = toml::from_str("name = 'x'\ncomponents = { robots = '*' }").unwrap();
+    let setting = RunSetting {
+        radio_range_m: None,
+        ..setting(2)
+    };
+    let error = measure.check(&setting).unwrap_err().to_string();
+    assert!(error.contains("`[network.radio]`"), "{error}");
 }
 
 #[test]
@@ -502,6 +527,14 @@ fn numbers_that_cannot_be_taken_are_refused() {
         (
             "components = { robots = '*', range = '1 furlong' }",
             "is not a length",
+        ),
+        (
+            "distance = { robot = 'R0', to = 'Nobody' }",
+            "no robot of this scenario is called Nobody",
+        ),
+        (
+            "distance = { robot = 'R0', to = 7 }",
+            "or the name of a robot",
         ),
         ("expression = 'a +'", "something is missing at the end"),
         ("expression = 'a'\nsummary = 'ticks'", "exactly one of"),

@@ -185,6 +185,7 @@ impl Scenario {
             ticks: self.ticks,
             field_m: self.field_m,
             body_m: self.body_m,
+            radio_range_m: self.network.radio.map(|radio| radio.range_m),
             roster: self.roster(),
         }
     }

@@ -243,6 +243,7 @@ impl ScenarioFile {
             ticks,
             field_m: size.0.map(|length| length.0),
             body_m: body.0,
+            radio_range_m: network.radio.map(|radio| radio.range_m),
             roster: robots.keys().cloned().collect(),
         };
         let expectations = expect::check(self.expectations, &setting, source)?;
