@@ -3,51 +3,12 @@
 
 use std::ops::RangeInclusive;
 
-use protocol::pattern::overlap;
-
-/// How a range begins in the name of a table.
-const OPEN: char = '{';
-/// Largest number of a robot in bulk.
-const MAX_NUMBER: usize = 1_000_000;
+use protocol::pattern::{overlap, split_range};
 
 /// The name of a robot of a table with a count or a range.
 #[must_use]
 pub fn member(name: &str, number: usize) -> String {
     format!("{name}{number}")
-}
-
-/// Splits a name such as `S{1..20}` into the name of the table and the numbers of its robots, the last one among them; `None` for
-/// a name without braces.
-///
-/// # Errors
-/// In words, what is wrong with the braces.
-pub fn split_range(name: &str) -> Result<Option<(&str, RangeInclusive<usize>)>, String> {
-    let Some((base, braces)) = name.split_once(OPEN) else {
-        return Ok(None);
-    };
-    let numbers = braces
-        .strip_suffix('}')
-        .and_then(|range| range.split_once(".."));
-    let numbers = numbers.and_then(|(first, last)| {
-        let number = |text: &str| {
-            let is_plain = text == "0" || !text.starts_with('0');
-            let number = text.parse().ok().filter(|_| is_plain);
-            number.filter(|number| *number <= MAX_NUMBER)
-        };
-        Some(number(first)?..=number(last)?)
-    });
-    let numbers = numbers.ok_or_else(|| {
-        format!(
-            "{name:?} is not a name with a range of numbers at its end, such as \"S{{1..20}}\"; the largest number is {MAX_NUMBER}"
-        )
-    })?;
-    if numbers.is_empty() {
-        let (first, last) = (numbers.start(), numbers.end());
-        return Err(format!(
-            "{name:?}: the range ends with {last}, before {first}"
-        ));
-    }
-    Ok(Some((base, numbers)))
 }
 
 /// The name of an element of a list, without the range in it.
@@ -188,7 +149,8 @@ fn single(
 
 #[cfg(test)]
 mod tests {
-    use super::split_range;
+    use protocol::pattern::split_range;
+
     use crate::Override;
 
     const FILE: &str = "[[robot]]\nname = \"Butler\"\n[[robot]]\nname = \"S\"\ncount = 3\n";

@@ -11,7 +11,7 @@ use observe::measure::MeasureSource;
 use observe::measure::check_name;
 use observe::{Expectation, Measure};
 use protocol::RobotName;
-use protocol::pattern::overlap;
+use protocol::pattern::matches;
 use record::Summary;
 use scenario::Scenario;
 use serde::Deserialize;
@@ -285,7 +285,7 @@ impl Experiment {
         for measure in &self.measures {
             for robot in measure.robots() {
                 let is_operator = robot == RobotName::operator().as_str();
-                if !is_operator && !roster.iter().any(|name| overlap(robot, name)) {
+                if !is_operator && !roster.iter().any(|name| matches(robot, name)) {
                     let reason = format!(
                         "the scenario has no robot \"{robot}\"; it has {}",
                         roster.join(", ")
@@ -345,7 +345,7 @@ impl Experiment {
             for (robot, name) in measure.variables() {
                 let mut matching = published
                     .iter()
-                    .filter(|(known, _)| overlap(robot, known.as_str()))
+                    .filter(|(known, _)| matches(robot, known.as_str()))
                     .peekable();
                 let reason = match matching.peek() {
                     None => Some(format!("{robot} has no state variables")),

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use config::FileError;
-use observe::Observation;
+use observe::{Observation, SiteStates};
 use protocol::Event;
 use record::RunFolder;
 use record::names::RECORDING;
@@ -113,12 +113,14 @@ pub(super) fn read(
     let recording = Recording::open(&run.file(RECORDING))?;
     let mut ticks = Ticks::of(recording);
     let mut states = LastStates::default();
+    let mut sites = SiteStates::new(&scenario.setting());
     while let Some(tick) = ticks.next_tick()? {
         let number = tick.tick();
         let mut events = tick.events;
         // The end of the run is observed by itself, as it is where robots run in this process.
         let end = events.pop_if(|event| matches!(event, Event::End { .. }));
         states.note(tick.reports, tick.frame.robots);
+        sites.note(&events);
 
         let has_ended = end.is_some();
         for events in [Some(events), end.map(|end| vec![end])]
@@ -130,6 +132,7 @@ pub(super) fn read(
                 tick_s: scenario.tick_s,
                 events: &events,
                 state: &|robot| states.of(robot),
+                site: &|site| sites.of(site),
             });
         }
         if has_ended {

@@ -293,6 +293,7 @@ fn follow_with(
             tick_s: simulation.scenario().tick_s,
             events: &record.events,
             state: &|robot| simulation.robot_state(robot),
+            site: &|site| simulation.site_state(site),
         });
         Ok(())
     })?;

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use observe::{Expectation, Monitors, Observation};
+use observe::{Expectation, Monitors, Observation, SiteStates};
 use protocol::messages::End;
 use protocol::{Event, Tick};
 use record::EpochFiles;
+use record::Record;
 use record::summary::ExpectationVerdict;
-use record::{Entry, Record};
 use recording::{Recording, Ticks};
 use scenario::Scenario;
 
@@ -37,7 +37,9 @@ pub fn judge(
 ) -> Result<Verdicts, LabError> {
     let mut record = Record::of_events(&files.events)?;
     let mut recorded = ReportsByTick::open(files, expectations)?;
-    let mut watches = Monitors::new(expectations, &scenario.setting());
+    let setting = scenario.setting();
+    let mut watches = Monitors::new(expectations, &setting);
+    let mut sites = SiteStates::new(&setting);
     let mut verdicts = Verdicts::default();
 
     while let Some(entry) = record.next_entry()? {
@@ -52,26 +54,19 @@ pub fn judge(
             break;
         }
         verdicts.tick = entry.tick;
-        let judged = observe(&mut watches, &entry, recorded.as_ref(), scenario.tick_s);
+        sites.note(&entry.events);
+        let judged = watches.observe(&Observation {
+            tick: entry.tick,
+            tick_s: scenario.tick_s,
+            events: &entry.events,
+            state: &|robot| recorded.as_ref().and_then(|states| states.last.of(robot)),
+            site: &|site| sites.of(site),
+        });
         verdicts.note(&judged);
     }
 
     verdicts.note(&watches.end(End::Aborted));
     Ok(verdicts)
-}
-
-fn observe(
-    watches: &mut Monitors,
-    entry: &Entry,
-    recorded: Option<&ReportsByTick>,
-    tick_s: f64,
-) -> Vec<Event> {
-    watches.observe(&Observation {
-        tick: entry.tick,
-        tick_s,
-        events: &entry.events,
-        state: &|robot| recorded.and_then(|states| states.last.of(robot)),
-    })
 }
 
 impl Verdicts {

@@ -2,16 +2,17 @@
 
 use config::units::Time;
 use protocol::messages::Point;
-use protocol::pattern::overlap as overlap_of_names;
+use protocol::pattern::matches;
 use protocol::time::tick_seconds;
 use protocol::{Event, RobotName, RobotPattern, Tick};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use crate::comparison::{TestError, TestTable, ValueTest, Values};
 use crate::pattern::{Pattern, PatternError};
 use crate::quantity::{
     By, OfRobot, PlaceKind, PlaceTable, QuantityError, QuantityGauge, RunQuantity, StateNames,
-    Team, ValueBounds, number,
+    Team, WhoseVariable, number,
 };
 use crate::words::{self, Word};
 use crate::{Observation, RobotState, RunSetting};
@@ -42,13 +43,27 @@ pub enum TickConditionError {
     /// It is not one of the conditions that there are.
     #[error(
         "a condition is an event (`event = …`), a state of a robot or of several (`robot = …` or `robots = …` with `behavior`, \
-         `emotion` or `variable`), a number of places (`walked`, `distance`, `inside`, `covered`, `components`), `overlap`, \
+         `emotion` or `variable`), a state of a site or of several (`site = …` or `sites = …` with `variable`), a number of places (`walked`, `distance`, `inside`, `covered`, `components`), `overlap`, \
          `stalled`, or several conditions (`all = […]`)"
     )]
     Unknown,
-    /// A number of robots or places that cannot be taken.
+    /// A number of robots, places or sites that cannot be taken.
     #[error(transparent)]
     RunQuantity(#[from] QuantityError),
+    /// What a variable is compared with is wrong.
+    #[error(transparent)]
+    Test(#[from] TestError),
+    /// `each` where nothing is combined, or where the other bounds are those of each.
+    #[error(
+        "`each` is for several robots or sites whose numbers become one, such as `by = \"count\"`: leave it out, and name what \
+         one has beside `variable`"
+    )]
+    Each,
+    /// A number of several robots or sites is compared with what is no number.
+    #[error(
+        "`is` beside `by = \"{0}\"` is of one number: what each has is named by `each = {{ is = … }}`"
+    )]
+    NoNumberOfAll(By),
     /// A condition has a number that is taken over the run.
     #[error("a condition is about each tick: leave `as` out")]
     OverTheRun,
@@ -56,7 +71,7 @@ pub enum TickConditionError {
     #[error("`{0}` is true or false: leave the bounds out")]
     Truth(String),
     /// A number without a bound.
-    #[error("{0} needs `at_least`, `at_most`, `above` or `below`, with a finite number")]
+    #[error("{0} needs `at_least`, `at_most`, `above`, `below` or `is`, with a finite number")]
     Unbound(String),
     /// Too many conditions in a condition, or too deep in each other.
     #[error("a condition has at most {MAX_PARTS} conditions, {MAX_DEPTH} deep in each other")]
@@ -71,11 +86,10 @@ pub enum TickConditionError {
     #[error("`for` is more than zero")]
     Lasting,
     /// A variable without a bound.
-    #[error("`variable` needs `at_least`, `at_most`, `above` or `below`, with a finite number")]
+    #[error(
+        "`variable` needs `at_least`, `at_most`, `above` or `below`, with a finite number, or `is` with a value"
+    )]
     Bound,
-    /// No number is within the bounds.
-    #[error("no number is within the bounds of `variable`")]
-    NoNumber,
     /// No behavior, or no emotion, is named.
     #[error("`{0}` names at least one")]
     NoName(&'static str),
@@ -103,11 +117,11 @@ enum Alternative {
     Stalled(StalledCondition),
 }
 
-/// A number of robots or places within bounds, which may have to last. A truth has no bounds.
+/// A number of robots, places or sites that is compared, which may have to last. A truth is not.
 #[derive(Debug, Clone, PartialEq)]
 struct LastingNumber {
     quantity: RunQuantity,
-    bounds: ValueBounds,
+    test: Option<ValueTest>,
     lasting: Option<Time>,
 }
 
@@ -130,7 +144,7 @@ struct LastingState {
 enum Is {
     Behavior(Vec<String>),
     Emotion(Vec<String>),
-    Variable(String, ValueBounds),
+    Variable(String, ValueTest),
 }
 
 /// That no state variable of progress has risen for a time.
@@ -156,6 +170,10 @@ struct ConditionTable {
     #[serde(skip_serializing_if = "Option::is_none")]
     robots: Option<Team>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    site: Option<RobotName>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sites: Option<Team>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     by: Option<By>,
     #[serde(skip_serializing_if = "Option::is_none")]
     behavior: Option<Names>,
@@ -163,6 +181,10 @@ struct ConditionTable {
     emotion: Option<Names>,
     #[serde(skip_serializing_if = "Option::is_none")]
     variable: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    each: Option<TestTable>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    is: Option<Values>,
     #[serde(skip_serializing_if = "Option::is_none")]
     at_least: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -291,8 +313,9 @@ impl ConditionTable {
         }
 
         let place = self.take_place();
+        let is_of_sites = self.site.is_some() || self.sites.is_some();
         let subjects = [
-            self.robot.is_some() || self.robots.is_some(),
+            self.robot.is_some() || self.robots.is_some() || is_of_sites,
             place.is_some(),
             self.all.is_some(),
             self.overlap.is_some(),
@@ -301,20 +324,20 @@ impl ConditionTable {
         let is_one = subjects.iter().filter(|is_given| **is_given).count() == 1;
         let has_state =
             self.behavior.is_some() || self.emotion.is_some() || self.variable.is_some();
-        let is_of_robots = subjects[0];
-        if !is_one || (!is_of_robots && (has_state || self.by.is_some())) {
+        let is_foreign = has_state || self.by.is_some() || self.each.is_some();
+        if !is_one || (!subjects[0] && is_foreign) {
             return Err(TickConditionError::Unknown);
         }
 
-        let bounds = self.bounds();
+        let test = self.take_test()?;
         let lasting = self.lasting;
-        let is_plain = bounds == ValueBounds::default();
+        let is_plain = test.is_none();
         if let Some((kind, table)) = place {
             if table.number.is_some() {
                 return Err(TickConditionError::OverTheRun);
             }
             let quantity = table.check(kind)?;
-            return within(format!("`{}`", kind.key()), quantity, bounds, lasting);
+            return compared(format!("`{}`", kind.key()), quantity, test, lasting);
         }
         match (self.all.take(), self.overlap.take(), self.stalled.take()) {
             (Some(parts), None, None) if is_plain => {
@@ -325,19 +348,24 @@ impl ConditionTable {
             }
             (None, Some(overlap), None) if is_plain && lasting.is_none() => check_overlap(overlap),
             (None, None, Some(stalled)) if is_plain && lasting.is_none() => check_stalled(&stalled),
-            (None, None, None) if self.robots.is_some() || self.by.is_some() => self.check_team(),
-            (None, None, None) => self.check_robot(),
+            (None, None, None) if is_of_sites => self.check_sites(test),
+            (None, None, None) if self.robots.is_some() || self.by.is_some() => {
+                self.check_team(test)
+            }
+            (None, None, None) => self.check_robot(test),
             _ => Err(TickConditionError::Unknown),
         }
     }
 
-    fn bounds(&self) -> ValueBounds {
-        ValueBounds {
+    fn take_test(&mut self) -> Result<Option<ValueTest>, TestError> {
+        TestTable {
+            is: self.is.take(),
             at_least: self.at_least,
             at_most: self.at_most,
             above: self.above,
             below: self.below,
         }
+        .check()
     }
 
     /// The number of places that it has; `None` if it has none or several.
@@ -358,20 +386,18 @@ impl ConditionTable {
     }
 
     /// A state of one robot.
-    fn check_robot(self) -> Result<Alternative, TickConditionError> {
-        let bounds = self.bounds();
-        let is_plain = bounds == ValueBounds::default();
+    fn check_robot(self, test: Option<ValueTest>) -> Result<Alternative, TickConditionError> {
         let Some(robot) = self.robot else {
             return Err(TickConditionError::Unknown);
         };
-        let is = match (self.behavior, self.emotion, self.variable) {
-            (Some(names), None, None) if is_plain => Is::Behavior(at_least_one("behavior", names)?),
-            (None, Some(names), None) if is_plain => Is::Emotion(at_least_one("emotion", names)?),
-            (None, None, Some(_)) if is_plain => return Err(TickConditionError::Bound),
-            (None, None, Some(_)) if bounds.are_contradictory() => {
-                return Err(TickConditionError::NoNumber);
-            }
-            (None, None, Some(variable)) => Is::Variable(variable, bounds),
+        if self.each.is_some() {
+            return Err(TickConditionError::Each);
+        }
+        let is = match (self.behavior, self.emotion, self.variable, test) {
+            (Some(names), None, None, None) => Is::Behavior(at_least_one("behavior", names)?),
+            (None, Some(names), None, None) => Is::Emotion(at_least_one("emotion", names)?),
+            (None, None, Some(variable), Some(test)) => Is::Variable(variable, test),
+            (None, None, Some(_), None) => return Err(TickConditionError::Bound),
             _ => return Err(TickConditionError::Unknown),
         };
         Ok(Alternative::State(LastingState {
@@ -382,52 +408,90 @@ impl ConditionTable {
     }
 
     /// A state of several robots.
-    fn check_team(self) -> Result<Alternative, TickConditionError> {
-        let mut bounds = self.bounds();
-        let (key, of) = match (self.behavior, self.emotion, self.variable) {
-            (Some(names), None, None) => {
+    fn check_team(mut self, test: Option<ValueTest>) -> Result<Alternative, TickConditionError> {
+        let (key, of) = match (
+            self.behavior.take(),
+            self.emotion.take(),
+            self.variable.take(),
+        ) {
+            (Some(names), None, None) if self.each.is_none() => {
                 let names = at_least_one("behavior", names)?;
                 ("behavior", OfRobot::State(StateNames::Behaviors(names)))
             }
-            (None, Some(names), None) => {
+            (None, Some(names), None) if self.each.is_none() => {
                 let names = at_least_one("emotion", names)?;
                 ("emotion", OfRobot::State(StateNames::Emotions(names)))
             }
-            (None, None, Some(variable)) => {
-                let mut of_each = ValueBounds::default();
-                // Those of all, or of any, are those of each.
-                if matches!(self.by, Some(By::All | By::Any)) {
-                    std::mem::swap(&mut of_each, &mut bounds);
-                }
-                if of_each.are_contradictory() {
-                    return Err(TickConditionError::NoNumber);
-                }
-                ("variable", OfRobot::Variable(variable, of_each))
-            }
+            (None, None, Some(variable)) => return self.check_variable(variable, test),
             _ => return Err(TickConditionError::Unknown),
         };
         let quantity = RunQuantity::each(key, self.robot, self.robots, self.by, of)?;
-        within(format!("`{key}`"), quantity, bounds, self.lasting)
+        compared(format!("`{key}`"), quantity, test, self.lasting)
+    }
+
+    /// A state of one site or of several.
+    fn check_sites(mut self, test: Option<ValueTest>) -> Result<Alternative, TickConditionError> {
+        match self.variable.take() {
+            Some(variable) if self.behavior.is_none() && self.emotion.is_none() => {
+                self.check_variable(variable, test)
+            }
+            _ => Err(TickConditionError::Unknown),
+        }
+    }
+
+    /// A variable of a site, or of several robots or sites.
+    fn check_variable(
+        self,
+        variable: String,
+        test: Option<ValueTest>,
+    ) -> Result<Alternative, TickConditionError> {
+        let each = match self.each {
+            Some(table) => Some(table.check()?.ok_or(TestError::Nothing)?),
+            None => None,
+        };
+        // What is named beside all, or any, is of each, and so is what a single site has beside numbers.
+        let (of_each, of_all) = match self.by {
+            Some(By::All | By::Any) if each.is_some() && test.is_some() => {
+                return Err(TickConditionError::Each);
+            }
+            Some(By::All | By::Any) => (each.or(test), None),
+            None if each.is_some() => return Err(TickConditionError::Each),
+            None if test.as_ref().is_some_and(|test| !test.is_of_numbers()) => (test, None),
+            Some(by) if test.as_ref().is_some_and(|test| !test.is_of_numbers()) => {
+                return Err(TickConditionError::NoNumberOfAll(by));
+            }
+            _ => (each, test),
+        };
+        let whose = WhoseVariable {
+            robot: self.robot,
+            robots: self.robots,
+            site: self.site,
+            sites: self.sites,
+            by: self.by,
+        };
+        let quantity = RunQuantity::variable(whose, variable, of_each)?;
+        compared("`variable`".to_owned(), quantity, of_all, self.lasting)
     }
 }
 
-/// A number within bounds. A truth has none, and any other number some.
-fn within(
+/// A number that is compared. A truth is not, and any other number is.
+fn compared(
     key: String,
     quantity: RunQuantity,
-    bounds: ValueBounds,
+    test: Option<ValueTest>,
     lasting: Option<Time>,
 ) -> Result<Alternative, TickConditionError> {
-    let is_plain = bounds == ValueBounds::default();
-    match quantity.is_truth() {
-        true if !is_plain => return Err(TickConditionError::Truth(key)),
-        false if is_plain => return Err(TickConditionError::Unbound(key)),
-        false if bounds.are_contradictory() => return Err(TickConditionError::NoNumber),
+    match (quantity.is_truth(), &test) {
+        (true, Some(_)) => return Err(TickConditionError::Truth(key)),
+        (false, None) => return Err(TickConditionError::Unbound(key)),
+        (false, Some(test)) if !test.is_of_numbers() => {
+            return Err(TickConditionError::Unbound(key));
+        }
         _ => {}
     }
     Ok(Alternative::Number(LastingNumber {
         quantity,
-        bounds,
+        test,
         lasting,
     }))
 }
@@ -494,9 +558,9 @@ impl Alternative {
                 match is {
                     Is::Behavior(names) => table.behavior = Some(names.into()),
                     Is::Emotion(names) => table.emotion = Some(names.into()),
-                    Is::Variable(name, bounds) => {
+                    Is::Variable(name, test) => {
                         table.variable = Some(name.clone());
-                        table.set_bounds(*bounds);
+                        table.set_test(Some(test));
                     }
                 }
             }
@@ -525,16 +589,18 @@ impl Alternative {
 }
 
 impl ConditionTable {
-    fn set_bounds(&mut self, bounds: ValueBounds) {
-        self.at_least = bounds.at_least;
-        self.at_most = bounds.at_most;
-        self.above = bounds.above;
-        self.below = bounds.below;
+    fn set_test(&mut self, test: Option<&ValueTest>) {
+        let table = TestTable::of(test);
+        self.is = table.is;
+        self.at_least = table.at_least;
+        self.at_most = table.at_most;
+        self.above = table.above;
+        self.below = table.below;
     }
 
     fn set_number(&mut self, number: &LastingNumber) {
         self.lasting = number.lasting;
-        self.set_bounds(number.bounds);
+        self.set_test(number.test.as_ref());
         if let Some((kind, table)) = PlaceTable::of(&number.quantity) {
             let place = match kind {
                 PlaceKind::Walked => &mut self.walked,
@@ -547,21 +613,47 @@ impl ConditionTable {
             return;
         }
 
-        let RunQuantity::Each { team, by, of } = &number.quantity else {
-            return;
-        };
-        self.robots = Some(team.clone());
-        self.by = *by;
-        match of {
-            OfRobot::State(StateNames::Behaviors(names)) => self.behavior = Some(names.into()),
-            OfRobot::State(StateNames::Emotions(names)) => self.emotion = Some(names.into()),
-            OfRobot::Variable(name, of_each) => {
-                self.variable = Some(name.clone());
-                if *of_each != ValueBounds::default() {
-                    self.set_bounds(*of_each);
+        match &number.quantity {
+            RunQuantity::Each { team, by, of } => {
+                self.robots = Some(team.clone());
+                self.by = *by;
+                match of {
+                    OfRobot::State(StateNames::Behaviors(names)) => {
+                        self.behavior = Some(names.into());
+                    }
+                    OfRobot::State(StateNames::Emotions(names)) => {
+                        self.emotion = Some(names.into());
+                    }
+                    OfRobot::Variable(name, test) => self.set_variable(name, test.as_ref()),
+                    OfRobot::Walked | OfRobot::DistanceTo(_) | OfRobot::Inside(_) => {}
                 }
             }
-            OfRobot::Walked | OfRobot::DistanceTo(_) | OfRobot::Inside(_) => {}
+            RunQuantity::Sites {
+                sites,
+                by,
+                variable,
+                test,
+            } => {
+                match (by, sites) {
+                    (None, Team::One(name)) => self.site = RobotName::new(name.as_str()).ok(),
+                    _ => self.sites = Some(sites.clone()),
+                }
+                self.by = *by;
+                self.set_variable(variable, test.as_ref());
+            }
+            RunQuantity::Between { .. }
+            | RunQuantity::Covered { .. }
+            | RunQuantity::Components { .. } => {}
+        }
+    }
+
+    /// A variable of each, with what each is compared with.
+    fn set_variable(&mut self, name: &str, of_each: Option<&ValueTest>) {
+        self.variable = Some(name.to_owned());
+        match self.by {
+            _ if of_each.is_none() => {}
+            Some(By::All | By::Any) | None => self.set_test(of_each),
+            Some(_) => self.each = Some(TestTable::of(of_each)),
         }
     }
 }
@@ -599,6 +691,9 @@ impl TickCondition {
         for quantity in numbers {
             quantity.check(setting)?;
         }
+        for pattern in self.patterns() {
+            pattern.check_sites(setting)?;
+        }
 
         for name in self.robots() {
             if !is_known(name, &setting.roster) {
@@ -631,11 +726,15 @@ impl TickCondition {
         named
     }
 
-    /// Whether it depends on anything but events.
+    /// Whether it depends on anything but events and sites, whose states follow from events.
     pub(crate) fn needs_states(&self) -> bool {
         let mut needs = false;
         self.visit(&mut |alternative| {
-            needs |= !matches!(alternative, Alternative::Event(_) | Alternative::All(_));
+            needs |= match alternative {
+                Alternative::Event(_) | Alternative::All(_) => false,
+                Alternative::Number(number) => !number.quantity.is_of_sites(),
+                Alternative::State(_) | Alternative::Overlap(_) | Alternative::Stalled(_) => true,
+            };
         });
         needs
     }
@@ -647,7 +746,7 @@ impl TickCondition {
             Alternative::Event(pattern) => robots.extend(pattern.robots()),
             Alternative::State(state) => robots.push(state.robot.as_str()),
             Alternative::Number(number) => {
-                let patterns = number.quantity.team().patterns().iter();
+                let patterns = number.quantity.patterns().iter();
                 robots.extend(patterns.map(RobotPattern::as_str));
             }
             Alternative::All(_) => {}
@@ -718,10 +817,7 @@ impl TickCondition {
 /// Whether a run of these robots has the robot, or one that matches the pattern, or the operator is meant.
 pub(crate) fn is_known(name: &str, roster: &[RobotName]) -> bool {
     let is_operator = name == RobotName::operator().as_str();
-    is_operator
-        || roster
-            .iter()
-            .any(|robot| overlap_of_names(name, robot.as_str()))
+    is_operator || roster.iter().any(|robot| matches(name, robot.as_str()))
 }
 
 impl LastingState {
@@ -901,9 +997,7 @@ impl Tracked {
         let Alternative::Number(condition) = &self.alternative else {
             return None;
         };
-        let bounds = condition.bounds;
         let lasting = condition.lasting;
-        let is_truth = condition.quantity.is_truth();
         let value = match self.gauge.as_mut()?.value(seen) {
             Ok(value) => value,
             Err(undefined) => {
@@ -913,10 +1007,9 @@ impl Tracked {
             }
         };
         self.unknown = None;
-        let holds = if is_truth {
-            value != 0.0
-        } else {
-            bounds.hold(value)
+        let holds = match &condition.test {
+            Some(test) => test.hold_number(value),
+            None => value != 0.0,
         };
         if !holds {
             self.since = None;
@@ -924,13 +1017,13 @@ impl Tracked {
         }
 
         let since = self.since_when(lasting, tick_s, seen.tick)?;
-        let Alternative::Number(LastingNumber { quantity, .. }) = &self.alternative else {
+        let Alternative::Number(LastingNumber { quantity, test, .. }) = &self.alternative else {
             return None;
         };
-        let words = if is_truth {
-            format!("{quantity} holds")
-        } else {
-            format!("{quantity} is {value}")
+        let words = match test {
+            Some(_) => format!("{quantity} is {value}"),
+            None if quantity.is_statement() => quantity.to_string(),
+            None => format!("{quantity} holds"),
         };
         Some(lasting_words(words, lasting, since, tick_s))
     }
@@ -1031,7 +1124,7 @@ impl Is {
         match self {
             Self::Behavior(names) => Some(names.iter().any(|name| name == state.behavior_state)),
             Self::Emotion(names) => Some(names.iter().any(|name| name == state.emotion_state)),
-            Self::Variable(name, bounds) => Some(bounds.hold(number(state, name)?)),
+            Self::Variable(name, test) => test.holds(state.state_variables.get(name)?),
         }
     }
 
@@ -1039,7 +1132,8 @@ impl Is {
     fn unknown(&self, robot: &RobotName) -> String {
         match self {
             Self::Behavior(_) | Self::Emotion(_) => format!("{robot} has not reported"),
-            Self::Variable(name, _) => unpublished(robot, name),
+            Self::Variable(name, test) if test.is_of_numbers() => unpublished(robot, name),
+            Self::Variable(name, _) => format!("{robot} publishes no such `{name}`"),
         }
     }
 
@@ -1048,7 +1142,8 @@ impl Is {
             Self::Behavior(_) => format!("the behavior of {robot} is {}", state.behavior_state),
             Self::Emotion(_) => format!("the emotion of {robot} is {}", state.emotion_state),
             Self::Variable(name, _) => {
-                let value = number(state, name).unwrap_or_default();
+                let value = state.state_variables.get(name);
+                let value = value.map(ToString::to_string).unwrap_or_default();
                 format!("`{name}` of {robot} is {value}")
             }
         }

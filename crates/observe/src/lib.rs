@@ -1,5 +1,6 @@
 //! What is asked of a run, tick by tick, while it is played or when it is read again. Pure: no simulator, no file, no clock.
 
+mod comparison;
 mod condition;
 pub mod expect;
 mod expression;
@@ -8,11 +9,16 @@ mod pattern;
 mod places;
 mod probe;
 mod quantity;
+mod sites;
+
 pub mod words;
+
+use std::collections::BTreeMap;
 
 use protocol::messages::{Point, StateVariables};
 use protocol::{Event, RobotName, Tick};
 
+pub use comparison::{TestError, ValueBounds, ValueTest};
 pub use condition::{Evaluation, TickCondition, TickConditionError};
 pub use expect::{Expectation, Judgment, Monitor, Monitors};
 pub use expression::{Expression, ExpressionError};
@@ -20,9 +26,8 @@ pub use measure::{Measure, MeasureError, MeasureSource, Measured};
 pub use pattern::{Pattern, PatternError};
 pub use places::FieldRegion;
 pub use probe::Probe;
-pub use quantity::{
-    By, Goal, OfRobot, OfValues, QuantityError, RunQuantity, StateNames, Team, ValueBounds,
-};
+pub use quantity::{By, Goal, OfRobot, OfValues, QuantityError, RunQuantity, StateNames, Team};
+pub use sites::SiteStates;
 pub use words::Words;
 
 /// What conditions and measures depend on beside the ticks of a run.
@@ -40,6 +45,22 @@ pub struct RunSetting {
     pub radio_range_m: Option<f64>,
     /// The robots, in the order of their names.
     pub roster: Vec<RobotName>,
+    /// The sites, with their states at the start: the types of their variables never change.
+    pub sites: BTreeMap<String, StateVariables>,
+}
+
+impl RunSetting {
+    /// Whether a site has this name, or matches this pattern.
+    pub(crate) fn has_site(&self, pattern: &str) -> bool {
+        self.sites
+            .keys()
+            .any(|site| protocol::pattern::matches(pattern, site))
+    }
+
+    /// The sites that there are, for errors.
+    pub(crate) fn sites_in_words(&self) -> String {
+        comparison::in_words("it has", self.sites.keys().map(String::as_str))
+    }
 }
 
 /// A complete tick of a run, or its end.
@@ -52,6 +73,8 @@ pub struct Observation<'a> {
     pub events: &'a [Event],
     /// What a robot reported last; `None` before its first report.
     pub state: &'a dyn Fn(&RobotName) -> Option<RobotState<'a>>,
+    /// The state of a site after the tick.
+    pub site: &'a dyn Fn(&str) -> Option<&'a StateVariables>,
 }
 
 impl Observation<'_> {

@@ -9,12 +9,13 @@ use serde::de::{MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 use toml::Spanned;
 
+use crate::comparison::{TestError, TestTable};
 use crate::condition::TickCondition;
 use crate::expression::Expression;
-use crate::pattern::Pattern;
+use crate::pattern::{Pattern, PatternError};
 use crate::quantity::{
     By, OfRobot, OfValues, PlaceKind, PlaceTable, QuantityError, RunQuantity, StateNames, Team,
-    ValueBounds,
+    WhoseVariable,
 };
 use crate::words::{self, Word};
 use crate::{RunSetting, TickConditionError};
@@ -57,7 +58,7 @@ pub enum MeasureSource {
     Between(Between),
     /// Share of the simulated time in which robots have one of these emotions or behaviors, 0 to 1, or how many of them have.
     Share(RunQuantity),
-    /// A number of robots or places.
+    /// A number of robots, places or sites.
     Number(Number),
     /// Time of the last progress before the robots come to a standstill.
     Stalled(Stalled),
@@ -86,7 +87,7 @@ pub enum When {
     After,
 }
 
-/// A number of robots or places, which has a value in each tick.
+/// A number of robots, places or sites, which has a value in each tick.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Number {
     /// What has it.
@@ -337,9 +338,15 @@ pub enum MeasureError {
     /// A variable of a robot that is not `ROBOT.VARIABLE`.
     #[error("\"{0}\" is not a state variable of a robot, such as \"Butler.served\"")]
     NoVariable(String),
-    /// A number of robots or places that cannot be taken.
+    /// A number of robots, places or sites that cannot be taken.
     #[error(transparent)]
     RunQuantity(#[from] QuantityError),
+    /// What a variable is compared with is wrong.
+    #[error(transparent)]
+    Test(#[from] TestError),
+    /// A pattern of events that the run does not have.
+    #[error(transparent)]
+    Pattern(#[from] PatternError),
     /// A condition that no tick can have.
     #[error(transparent)]
     Condition(#[from] TickConditionError),
@@ -419,8 +426,12 @@ struct RawShare {
 struct RawVariable {
     robot: Option<RobotName>,
     robots: Option<Team>,
+    site: Option<RobotName>,
+    sites: Option<Team>,
     by: Option<By>,
     name: String,
+    /// If it is given: the number of each is whether its variable passes.
+    each: Option<TestTable>,
     #[serde(rename = "as")]
     taken: OfValues,
 }
@@ -654,8 +665,18 @@ impl RawShare {
 
 impl RawVariable {
     fn check(self) -> Result<MeasureSource, MeasureError> {
-        let of = OfRobot::Variable(self.name, ValueBounds::default());
-        let quantity = RunQuantity::each("variable", self.robot, self.robots, self.by, of)?;
+        let test = match self.each {
+            Some(table) => Some(table.check()?.ok_or(TestError::Nothing)?),
+            None => None,
+        };
+        let whose = WhoseVariable {
+            robot: self.robot,
+            robots: self.robots,
+            site: self.site,
+            sites: self.sites,
+            by: self.by,
+        };
+        let quantity = RunQuantity::variable(whose, self.name, test)?;
         let taken = self.taken;
         Ok(MeasureSource::Number(Number { quantity, taken }))
     }
@@ -667,7 +688,7 @@ impl RawJain {
             quantity: RunQuantity::Each {
                 team: Team::One(self.robot),
                 by: Some(By::Jain),
-                of: OfRobot::Variable(self.name, ValueBounds::default()),
+                of: OfRobot::Variable(self.name, None),
             },
             taken: OfValues::End,
         })
@@ -780,6 +801,11 @@ impl Measure {
                     for condition in time.after.iter().chain([&time.to]) {
                         condition.check(setting)?;
                     }
+                }
+                MeasureSource::Count(count) => count.pattern.check_sites(setting)?,
+                MeasureSource::Between(between) => {
+                    between.begin.check_sites(setting)?;
+                    between.end.check_sites(setting)?;
                 }
                 _ => {}
             }
@@ -926,7 +952,7 @@ impl MeasureSource {
                 between.begin.robots().chain(ends).collect()
             }
             Self::Share(quantity) | Self::Number(Number { quantity, .. }) => {
-                let patterns = quantity.team().patterns().iter();
+                let patterns = quantity.patterns().iter();
                 patterns.map(RobotPattern::as_str).collect()
             }
             Self::Stalled(stalled) => {

@@ -3,14 +3,16 @@
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
-use protocol::{Event, RobotName};
+use protocol::pattern::matches;
+use protocol::{Event, RobotPattern};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use crate::RunSetting;
 use crate::words::{self, Word};
 
 /// A set of events, in a file `{ event = "behavior", robot = "Butler", to = "EXCHANGE" }`. A field with a list of values matches
-/// each of them; a field that is not named matches everything, and so does the robot `"*"`.
+/// each of them; a field that is not named matches everything. Robots and sites are named as [`RobotPattern`]s, `"*"` for all.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "BTreeMap<String, Value>", into = "Value")]
 pub struct Pattern {
@@ -18,12 +20,20 @@ pub struct Pattern {
     fields: BTreeMap<String, FieldValues>,
 }
 
-/// The values of a field that match; empty for every robot.
+/// The values of a field that match.
 #[derive(Debug, Clone, PartialEq)]
-struct FieldValues(Vec<Value>);
+struct FieldValues {
+    values: Vec<Value>,
+    /// Whether the values are patterns of names.
+    are_names: bool,
+}
 
-/// Every robot, as the value of a field.
-const EVERY_ROBOT: &str = "*";
+/// Every robot or site, as the value of a field.
+const EVERY_NAME: &str = "*";
+/// The field of events of sites that names one.
+const SITE: &str = "site";
+/// What a robot did to a site that there need not be.
+const REFUSED: &str = "site_refused";
 
 /// A pattern that no event can match.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -55,6 +65,14 @@ pub enum PatternError {
         /// The field.
         field: String,
     },
+    /// A site, or a pattern of sites, that the run does not have.
+    #[error("no site of this scenario is called {name}; {known}")]
+    UnknownSite {
+        /// The name or pattern.
+        name: String,
+        /// The sites that there are, in words.
+        known: String,
+    },
     /// The field never has the value.
     #[error("`{field}` of the event \"{kind}\" is never {value}{known}")]
     UnknownValue {
@@ -73,6 +91,7 @@ pub enum PatternError {
 #[derive(Debug, Clone, PartialEq)]
 enum Domain {
     Robot,
+    Site,
     Words(Vec<String>),
     /// One of these words, or a table.
     WordsOrTable(Vec<String>),
@@ -94,6 +113,8 @@ fn kinds() -> BTreeMap<String, BTreeMap<String, Domain>> {
         for (name, field) in variant["properties"].as_object().into_iter().flatten() {
             if name == "event" {
                 kind = field["const"].as_str().unwrap_or_default().to_owned();
+            } else if name == SITE {
+                fields.insert(name.clone(), Domain::Site);
             } else {
                 fields.insert(name.clone(), domain(&schema, field));
             }
@@ -156,9 +177,9 @@ fn all_kinds() -> String {
 impl Domain {
     fn has(&self, value: &Value) -> bool {
         match self {
-            Self::Robot => value
+            Self::Robot | Self::Site => value
                 .as_str()
-                .is_some_and(|name| RobotName::new(name).is_ok()),
+                .is_some_and(|name| RobotPattern::new(name).is_ok()),
             Self::Words(words) => words.iter().any(|word| value == word),
             Self::WordsOrTable(words) => {
                 value.is_object() || words.iter().any(|word| value == word)
@@ -173,7 +194,12 @@ impl Domain {
     /// What it can be, to be appended to an error.
     fn known(&self) -> String {
         match self {
-            Self::Robot => ": it is the name of a robot".to_owned(),
+            Self::Robot => {
+                ": it is the name of a robot, or a pattern such as \"S*\" or \"S{1..9}\"".to_owned()
+            }
+            Self::Site => {
+                ": it is the name of a site, or a pattern such as \"T*\" or \"T{1..9}\"".to_owned()
+            }
             Self::Words(words) => format!(": it is one of {}", words.join(", ")),
             Self::WordsOrTable(words) => {
                 format!(": it is one of {}, or a table", words.join(", "))
@@ -215,10 +241,6 @@ impl TryFrom<BTreeMap<String, Value>> for Pattern {
             if values.is_empty() {
                 return Err(PatternError::NoValue { kind, field });
             }
-            if *domain == Domain::Robot && values == [EVERY_ROBOT] {
-                fields.insert(field, FieldValues(Vec::new()));
-                continue;
-            }
             if let Some(value) = values.iter().find(|value| !domain.has(value)) {
                 return Err(PatternError::UnknownValue {
                     kind,
@@ -227,7 +249,8 @@ impl TryFrom<BTreeMap<String, Value>> for Pattern {
                     known: domain.known(),
                 });
             }
-            fields.insert(field, FieldValues(values));
+            let are_names = matches!(domain, Domain::Robot | Domain::Site);
+            fields.insert(field, FieldValues { values, are_names });
         }
         Ok(Self { kind, fields })
     }
@@ -248,9 +271,8 @@ impl From<Pattern> for Value {
     fn from(pattern: Pattern) -> Self {
         let mut table = serde_json::Map::new();
         table.insert("event".to_owned(), Self::String(pattern.kind));
-        for (field, FieldValues(mut values)) in pattern.fields {
+        for (field, FieldValues { mut values, .. }) in pattern.fields {
             let value = match values.len() {
-                0 => EVERY_ROBOT.into(),
                 1 => values.remove(0),
                 _ => Self::Array(values),
             };
@@ -306,7 +328,7 @@ impl Pattern {
 
         let texts = |field: &str| {
             let wanted = self.fields.get(field).into_iter();
-            wanted.flat_map(|wanted| wanted.0.iter().filter_map(Value::as_str).map(str::to_owned))
+            wanted.flat_map(|wanted| wanted.texts().map(str::to_owned))
         };
         let mut named = Vec::new();
         for field in fields {
@@ -326,23 +348,58 @@ impl Pattern {
         let is_about_them = self.kind == "judged";
         let wanted = self.fields.get("expectation");
         let wanted = wanted.filter(|_| is_about_them).into_iter();
-        wanted.flat_map(|wanted| wanted.0.iter().filter_map(Value::as_str))
+        wanted.flat_map(FieldValues::texts)
     }
 
-    /// The robots that the pattern names. An event of a run can match only if its roster has them.
+    /// The robots that the pattern names, or patterns of them. An event of a run can match only if its roster has them.
     pub fn robots(&self) -> impl Iterator<Item = &str> {
+        self.names(Domain::Robot)
+    }
+
+    /// Checks that a run has the sites that it names. What was refused because there is no such site can have any name.
+    ///
+    /// # Errors
+    /// [`PatternError::UnknownSite`].
+    pub fn check_sites(&self, setting: &RunSetting) -> Result<(), PatternError> {
+        if self.kind == REFUSED {
+            return Ok(());
+        }
+        for name in self.names(Domain::Site) {
+            if !setting.has_site(name) {
+                return Err(PatternError::UnknownSite {
+                    name: name.to_owned(),
+                    known: setting.sites_in_words(),
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// The values of fields with names of this kind, but for those that stand for all.
+    fn names(&self, domain: Domain) -> impl Iterator<Item = &str> {
         let domains = &KINDS[&self.kind];
-        let of_robots = self
+        let named = self
             .fields
             .iter()
-            .filter(|(field, _)| domains[*field] == Domain::Robot);
-        of_robots.flat_map(|(_, wanted)| wanted.0.iter().filter_map(Value::as_str))
+            .filter(move |(field, _)| domains[*field] == domain);
+        named.flat_map(|(_, wanted)| wanted.texts())
     }
 }
 
 impl FieldValues {
     fn has(&self, value: &Value) -> bool {
-        self.0.is_empty() || self.0.iter().any(|wanted| equal(wanted, value))
+        if self.are_names {
+            let name = value.as_str().unwrap_or_default();
+            let mut patterns = self.values.iter().filter_map(Value::as_str);
+            return patterns.any(|pattern| matches(pattern, name));
+        }
+        self.values.iter().any(|wanted| equal(wanted, value))
+    }
+
+    /// Its texts, but for the one that stands for all names.
+    fn texts(&self) -> impl Iterator<Item = &str> {
+        let texts = self.values.iter().filter_map(Value::as_str);
+        texts.filter(|text| !(self.are_names && *text == EVERY_NAME))
     }
 }
 
@@ -358,9 +415,9 @@ impl std::fmt::Display for Pattern {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(&self.kind)?;
         for (place, (field, wanted)) in self.fields.iter().enumerate() {
-            let mut values: Vec<String> = wanted.0.iter().map(plain).collect();
-            if values.is_empty() {
-                values.push("of every name".to_owned());
+            let mut values: Vec<String> = wanted.values.iter().map(plain).collect();
+            if wanted.are_names && wanted.texts().next().is_none() {
+                values = vec!["of every name".to_owned()];
             }
             let comma = if place > 0 { ", " } else { " with " };
             write!(f, "{comma}{field} {}", values.join(" or "))?;
@@ -378,6 +435,8 @@ fn plain(value: &Value) -> String {
 
 #[cfg(test)]
 mod tests {
+    use protocol::RobotName;
+
     use super::*;
 
     fn pattern(text: &str) -> Result<Pattern, String> {

@@ -699,6 +699,7 @@ mod tests {
             body_m: 0.5,
             radio_range_m: None,
             roster: roster.to_vec(),
+            sites: BTreeMap::new(),
         }
     }
 
@@ -771,6 +772,7 @@ mod tests {
                     behavior_state: "",
                 })
             },
+            site: &|_| None,
         });
     }
 

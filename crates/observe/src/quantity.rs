@@ -1,4 +1,4 @@
-//! Numbers of robots, teams and places, one in each tick: a condition compares it, and a measure takes it over a run.
+//! Numbers of robots, teams, places and sites, one in each tick: a condition compares it, and a measure takes it over a run.
 //!
 //! [`RunQuantity`] is what there is to look at: what comes with another kind of subject is added there.
 
@@ -6,10 +6,12 @@ use std::fmt;
 
 use config::FixedList;
 use config::units::Length;
-use protocol::messages::{Point, Variable};
-use protocol::{RobotName, RobotPattern};
+use protocol::messages::Point;
+use protocol::pattern::matches;
+use protocol::{Event, RobotName, RobotPattern};
 use serde::{Deserialize, Serialize};
 
+use crate::comparison::{ValueTest, in_words, number_of, type_in_words};
 use crate::places::{CoveredArea, FieldRegion, components, least_distance_m};
 use crate::words::{Word, WordKind};
 use crate::{Observation, RobotState, RunSetting};
@@ -54,6 +56,27 @@ pub enum RunQuantity {
         /// Range, meters; `None` for that of the scenario's radios.
         range_m: Option<f64>,
     },
+    /// A variable of the state of each site, combined to one number.
+    Sites {
+        /// The sites.
+        sites: Team,
+        /// How the numbers are combined; `None` for a single site.
+        by: Option<By>,
+        /// Name of the variable.
+        variable: String,
+        /// If it is given: the number of each is whether it passes. Otherwise it is that of the variable; a flag is 1 or 0.
+        test: Option<ValueTest>,
+    },
+}
+
+/// Whose variable a number is.
+#[derive(Debug, Default)]
+pub(crate) struct WhoseVariable {
+    pub(crate) robot: Option<RobotName>,
+    pub(crate) robots: Option<Team>,
+    pub(crate) site: Option<RobotName>,
+    pub(crate) sites: Option<Team>,
+    pub(crate) by: Option<By>,
 }
 
 /// A number of a robot.
@@ -61,8 +84,8 @@ pub enum RunQuantity {
 pub enum OfRobot {
     /// Whether it is in one of these states.
     State(StateNames),
-    /// A state variable. A flag is 1 or 0. With bounds: whether it is within them.
-    Variable(String, ValueBounds),
+    /// A state variable. A flag is 1 or 0. With a test: whether it passes.
+    Variable(String, Option<ValueTest>),
     /// Distance that it has walked, meters.
     Walked,
     /// Distance to a point or a robot, meters.
@@ -89,11 +112,11 @@ pub enum StateNames {
     Behaviors(Vec<String>),
 }
 
-/// Robots by a name, a pattern of names, or a list of them.
+/// Robots or sites by a name, a pattern of names, or a list of them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(
     untagged,
-    expecting = "a name, a pattern such as \"S*\", or a list of them"
+    expecting = "a name, a pattern such as \"S*\" or \"S{1..9}\", or a list of them"
 )]
 pub enum Team {
     /// Those that match.
@@ -143,15 +166,6 @@ pub enum OfValues {
     Area,
 }
 
-/// The values of a number; all bounds that are given hold.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct ValueBounds {
-    pub(crate) at_least: Option<f64>,
-    pub(crate) at_most: Option<f64>,
-    pub(crate) above: Option<f64>,
-    pub(crate) below: Option<f64>,
-}
-
 /// Why a quantity has no value in a tick.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub(crate) enum Undefined {
@@ -161,9 +175,12 @@ pub(crate) enum Undefined {
     /// A robot does not have the variable, or it is a text.
     #[error("{0} has no number `{1}` among its state variables")]
     NoNumber(RobotName, String),
+    /// A site does not have the variable, or it is of another type.
+    #[error("the site {0} has no such `{1}` in its state")]
+    NoSite(String, String),
     /// A share is negative.
     #[error("the number of {0} is {1}, and shares are 0 or more")]
-    Negative(RobotName, f64),
+    Negative(String, f64),
     /// All shares are 0.
     #[error("there is nothing that could be spread: every robot has 0")]
     NothingToSpread,
@@ -191,7 +208,7 @@ pub enum QuantityError {
     #[error("`{0}` is of `robots`: a pattern such as \"S*\", or a list of names")]
     Several(&'static str),
     /// Too few or too many names and patterns.
-    #[error("a list of robots has 1 to {MAX_PATTERNS} names and patterns")]
+    #[error("a list of robots or sites has 1 to {MAX_PATTERNS} names and patterns")]
     Patterns,
     /// How the numbers of robots become one is missing, or there is one robot only.
     #[error("`by` belongs to `robots`, and `robots` needs it: {0}")]
@@ -199,6 +216,17 @@ pub enum QuantityError {
     /// The numbers cannot be combined in this way.
     #[error("`{0}` of robots is taken by {1}")]
     WrongBy(&'static str, &'static str),
+    /// A number of robots and of sites at once.
+    #[error("a variable is of robots or of sites: leave one of them out")]
+    RobotOrSite,
+    /// One site and several at once.
+    #[error(
+        "`variable` is of `site = NAME`, or of `sites`: a pattern such as \"T*\", or a list of names"
+    )]
+    OneOrMoreSites,
+    /// How the numbers of sites become one is missing, or there is one site only.
+    #[error("`by` belongs to `sites`, and `sites` needs it: {0}")]
+    BySites(&'static str),
     /// A key that belongs to another number.
     #[error("`{0}` has no `{1}`")]
     Foreign(&'static str, &'static str),
@@ -220,6 +248,36 @@ pub enum QuantityError {
     /// The field would have too many cells, or none.
     #[error("{0}")]
     Cells(String),
+    /// A site, or a pattern of sites, that the run does not have.
+    #[error("no site of this scenario is called {name}; {known}")]
+    UnknownSite {
+        /// The name or pattern.
+        name: String,
+        /// The sites that there are, in words.
+        known: String,
+    },
+    /// A site does not have the variable.
+    #[error("the state of the site {site} has no `{variable}`; {known}")]
+    UnknownKey {
+        /// The site.
+        site: String,
+        /// The variable.
+        variable: String,
+        /// The variables that it has, in words.
+        known: String,
+    },
+    /// A variable of a site has another type.
+    #[error("`{variable}` of the site {site} is {has}: {wanted}")]
+    OtherType {
+        /// The site.
+        site: String,
+        /// The variable.
+        variable: String,
+        /// Its type, in words.
+        has: &'static str,
+        /// What it would have to be, or what to do, in words.
+        wanted: &'static str,
+    },
 }
 
 /// What is taken of places.
@@ -431,6 +489,7 @@ impl PlaceTable {
                 table.range = range_m.map(Length);
                 PlaceKind::Components
             }
+            RunQuantity::Sites { .. } => return None,
         };
         Some((kind, table))
     }
@@ -525,6 +584,15 @@ impl Team {
         robots.sort();
         robots
     }
+
+    /// The sites of a run that belong to it, in the order of their names.
+    fn of_sites(&self, setting: &RunSetting) -> Vec<String> {
+        let is_in = |site: &&String| {
+            let mut patterns = self.patterns().iter();
+            patterns.any(|pattern| matches(pattern.as_str(), site))
+        };
+        setting.sites.keys().filter(is_in).cloned().collect()
+    }
 }
 
 impl fmt::Display for Team {
@@ -572,28 +640,6 @@ impl StateNames {
     }
 }
 
-impl ValueBounds {
-    /// Whether no number is within them.
-    pub(crate) fn are_contradictory(&self) -> bool {
-        let above = |low: f64| {
-            self.at_most.is_some_and(|high| high < low)
-                || self.below.is_some_and(|high| high <= low)
-        };
-        let strictly_above = |low: f64| {
-            self.at_most.is_some_and(|high| high <= low)
-                || self.below.is_some_and(|high| high <= low)
-        };
-        self.at_least.is_some_and(above) || self.above.is_some_and(strictly_above)
-    }
-
-    pub(crate) fn hold(&self, value: f64) -> bool {
-        self.at_least.is_none_or(|bound| value >= bound)
-            && self.at_most.is_none_or(|bound| value <= bound)
-            && self.above.is_none_or(|bound| value > bound)
-            && self.below.is_none_or(|bound| value < bound)
-    }
-}
-
 impl RunQuantity {
     /// A number of one robot, or of several combined; `key` names it in errors.
     pub(crate) fn each(
@@ -616,18 +662,82 @@ impl RunQuantity {
         Ok(Self::Each { team, by, of })
     }
 
+    /// A variable of one robot or site, or of several combined. With a test, whether each passes it.
+    pub(crate) fn variable(
+        whose: WhoseVariable,
+        variable: String,
+        test: Option<ValueTest>,
+    ) -> Result<Self, QuantityError> {
+        const KEY: &str = "variable";
+        if whose.site.is_none() && whose.sites.is_none() {
+            let of = OfRobot::Variable(variable, test);
+            return Self::each(KEY, whose.robot, whose.robots, whose.by, of);
+        }
+
+        if whose.robot.is_some() || whose.robots.is_some() {
+            return Err(QuantityError::RobotOrSite);
+        }
+        let (ways, is_way) = ways_of_variables(test.is_some());
+        let sites = match (whose.site, whose.sites, whose.by) {
+            (Some(site), None, None) => Team::one(site),
+            (None, Some(sites), Some(by)) if is_way(by) => sites.check()?,
+            (None, Some(_), Some(_)) => return Err(QuantityError::WrongBy(KEY, ways)),
+            (Some(_), None, Some(_)) | (None, Some(_), None) => {
+                return Err(QuantityError::BySites(ways));
+            }
+            _ => return Err(QuantityError::OneOrMoreSites),
+        };
+        Ok(Self::Sites {
+            sites,
+            by: whose.by,
+            variable,
+            test,
+        })
+    }
+
     /// Whether its only values are 0 and 1, which stand for false and true.
     pub(crate) fn is_truth(&self) -> bool {
         match self {
             Self::Each {
                 by: Some(By::All | By::Any),
                 ..
-            } => true,
-            Self::Each { by: None, of, .. } => {
-                matches!(of, OfRobot::State(_) | OfRobot::Inside(_))
             }
+            | Self::Sites {
+                by: Some(By::All | By::Any),
+                ..
+            }
+            | Self::Sites {
+                by: None,
+                test: Some(_),
+                ..
+            } => true,
+            Self::Each { by: None, of, .. } => matches!(
+                of,
+                OfRobot::State(_) | OfRobot::Inside(_) | OfRobot::Variable(_, Some(_))
+            ),
             _ => false,
         }
+    }
+
+    /// Whether its words say what a variable is compared with, and of one robot or site only.
+    pub(crate) fn is_statement(&self) -> bool {
+        matches!(
+            self,
+            Self::Sites {
+                by: None,
+                test: Some(_),
+                ..
+            } | Self::Each {
+                by: None,
+                of: OfRobot::Variable(_, Some(_)),
+                ..
+            }
+        )
+    }
+
+    /// Whether it is about sites, whose states follow from the events of a run.
+    pub(crate) fn is_of_sites(&self) -> bool {
+        matches!(self, Self::Sites { .. })
     }
 
     /// The robots of a run, in the order of their names. One that is named is there whatever the roster is.
@@ -640,18 +750,25 @@ impl RunQuantity {
         {
             return RobotName::new(name.as_str()).into_iter().collect();
         }
-        self.team().of(&setting.roster)
+        let team = self.team();
+        team.map(|team| team.of(&setting.roster))
+            .unwrap_or_default()
     }
 
-    /// The robots.
-    #[must_use]
-    pub fn team(&self) -> &Team {
+    /// The robots; `None` for a number of sites.
+    fn team(&self) -> Option<&Team> {
         match self {
             Self::Each { team, .. }
             | Self::Between { team, .. }
             | Self::Covered { team, .. }
-            | Self::Components { team, .. } => team,
+            | Self::Components { team, .. } => Some(team),
+            Self::Sites { .. } => None,
         }
+    }
+
+    /// Its names and patterns of robots.
+    pub(crate) fn patterns(&self) -> &[RobotPattern] {
+        self.team().map_or(&[], Team::patterns)
     }
 
     /// The state variables that it needs: patterns of robots, and the name.
@@ -687,7 +804,7 @@ impl RunQuantity {
     /// # Errors
     /// [`QuantityError`].
     pub fn check(&self, setting: &RunSetting) -> Result<(), QuantityError> {
-        for pattern in self.team().patterns() {
+        for pattern in self.patterns() {
             if !setting.roster.iter().any(|robot| pattern.matches(robot)) {
                 return Err(QuantityError::UnknownRobot(pattern.to_string()));
             }
@@ -708,27 +825,86 @@ impl RunQuantity {
             } if !setting.roster.contains(robot) => {
                 Err(QuantityError::UnknownRobot(robot.to_string()))
             }
+            Self::Sites {
+                sites,
+                variable,
+                test,
+                ..
+            } => check_sites(sites, variable, test.as_ref(), setting),
             _ => Ok(()),
         }
     }
 }
 
+/// Checks that a run has sites, and each of them a variable of the type that is wanted: the types of a scenario never change.
+fn check_sites(
+    sites: &Team,
+    variable: &str,
+    test: Option<&ValueTest>,
+    setting: &RunSetting,
+) -> Result<(), QuantityError> {
+    for pattern in sites.patterns() {
+        if !setting.has_site(pattern.as_str()) {
+            return Err(QuantityError::UnknownSite {
+                name: pattern.to_string(),
+                known: setting.sites_in_words(),
+            });
+        }
+    }
+
+    for site in sites.of_sites(setting) {
+        let state = &setting.sites[&site];
+        let Some(value) = state.get(variable) else {
+            return Err(QuantityError::UnknownKey {
+                site,
+                variable: variable.to_owned(),
+                known: in_words("it has", state.iter().map(|(name, _)| name)),
+            });
+        };
+        let wanted = match test {
+            Some(test) => test.mismatch(value),
+            None if number_of(value).is_none() => Some("compare it by `is`, which names a text"),
+            None => None,
+        };
+        if let Some(wanted) = wanted {
+            return Err(QuantityError::OtherType {
+                site,
+                variable: variable.to_owned(),
+                has: type_in_words(value),
+                wanted,
+            });
+        }
+    }
+    Ok(())
+}
+
+/// How truths are combined.
+const TRUTHS: &str = "\"all\", \"any\", \"count\" or \"mean\"";
+
 impl OfRobot {
     /// How it is combined over robots, in words and as a rule.
     fn ways(&self) -> (&'static str, fn(By) -> bool) {
         match self {
-            Self::State(_) | Self::Inside(_) => ("\"all\", \"any\", \"count\" or \"mean\"", |by| {
-                matches!(by, By::All | By::Any | By::Count | By::Mean)
-            }),
+            Self::State(_) | Self::Inside(_) => ways_of_variables(true),
             Self::Walked | Self::DistanceTo(_) => (
                 "\"sum\", \"mean\", \"max\", \"min\", \"spread\" or \"jain\"",
                 |by| !matches!(by, By::All | By::Any | By::Count),
             ),
-            Self::Variable(..) => (
-                "\"sum\", \"mean\", \"max\", \"min\", \"spread\", \"jain\", \"all\", \"any\" or \"count\"",
-                |_| true,
-            ),
+            Self::Variable(_, test) => ways_of_variables(test.is_some()),
         }
+    }
+}
+
+/// How variables are combined, in words and as a rule; `are_tested`: whether each is true or false.
+fn ways_of_variables(are_tested: bool) -> (&'static str, fn(By) -> bool) {
+    match are_tested {
+        true => (TRUTHS, |by| {
+            matches!(by, By::All | By::Any | By::Count | By::Mean)
+        }),
+        false => (
+            "\"sum\", \"mean\", \"max\", \"min\", \"spread\", \"jain\", \"all\", \"any\" or \"count\"",
+            |_| true,
+        ),
     }
 }
 
@@ -743,7 +919,10 @@ impl fmt::Display for RunQuantity {
                     OfRobot::State(StateNames::Behaviors(names)) => {
                         write!(f, "behavior {} of {team}", names.join(" or "))
                     }
-                    OfRobot::Variable(name, _) => write!(f, "`{name}` of {team}"),
+                    OfRobot::Variable(name, None) => write!(f, "`{name}` of {team}"),
+                    OfRobot::Variable(name, Some(test)) => {
+                        write!(f, "`{name}` of {team} {test}")
+                    }
                     OfRobot::Walked => write!(f, "the distance walked by {team}"),
                     OfRobot::DistanceTo(Goal::Point(to)) => {
                         write!(f, "the distance of {team} to {} m, {} m", to.x, to.y)
@@ -765,6 +944,22 @@ impl fmt::Display for RunQuantity {
                 match range_m {
                     Some(range_m) => write!(f, "{range_m} m"),
                     None => f.write_str("the range of radios"),
+                }
+            }
+            Self::Sites {
+                sites,
+                by,
+                variable,
+                test,
+            } => {
+                let noun = if by.is_some() { "sites" } else { "site" };
+                write!(f, "`{variable}` of the {noun} {sites}")?;
+                if let Some(test) = test {
+                    write!(f, " {test}")?;
+                }
+                match by {
+                    Some(by) => write!(f, " ({by})"),
+                    None => Ok(()),
                 }
             }
         }
@@ -797,6 +992,10 @@ pub(crate) struct QuantityGauge {
     coverage: Option<CoveredArea>,
     /// Range of the scenario's radios, meters.
     radio_range_m: Option<f64>,
+    /// The sites, in the order of their names.
+    sites: Vec<String>,
+    /// The number of the sites, until one of them changes.
+    of_sites: Option<f64>,
 }
 
 /// How far a robot has walked.
@@ -815,8 +1014,14 @@ impl QuantityGauge {
             } => Some(CoveredArea::new(setting.field_m, *cell_m, *radius_m)),
             _ => None,
         };
+        let sites = match quantity {
+            RunQuantity::Sites { sites, .. } => sites.of_sites(setting),
+            _ => Vec::new(),
+        };
         Self {
             quantity: quantity.clone(),
+            sites,
+            of_sites: None,
             walked: vec![Walk::default(); robots.len()],
             coverage,
             radio_range_m: setting.radio_range_m,
@@ -868,8 +1073,42 @@ impl QuantityGauge {
                 let range_m = range_m.or(self.radio_range_m).ok_or(Undefined::NoRobot)?;
                 Ok(components(&places(&self.robots, seen)?, range_m) as f64)
             }
+            RunQuantity::Sites {
+                by, variable, test, ..
+            } => {
+                let mut events = seen.events.iter();
+                let has_changed = events.any(|event| matches!(event, Event::SiteChanged { .. }));
+                if let Some(value) = self.of_sites.filter(|_| !has_changed) {
+                    return Ok(value);
+                }
+
+                let mut values = Vec::with_capacity(self.sites.len());
+                for site in &self.sites {
+                    values.push(value_of_site(site, variable, test.as_ref(), seen)?);
+                }
+                let value = match by {
+                    Some(by) => by.combine(&values, &self.sites)?,
+                    None => values.first().copied().ok_or(Undefined::NoRobot)?,
+                };
+                self.of_sites = Some(value);
+                Ok(value)
+            }
         }
     }
+}
+
+fn value_of_site(
+    site: &str,
+    variable: &str,
+    test: Option<&ValueTest>,
+    seen: &Observation<'_>,
+) -> Result<f64, Undefined> {
+    let value = (seen.site)(site).and_then(|state| state.get(variable));
+    let number = value.and_then(|value| match test {
+        Some(test) => test.holds(value).map(truth),
+        None => number_of(value),
+    });
+    number.ok_or_else(|| Undefined::NoSite(site.to_owned(), variable.to_owned()))
 }
 
 fn places(robots: &[RobotName], seen: &Observation<'_>) -> Result<Vec<Point>, Undefined> {
@@ -918,15 +1157,13 @@ impl OfRobot {
             }
             return Ok(walk.walked_m);
         }
-        if let (Self::Variable(name, bounds), Some(state)) = (self, state) {
-            let value = number(state, name)
-                .ok_or_else(|| Undefined::NoNumber(robot.clone(), name.clone()))?;
-            let is_compared = *bounds != ValueBounds::default();
-            return Ok(if is_compared {
-                truth(bounds.hold(value))
-            } else {
-                value
+        if let (Self::Variable(name, test), Some(state)) = (self, state) {
+            let value = state.state_variables.get(name);
+            let value = value.and_then(|value| match test {
+                Some(test) => test.holds(value).map(truth),
+                None => number_of(value),
             });
+            return value.ok_or_else(|| Undefined::NoNumber(robot.clone(), name.clone()));
         }
 
         let state = state.ok_or_else(|| match self {
@@ -952,16 +1189,16 @@ fn truth(holds: bool) -> f64 {
 
 /// A state variable as a number; a flag is 1 or 0.
 pub(crate) fn number(state: RobotState<'_>, variable: &str) -> Option<f64> {
-    match state.state_variables.get(variable)? {
-        Variable::Number(number) => Some(*number),
-        Variable::Flag(flag) => Some(f64::from(*flag)),
-        Variable::Text(_) => None,
-    }
+    number_of(state.state_variables.get(variable)?)
 }
 
 impl By {
-    /// The number of the numbers of robots, which are in the order of their names.
-    pub(crate) fn combine(self, values: &[f64], robots: &[RobotName]) -> Result<f64, Undefined> {
+    /// The number of the numbers of robots or sites, which are in the order of their names.
+    pub(crate) fn combine(
+        self,
+        values: &[f64],
+        names: &[impl fmt::Display],
+    ) -> Result<f64, Undefined> {
         let Some(first) = values.first() else {
             return Err(Undefined::NoRobot);
         };
@@ -979,17 +1216,17 @@ impl By {
             Self::All => truth(count == values.len()),
             Self::Any => truth(count > 0),
             Self::Count => count as f64,
-            Self::Jain => return jain(values, robots),
+            Self::Jain => return jain(values, names),
         })
     }
 }
 
-fn jain(values: &[f64], robots: &[RobotName]) -> Result<f64, Undefined> {
+fn jain(values: &[f64], names: &[impl fmt::Display]) -> Result<f64, Undefined> {
     let mut sum = 0.0;
     let mut squares = 0.0;
-    for (value, robot) in values.iter().zip(robots) {
+    for (value, name) in values.iter().zip(names) {
         if *value < 0.0 {
-            return Err(Undefined::Negative(robot.clone(), *value));
+            return Err(Undefined::Negative(name.to_string(), *value));
         }
         sum += value;
         squares += value * value;

@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use protocol::pattern::overlap;
+use protocol::pattern::matches;
 use protocol::{Event, RobotName};
 use serde::{Deserialize, Serialize};
 
@@ -123,7 +123,7 @@ impl Words {
         let mut all = BTreeSet::new();
         for ((kind, robot), heard) in &self.heard {
             let may_say = word.robots.is_empty()
-                || word.robots.iter().any(|one| overlap(one, robot.as_str()));
+                || word.robots.iter().any(|one| matches(one, robot.as_str()));
             if *kind == word.kind && may_say {
                 all.extend(heard.iter().map(String::as_str));
             }
@@ -222,6 +222,7 @@ mod tests {
             tick_s: 0.5,
             events: &events,
             state: &|_| None,
+            site: &|_| None,
         });
 
         let unheard = words.unheard().into_iter();

@@ -48,6 +48,7 @@ fn setting() -> RunSetting {
         body_m: BODY_M,
         radio_range_m: None,
         roster: roster(),
+        sites: BTreeMap::new(),
     }
 }
 
@@ -100,6 +101,7 @@ impl Run {
                     behavior_state: &stated.behavior,
                 })
             },
+            site: &|_| None,
         });
         self.tick += 1;
         judgment
@@ -495,6 +497,7 @@ fn each_expectation_is_judged_once() {
             tick_s: TICK_S,
             events: &events,
             state: &|_| None,
+            site: &|_| None,
         }));
     }
     judged.extend(watches.end(End::Finished));

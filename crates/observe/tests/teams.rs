@@ -42,6 +42,7 @@ fn setting(robots: usize) -> RunSetting {
         body_m: 0.5,
         radio_range_m: Some(3.0),
         roster: (0..robots).map(robot).collect(),
+        sites: BTreeMap::new(),
     }
 }
 
@@ -102,6 +103,7 @@ impl Run {
                         behavior_state: report.behavior,
                     })
                 },
+                site: &|_| None,
             });
         }
     }

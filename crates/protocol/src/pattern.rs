@@ -1,6 +1,8 @@
-//! Patterns of robots' names: a name in which each `*` stands for any number of characters, also for none.
+//! Patterns of names of robots and sites: a name in which each `*` stands for any number of characters, also for none, and which
+//! may end with a range of numbers, as in `S{1..20}`.
 
 use std::fmt;
+use std::ops::RangeInclusive;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -9,21 +11,29 @@ use crate::name::{BadName, RobotName};
 
 /// What stands for any number of characters.
 const ANY: char = '*';
+/// How a range of numbers begins.
+const OPEN: char = '{';
+/// Largest number of a range.
+const MAX_NUMBER: usize = 1_000_000;
 
-/// A set of robots: one by its name, or all whose names match, as in `S*`.
+/// A set of robots or sites: one by its name, or all whose names match, as in `S*` and `S{1..20}`.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "String", into = "String")]
 #[schemars(with = "String")]
 pub struct RobotPattern(String);
 
 impl RobotPattern {
-    /// A pattern of the characters that names have, and `*`.
+    /// A pattern of the characters that names have, `*`, and a range of numbers at the end.
     ///
     /// # Errors
     /// [`BadName`] says what is wrong with it.
     pub fn new(text: &str) -> Result<Self, BadName> {
+        let longest = match split_range(text) {
+            Ok(Some((base, numbers))) => format!("{base}{}", numbers.end()),
+            _ => text.to_owned(),
+        };
         // A star stands for characters of names, so a name is left where each is a letter.
-        RobotName::new(&text.replace(ANY, "x"))
+        RobotName::new(&longest.replace(ANY, "x"))
             .map(|_| Self(text.to_owned()))
             .map_err(|error| error.of(text))
     }
@@ -31,13 +41,13 @@ impl RobotPattern {
     /// Whether it is one of the robots.
     #[must_use]
     pub fn matches(&self, robot: &RobotName) -> bool {
-        overlap(&self.0, robot.as_str())
+        matches(&self.0, robot.as_str())
     }
 
     /// Whether it can match several names.
     #[must_use]
     pub fn is_open(&self) -> bool {
-        is_pattern(&self.0)
+        is_pattern(&self.0) || self.0.contains(OPEN)
     }
 
     /// The pattern as text.
@@ -78,6 +88,60 @@ impl fmt::Display for RobotPattern {
 #[must_use]
 pub fn is_pattern(text: &str) -> bool {
     text.contains(ANY)
+}
+
+/// Splits a name such as `S{1..20}` into what comes before the range and its numbers, the last one among them; `None` for a name
+/// without braces.
+///
+/// # Errors
+/// In words, what is wrong with the braces.
+pub fn split_range(name: &str) -> Result<Option<(&str, RangeInclusive<usize>)>, String> {
+    let Some((base, braces)) = name.split_once(OPEN) else {
+        return Ok(None);
+    };
+    let numbers = braces
+        .strip_suffix('}')
+        .and_then(|range| range.split_once(".."));
+    let numbers = numbers.and_then(|(first, last)| {
+        let number = |text: &str| plain_number(text).filter(|number| *number <= MAX_NUMBER);
+        Some(number(first)?..=number(last)?)
+    });
+    let numbers = numbers.ok_or_else(|| {
+        format!(
+            "{name:?} is not a name with a range of numbers at its end, such as \"S{{1..20}}\"; the largest number is {MAX_NUMBER}"
+        )
+    })?;
+    if numbers.is_empty() {
+        let (first, last) = (numbers.start(), numbers.end());
+        return Err(format!(
+            "{name:?}: the range ends with {last}, before {first}"
+        ));
+    }
+    Ok(Some((base, numbers)))
+}
+
+/// A number as names have them: of digits only, without zeros before it.
+fn plain_number(text: &str) -> Option<usize> {
+    let is_plain = text == "0" || !text.starts_with(['0', '+']);
+    text.parse().ok().filter(|_| is_plain)
+}
+
+/// Whether a pattern matches a name. A pattern without stars and range is a name that matches itself alone.
+#[must_use]
+pub fn matches(pattern: &str, name: &str) -> bool {
+    let Ok(Some((base, numbers))) = split_range(pattern) else {
+        return match is_pattern(pattern) {
+            true => overlap(pattern, name),
+            false => pattern == name,
+        };
+    };
+
+    // Where the base ends with a star, the digits before the number may belong to it.
+    let digits = name.bytes().rev().take_while(u8::is_ascii_digit).count();
+    (name.len() - digits..name.len()).any(|from| {
+        let number = plain_number(&name[from..]);
+        number.is_some_and(|number| numbers.contains(&number)) && matches(base, &name[..from])
+    })
 }
 
 /// Whether two patterns match a common text. A text without a star is a pattern that matches itself alone.
@@ -156,6 +220,40 @@ mod tests {
         for bad in ["", "S *", "a/*", "-*", &"x".repeat(65)] {
             let refused = RobotPattern::new(bad).unwrap_err().to_string();
             assert!(refused.contains("is not a usable name"), "{refused}");
+        }
+        for bad in [
+            "S{1}",
+            "S{3..2}",
+            "S{1..2}x",
+            "{",
+            &format!("{}{{1..10}}", "x".repeat(63)),
+        ] {
+            let refused = RobotPattern::new(bad).unwrap_err().to_string();
+            assert!(refused.contains("is not a usable name"), "{refused}");
+        }
+    }
+
+    #[test]
+    fn a_range_matches_its_numbers() {
+        for (pattern, name, is_matched) in [
+            ("S{1..3}", "S1", true),
+            ("S{1..3}", "S3", true),
+            ("S{1..3}", "S4", false),
+            ("S{1..30}", "S12", true),
+            ("S{1..30}", "S012", false),
+            ("S{0..3}", "S0", true),
+            ("S{1..3}", "S", false),
+            ("S{1..3}", "T1", false),
+            ("S{1..3}", "S+1", false),
+            ("*{1..3}", "T2", true),
+            ("*{1..3}", "T22", true),
+            ("S*{12..13}", "S12", true),
+            ("S*{12..13}", "Sx112", true),
+            ("S*{12..13}", "S2", false),
+            ("S{1..1000000}", "S999999999999999999999999", false),
+        ] {
+            assert_eq!(matches(pattern, name), is_matched, "{pattern} and {name}");
+            assert!(RobotPattern::new(pattern).unwrap().is_open());
         }
     }
 }

@@ -14,7 +14,7 @@ use super::guests::GuestRules;
 use super::lateness::Lateness;
 use super::network::Network;
 use super::sensing::Sensing;
-use super::sites::SiteSpec;
+use super::sites::{SiteSpec, start_states};
 
 /// Seed if neither the file nor the command line gives one. It is fixed, so runs are reproducible by default.
 pub const DEFAULT_SEED: u64 = 1;
@@ -187,6 +187,7 @@ impl Scenario {
             body_m: self.body_m,
             radio_range_m: self.network.radio.map(|radio| radio.range_m),
             roster: self.roster(),
+            sites: start_states(&self.sites),
         }
     }
 

@@ -49,6 +49,7 @@ use super::change::Parent;
 use super::checked::{self, DEFAULT_SEED, RecordContents, RobotSpec, to_wire, to_world};
 use super::lateness::Lateness;
 use super::placing::{self, PlacingCause, PlacingError};
+use super::sites::start_states;
 
 /// Most ticks of a scenario.
 const MAX_TICKS: f64 = 1e9;
@@ -245,6 +246,7 @@ impl ScenarioFile {
             body_m: body.0,
             radio_range_m: network.radio.map(|radio| radio.range_m),
             roster: robots.keys().cloned().collect(),
+            sites: start_states(&sites),
         };
         let expectations = expect::check(self.expectations, &setting, source)?;
         let end_when = expect::check_end(self.end_when, &setting, source)?;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use protocol::messages::{Point, Variable};
+use protocol::messages::{Point, StateVariables, Variable};
 use serde::{Deserialize, Serialize};
 use world::Region;
 
@@ -34,6 +34,25 @@ pub struct SiteVariable {
     pub min: Option<f64>,
     /// Greatest value of a number.
     pub max: Option<f64>,
+}
+
+impl SiteSpec {
+    /// Its state at the start.
+    #[must_use]
+    pub fn start(&self) -> StateVariables {
+        let variables = self.state.iter();
+        variables
+            .map(|(key, variable)| (key, variable.start.clone()))
+            .collect()
+    }
+}
+
+/// The states of sites at the start, by name.
+pub(super) fn start_states(sites: &BTreeMap<String, SiteSpec>) -> BTreeMap<String, StateVariables> {
+    let sites = sites.iter();
+    sites
+        .map(|(name, spec)| (name.clone(), spec.start()))
+        .collect()
 }
 
 /// What happens where two robots change the same variable of a site in a tick.

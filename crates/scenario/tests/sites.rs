@@ -188,3 +188,49 @@ fn a_site_that_cannot_be_is_refused_where_it_is_written() {
     let most = BULK.replace("count = 3", &format!("count = {MAX_SITES}"));
     assert_eq!(parse(&most).unwrap().sites.len(), MAX_SITES);
 }
+
+#[test]
+fn conditions_of_sites_are_checked_where_they_are_written() {
+    let state = |condition: &str| format!("end_when = {condition}\n{BULK}");
+    for condition in [
+        "{ sites = \"T*\", by = \"all\", variable = \"done\" }",
+        "{ sites = \"T{1..3}\", by = \"count\", variable = \"stock\", each = { below = 3 }, at_least = 2 }",
+        "{ site = \"T1\", variable = \"label\", is = [\"B\", \"C\"], for = \"2 s\" }",
+    ] {
+        let scenario = parse(&state(condition)).unwrap();
+        let again = parse(&scenario.to_toml().unwrap()).unwrap();
+        assert_eq!(again.end_when, scenario.end_when);
+    }
+
+    for (condition, reason) in [
+        (
+            "{ site = \"T4\", variable = \"done\", is = true }",
+            "no site of this scenario is called T4; it has T1, T2, T3",
+        ),
+        (
+            "{ sites = \"X*\", by = \"any\", variable = \"done\" }",
+            "is called X*",
+        ),
+        (
+            "{ site = \"T1\", variable = \"dome\", is = true }",
+            "no `dome`; it has done, label, stock",
+        ),
+        (
+            "{ site = \"T1\", variable = \"label\", below = 3 }",
+            "is a text: compare it by `is`",
+        ),
+    ] {
+        let error = shown(&parse(&state(condition)).unwrap_err());
+        assert!(error.contains(reason), "{condition}: {error}");
+        assert!(error.contains("hall.toml:1:12"), "{error}");
+        assert!(
+            error.contains(&format!("1 │ end_when = {condition}")),
+            "{error}"
+        );
+
+        let text = format!("{BULK}[[expect]]\nname = \"it\"\nnever = {condition}\n");
+        let error = shown(&parse(&text).unwrap_err());
+        assert!(error.contains(reason), "{condition}: {error}");
+        assert!(error.contains("hall.toml:8:1"), "{error}");
+    }
+}

@@ -457,6 +457,7 @@ impl Simulation {
             tick_s: self.scenario.tick_s,
             events: &self.events,
             state: &|name| self.robot_state(name),
+            site: &|name| self.site_state(name),
         });
         self.watches = watches;
         self.events.extend(judged);
@@ -472,6 +473,7 @@ impl Simulation {
             tick_s: self.scenario.tick_s,
             events: &self.events,
             state: &|name| self.robot_state(name),
+            site: &|name| self.site_state(name),
         });
         self.end_when = Some(end_when);
     }

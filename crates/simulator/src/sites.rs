@@ -48,7 +48,7 @@ impl Sites {
         let sites = scenario.sites.iter().map(|(name, spec)| {
             let site = Site {
                 spec: spec.clone(),
-                state: start(spec),
+                state: spec.start(),
             };
             (name.clone(), site)
         });
@@ -314,11 +314,4 @@ pub(crate) fn most_bytes(site: &SensedSite) -> usize {
         bytes += VARIABLE + key.len() + ESCAPED * text;
     }
     bytes
-}
-
-fn start(spec: &SiteSpec) -> StateVariables {
-    let variables = spec.state.iter();
-    variables
-        .map(|(key, variable)| (key, variable.start.clone()))
-        .collect()
 }

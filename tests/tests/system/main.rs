@@ -53,6 +53,7 @@ mod returns;
 mod scale;
 mod secure;
 mod shell;
+mod sites;
 mod statistics;
 mod stay;
 mod stdio;

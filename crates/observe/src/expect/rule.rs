@@ -337,15 +337,19 @@ impl Expectation {
         for condition in conditions {
             condition.check(setting)?;
         }
-        for name in patterns.into_iter().flat_map(Pattern::robots) {
-            if !condition::is_known(name, &setting.roster) {
+        for pattern in patterns {
+            let mut robots = pattern.robots();
+            if let Some(name) = robots.find(|name| !condition::is_known(name, &setting.roster)) {
                 return Err(ExpectError::UnknownRobot(name.to_owned()));
             }
+            pattern
+                .check_sites(setting)
+                .map_err(condition::TickConditionError::from)?;
         }
         Ok(())
     }
 
-    /// Whether it depends on what robots report and where they are, and not on events alone.
+    /// Whether it depends on what robots report and where they are, and not on events, from which the states of sites follow.
     #[must_use]
     pub fn needs_states(&self) -> bool {
         let (conditions, _) = self.parts();

@@ -2,8 +2,8 @@
 
 use std::ops::RangeInclusive;
 
-use config::bulk::split_range;
 use protocol::RobotName;
+use protocol::pattern::split_range;
 use serde::{Deserialize, Serialize};
 
 /// A name, and where it is the table of several robots, the numbers that follow it in their names.
