@@ -13,6 +13,7 @@ import { renderGuide } from "./guide.js";
 import { Hover } from "./hover.js";
 import { Interventions } from "./interventions.js";
 import { classesIn } from "./known.js";
+import { renderLayers } from "./layers.js";
 import { renderEmotions } from "./legend.js";
 import { LogView } from "./log.js";
 import { Notices } from "./notices.js";
@@ -298,6 +299,11 @@ function drawBar() {
   crosshair.render();
   renderEmotions(box("emotions"), store);
   renderKinds(box("site-kinds"), store.frame?.sites ?? []);
+  renderLayers(box("layers"), store.frame?.layers ?? [], plan.chosenLayer, (name) => {
+    plan.chosenLayer = name;
+    plan.touch();
+    drawBar();
+  });
   document.body.dataset.time = isRecording() ? "recording" : player.isLive ? "live" : "past";
   const isPast = isRecording() || store.replayOf !== null;
   box("tab-setup").hidden = isPast;

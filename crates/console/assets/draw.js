@@ -39,11 +39,12 @@ export function outside({ context, camera, theme }) {
 }
 
 /**
- * The field with lines at whole steps.
+ * The field with lines at whole steps, and what `below` draws below the lines.
  * @param {Pen} pen
  * @param {number} step_m
+ * @param {() => void} below
  */
-export function field({ context, camera, theme }, step_m) {
+export function field({ context, camera, theme }, step_m, below) {
   const [width_m, height_m] = camera.field_m;
   const left = camera.x(0);
   const top = camera.y(height_m);
@@ -51,6 +52,7 @@ export function field({ context, camera, theme }, step_m) {
   const height = height_m * camera.scale;
   context.fillStyle = theme.field;
   context.fillRect(left, top, width, height);
+  below();
 
   if (step_m * camera.scale >= 6) {
     context.beginPath();

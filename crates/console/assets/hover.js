@@ -1,6 +1,7 @@
 // @ts-check
-// The full name and the states of the robot below the pointer, or the site with its state.
+// The full name and the states of the robot below the pointer, the site with its state, or the number of the layer that is shown.
 
+import { layerWords, shownLayer } from "./layers.js";
 import { siteAt, siteWords } from "./sites.js";
 
 /** @typedef {import("./plan.js").Plan} Plan */
@@ -36,7 +37,7 @@ export class Hover {
     if (robot) return [robot.name, robot.emotion_state, robot.behavior_state].filter(Boolean).join(" · ");
 
     const site = siteAt(frame?.sites ?? [], place, plan.camera.scale, frame?.body_m ?? 0);
-    return site ? siteWords(site) : "";
+    return site ? siteWords(site) : layerWords(shownLayer(frame?.layers, plan.chosenLayer), place);
   }
 
   leave() {

@@ -14,7 +14,7 @@ const MOST_ROWS = 2000;
 const MOST_ROWS_READING = 4000;
 const NEAR_END_PX = 12;
 /** Every kind; the type check keeps the list complete. @type {Record<import("./types/messages.js").LogKind, true>} */
-const ALL_KINDS = { run: true, membership: true, emotion: true, behavior: true, command: true, network: true, say: true, site: true, verdict: true, late: true };
+const ALL_KINDS = { run: true, membership: true, emotion: true, behavior: true, command: true, network: true, say: true, site: true, layer: true, verdict: true, late: true };
 /** What the medium did to a command: of the kind `command`, and of the network, too. */
 const FATE = /^command \d+ of .+ (was lost on the way|is held back until|comes twice)/;
 /** Where a robot joined. */

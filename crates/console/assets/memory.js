@@ -3,6 +3,7 @@
 // all there is where the console does not have the run's folder.
 
 import { spread } from "./history.js";
+import { cellsIn } from "./layers.js";
 
 /** @typedef {import("./types/messages.js").WorldFrame} WorldFrame */
 /** @typedef {import("./widgets.js").Panel} Panel */
@@ -16,6 +17,8 @@ const MOST_FRAMES = 3000;
 const MOST_BODIES = 500_000;
 /** A robot has as much as this many guests. */
 const ROBOT_WEIGHT = 10;
+/** As many cells of a layer have as much as a guest. */
+const CELLS_PER_GUEST = 16;
 
 export class Memory {
   constructor() {
@@ -92,5 +95,5 @@ export class Memory {
 
 /** @param {Seen} seen */
 function weight({ frame, guests_m }) {
-  return guests_m.length / 2 + ROBOT_WEIGHT * frame.robots.length;
+  return guests_m.length / 2 + ROBOT_WEIGHT * frame.robots.length + cellsIn(frame.layers) / CELLS_PER_GUEST;
 }

@@ -6,6 +6,7 @@ import { Camera } from "./camera.js";
 import * as draw from "./draw.js";
 import { faceShapes } from "./face.js";
 import { intensityOf } from "./known.js";
+import { drawScale, scaleWords, shownLayer } from "./layers.js";
 import { arrow, barrier, cross, disk, envelope, line, ring } from "./shapes.js";
 import { diamond, kindsInLegend } from "./sites.js";
 import { readTheme } from "./theme.js";
@@ -68,7 +69,7 @@ export function picture(plan, panels) {
     y += 28;
   }
 
-  y = legend(side, words, theme, frame, plan.hasTrails, y + 6);
+  y = legend(side, words, theme, frame, plan, y + 6);
   const width = camera.width_px + SIDE_PX;
   const height = Math.max(camera.height_px, y + 6);
   const whole = new Vector();
@@ -194,9 +195,9 @@ function faceStyles({ skin, ink }) {
 
 /**
  * The signs of the plan, drawn by what draws them there.
- * @type {(paper: Vector, words: Words, theme: Theme, frame: WorldFrame | null, hasTrails: boolean, y: number) => number} where it ends
+ * @type {(paper: Vector, words: Words, theme: Theme, frame: WorldFrame | null, plan: import("./plan.js").Plan, y: number) => number} where it ends
  */
-function legend(paper, words, theme, frame, hasTrails, y) {
+function legend(paper, words, theme, frame, { hasTrails, chosenLayer }, y) {
   const { robots = [], guest_moods: moods } = frame ?? {};
   const x = PAD_PX + 12;
   /** @type {(draw: (y: number) => void, label: string) => void} */
@@ -234,6 +235,8 @@ function legend(paper, words, theme, frame, hasTrails, y) {
   for (const { kind, color } of kindsInLegend(frame?.sites ?? [])) {
     row((at) => diamond({ context: paper, theme }, color, false, x, at, 5.5), kind);
   }
+  const layer = shownLayer(frame?.layers, chosenLayer);
+  if (layer) row((at) => drawScale(paper, theme, x - 12, at, 26), scaleWords(layer));
   row((at) => barrier(paper, x - 8, at, 6, 0, theme.warning), "blocked");
   row((at) => envelope(paper, x, at, theme.accent, theme.field), "command under way");
   row((at) => {

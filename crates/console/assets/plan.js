@@ -5,6 +5,7 @@ import { Camera } from "./camera.js";
 import { Crowd } from "./crowd.js";
 import * as draw from "./draw.js";
 import { Gestures } from "./gestures.js";
+import { drawLayer, shownLayer } from "./layers.js";
 import { Motion } from "./motion.js";
 import { drawSites } from "./sites.js";
 import { Ground, Sprites } from "./sprites.js";
@@ -56,6 +57,8 @@ export class Plan {
     this.hasTrails = false;
     /** @type {string | null} */
     this.chosen = null;
+    /** The layer that was chosen in the legend. @type {string | null} */
+    this.chosenLayer = null;
     this.isStale = true;
     /** @type {number[]} */
     this.drawnAt_ms = [];
@@ -152,7 +155,7 @@ export class Plan {
    */
   paintRun(frame, now_ms) {
     this.lastDraw_ms = now_ms;
-    this.paintGround(frame.obstacles, frame.body_m, true);
+    this.paintGround(frame.obstacles, frame.body_m, true, shownLayer(frame.layers, this.chosenLayer));
     this.paintMoving(this.pen, frame, this.drawRobot);
   }
 
@@ -161,12 +164,13 @@ export class Plan {
    * @param {[number, number][]} obstacles
    * @param {number} body_m
    * @param {boolean} hasGuests
+   * @param {import("./types/messages.js").LayerFrame | null} layer
    */
-  paintGround(obstacles, body_m, hasGuests) {
+  paintGround(obstacles, body_m, hasGuests, layer) {
     const { camera, theme } = this.pen;
     const radius = draw.guestRadius(camera, body_m);
     const guests = hasGuests ? draw.guestsAt(camera, this.motion.now_m, radius) : [];
-    this.ground.renew(this.pen, this.canvas, obstacles, body_m, this.step_m(camera));
+    this.ground.renew(this.pen, this.canvas, obstacles, body_m, this.step_m(camera), layer);
     if (this.crowd.takes(guests.length / 2, radius)) {
       this.crowd.draw(this.context, this.ground.pixels(), theme, guests, radius, this.sprites.ratio);
       return;
@@ -247,7 +251,7 @@ export class Plan {
     const body_m = this.motion.to?.body_m ?? 0.6096;
     const obstacles = draft.obstacles.map(({ x, y }) => /** @type {[number, number]} */ ([x, y]));
     // The simulator places the guests: those of a changed set-up have no places yet.
-    this.paintGround(obstacles, body_m, this.editor.isAsApplied && this.motion.to?.tick === 0);
+    this.paintGround(obstacles, body_m, this.editor.isAsApplied && this.motion.to?.tick === 0, null);
 
     for (const [name, place] of Object.entries(draft.robots)) {
       const robot = { name, emotion_state: "", blocked: false, presence: /** @type {const} */ ("here"), direction_rad: 0, speed_mps: 0 };
@@ -296,7 +300,7 @@ export class Plan {
     draw.outside(pen);
     if (!frame) return;
 
-    draw.field(pen, this.step_m(camera));
+    draw.field(pen, this.step_m(camera), () => drawLayer(pen, shownLayer(frame.layers, this.chosenLayer)));
     draw.obstacles(pen, frame.obstacles, frame.body_m);
     const radius = draw.guestRadius(camera, frame.body_m);
     draw.guestCircles(pen, draw.guestsAt(camera, this.motion.now_m, radius), radius);

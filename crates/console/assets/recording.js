@@ -3,6 +3,7 @@
 // the same store as the newest one.
 
 import { Flights } from "./flights.js";
+import { cellsIn } from "./layers.js";
 import { History } from "./history.js";
 import { hasGuessedNames, orderNames } from "./palette.js";
 
@@ -20,11 +21,12 @@ import { hasGuessedNames, orderNames } from "./palette.js";
  * An epoch that is recorded; `ticks` is its last tick so far, `number` tells it from a recording that took its place, and
  * `epochs` are all that have one.
  * @typedef {{run: string, epoch: number, seed: number, tick_s: number, duration_s: number, field_m: [number, number],
- *   body_m: number, display_unit: "m" | "ft", obstacles: [number, number][], ticks: number, is_finished: boolean, number: number, epochs: number[]}} Recorded
+ *   body_m: number, display_unit: "m" | "ft", obstacles: [number, number][], layers: WorldFrame["layers"], ticks: number, is_finished: boolean, number: number, epochs: number[]}} Recorded
  */
 /**
  * @typedef {{tick: number, robots: RobotFrame[], guests_mm: number[], guest_moods: WorldFrame["guest_moods"], cuts: Cut[], faults: HeldProcess[],
- *   awaiting: Awaited[], expectations: Standing[], sites: WorldFrame["sites"]}} RecordedTick
+ *   awaiting: Awaited[], expectations: Standing[], sites: WorldFrame["sites"],
+ *   layers: WorldFrame["layers"]}} RecordedTick
  */
 /** A panel and its tick. @typedef {{tick: number, robot: string, panel: Panel}} RecordedPanel */
 /** Ticks before `end`; `earlier_flights` are of commands that the first ones show, too. @typedef {{end: number, ticks: RecordedTick[], panels: RecordedPanel[], earlier_flights: Flight[], flights: Flight[],
@@ -32,7 +34,7 @@ import { hasGuessedNames, orderNames } from "./palette.js";
 
 /** Ticks in a chunk: few, because a seek waits for a whole one. */
 const CHUNK = 32;
-/** Most numbers of guests' places that are kept; the least recently used chunks are dropped first. */
+/** Most numbers of guests' places and cells of layers that are kept; the least recently used chunks are dropped first. */
 const MOST_NUMBERS = 12_000_000;
 /** Most chunks that are kept. */
 const MOST_CHUNKS = 2000;
@@ -521,6 +523,7 @@ export class Player {
       faults: record.faults,
       expectations: record.expectations,
       sites: record.sites,
+      layers: header.layers?.map((layer) => record.layers?.find((now) => now.name === layer.name) ?? layer),
       robots: record.robots,
     };
   }
@@ -610,7 +613,7 @@ function flightsOf({ earlier_flights, flights }) {
 
 /** @param {Chunk} chunk */
 function numbersIn(chunk) {
-  return chunk.ticks.reduce((sum, tick) => sum + tick.guests_mm.length, 0);
+  return chunk.ticks.reduce((sum, tick) => sum + tick.guests_mm.length + cellsIn(tick.layers), 0);
 }
 
 /** @param {unknown} error */

@@ -3,6 +3,7 @@
 // are copied onto the plan at whole pixels, so that they stay sharp.
 
 import * as draw from "./draw.js";
+import { areSameLayers, drawLayer } from "./layers.js";
 
 /** @typedef {import("./theme.js").Theme} Theme */
 
@@ -11,7 +12,7 @@ const MOST = 1024;
 /** Places in a pixel, each way. */
 const PLACES = 4;
 
-/** What does not move: the field and its obstacles. */
+/** What does not move: the field, a layer and the obstacles. */
 export class Ground {
   constructor() {
     this.canvas = document.createElement("canvas");
@@ -19,6 +20,8 @@ export class Ground {
     this.key = "";
     /** @type {[number, number][]} */
     this.obstacles = [];
+    /** @type {import("./types/messages.js").LayerFrame | null} */
+    this.layer = null;
     /** Its pixels, if they were asked for. @type {ImageData | null} */
     this.read = null;
   }
@@ -30,12 +33,14 @@ export class Ground {
    * @param {[number, number][]} obstacles
    * @param {number} body_m
    * @param {number} step_m between lines
+   * @param {import("./types/messages.js").LayerFrame | null} layer
    */
-  renew({ camera, theme }, plan, obstacles, body_m, step_m) {
+  renew({ camera, theme }, plan, obstacles, body_m, step_m, layer) {
     const { width_px, height_px, field_m, scale, center } = camera;
-    const key = [plan.width, plan.height, width_px, height_px, ...field_m, scale, center.x, center.y, body_m, step_m, theme.field].join();
-    if (key !== this.key || !areSame(obstacles, this.obstacles)) {
+    const key = [plan.width, plan.height, width_px, height_px, ...field_m, scale, center.x, center.y, body_m, step_m, theme.field, theme.layer].join();
+    if (key !== this.key || !areSame(obstacles, this.obstacles) || !areSameLayers(layer, this.layer)) {
       this.key = key;
+      this.layer = layer;
       this.obstacles = obstacles;
       this.read = null;
       this.canvas.width = plan.width;
@@ -43,7 +48,7 @@ export class Ground {
       this.context.setTransform(plan.width / width_px, 0, 0, plan.height / height_px, 0, 0);
       const pen = { context: this.context, camera, theme };
       draw.outside(pen);
-      draw.field(pen, step_m);
+      draw.field(pen, step_m, () => drawLayer(pen, layer));
       draw.obstacles(pen, obstacles, body_m);
     }
   }

@@ -1,7 +1,7 @@
 // @ts-check
 // The colors of the style sheet for canvases, which follow light and dark mode, and for pictures that are saved, which are light.
 
-/** @typedef {Record<"field" | "outside" | "grid" | "edge" | "obstacle" | "obstacleEdge" | "guest" | "guestFill" | "robot" | "robotText"
+/** @typedef {Record<"field" | "outside" | "grid" | "edge" | "obstacle" | "obstacleEdge" | "layer" | "guest" | "guestFill" | "robot" | "robotText"
  *   | "absent" | "absentFill" | "accent" | "warning" | "bad" | "muted" | "text" | "font" | "skin" | "ink", string> & {isOnPaper: boolean}} Theme */
 
 /** Names in the style sheet. @type {[string, string][]} */
@@ -12,6 +12,7 @@ const NAMES = [
   ["edge", "--edge"],
   ["obstacle", "--obstacle"],
   ["obstacleEdge", "--obstacle-edge"],
+  ["layer", "--layer"],
   ["guest", "--guest"],
   ["guestFill", "--guest-fill"],
   ["robot", "--robot"],

@@ -459,6 +459,7 @@ mod tests {
             guest_moods: BTreeMap::new(),
             obstacles: Vec::new(),
             sites: Vec::new(),
+            layers: Vec::new(),
             flights: vec![flight],
             cuts: Vec::new(),
             faults: Vec::new(),

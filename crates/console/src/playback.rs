@@ -112,7 +112,7 @@ pub(crate) struct Wanted {
     /// Number of ticks.
     pub(crate) count: u64,
     /// If set, samples for charts: of the ticks those that this number divides, and those in which a robot changed its state, was
-    /// lost or joined, without guests, panels and commands. The log is complete.
+    /// lost or joined, without guests, layers, panels and commands. The log is complete.
     pub(crate) every: Option<u64>,
 }
 
@@ -228,6 +228,7 @@ impl RecordedEpoch {
             if every.is_some() {
                 recorded.panels.clear();
                 recorded.frame.guests_mm.clear();
+                recorded.frame.layers.clear();
             }
             for (robot, panel) in &recorded.panels {
                 range.add_panel(tick, robot, panel);
@@ -318,6 +319,8 @@ fn add_tick(
         ("cuts", &to_json(&recorded.frame.cuts)),
         ("faults", &to_json(&faults)),
         ("sites", &to_json(&file.header().sites_of(&recorded.frame))),
+        // Of the others, the page has in the header how they are at the start.
+        ("layers", &to_json(&recorded.frame.layers)),
         (
             "expectations",
             &to_json(&recorded.frame.standings(&recorded.events)),

@@ -94,6 +94,12 @@ impl Hosts {
                 to,
                 ..
             } => (robot, format!("sets {key} of site {site} to {to}")),
+            Event::LayerChanged {
+                robot,
+                layer,
+                change,
+                ..
+            } => (robot, format!("adds {change} to layer {layer}")),
             Event::CommandSent {
                 from, to, command, ..
             } => (from, format!("sends {to}: {command}")),
@@ -104,6 +110,7 @@ impl Hosts {
             | Event::Blocked { .. }
             | Event::Guest { .. }
             | Event::SiteRefused { .. }
+            | Event::LayerRefused { .. }
             | Event::CommandDropped { .. }
             | Event::CommandDelayed { .. }
             | Event::CommandDuplicated { .. }

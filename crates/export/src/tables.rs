@@ -25,7 +25,7 @@ const WHEN: &str = "epoch tick time_s";
 /// A row for each event.
 const EVENTS: &str = "event robot generation x_m y_m blocked_by blocked_by_robot state_before state_after from_robot \
                       to_robot seq performative command payload_bytes because until_tick cuts_commands cuts_queries fault begins guest mood \
-                      site key value_before value_after set by_hand expectation verdict text seed version protocol tick_s reason digest";
+                      site key value_before value_after layer cells change set by_hand expectation verdict text seed version protocol tick_s reason digest";
 /// A row for each robot in each tick.
 const STATES: &str = "robot generation x_m y_m speed_mps direction_rad emotion behavior blocked missed commands \
                       proposal_x_m proposal_y_m";
@@ -427,6 +427,26 @@ fn event_cells(event: &Event) -> Vec<Column<'_>> {
         } => vec![
             ("robot", robot.as_str().into()),
             ("site", site.as_str().into()),
+            ("because", because.name().into()),
+        ],
+        Event::LayerChanged {
+            robot,
+            layer,
+            cells,
+            change,
+        } => vec![
+            ("robot", robot.as_str().into()),
+            ("layer", layer.as_str().into()),
+            ("cells", (*cells).into()),
+            ("change", (*change).into()),
+        ],
+        Event::LayerRefused {
+            robot,
+            layer,
+            because,
+        } => vec![
+            ("robot", robot.as_str().into()),
+            ("layer", layer.as_str().into()),
             ("because", because.name().into()),
         ],
         Event::Judged {

@@ -124,6 +124,7 @@ pub(crate) fn action(report: &Report) -> Action {
         behavior_state: report.behavior_state.clone(),
         state_variables: report.state_variables.clone(),
         site_actions: report.site_actions.clone(),
+        layer_actions: report.layer_actions.clone(),
     }
 }
 

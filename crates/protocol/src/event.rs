@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::messages::is_false;
 use crate::messages::{
-    End, Fate, FaultKind, Flight, GuestMood, LogKind, LogRecord, Payload, Performative, Point,
-    Reason, SiteRefusal, Variable, Verdict,
+    End, Fate, FaultKind, Flight, GuestMood, LayerRefusal, LogKind, LogRecord, Payload,
+    Performative, Point, Reason, SiteRefusal, Variable, Verdict,
 };
 use crate::name::RobotName;
 use crate::plain::escape_line;
@@ -237,6 +237,26 @@ pub enum Event {
         /// Why.
         because: SiteRefusal,
     },
+    /// A robot changed cells of a layer.
+    LayerChanged {
+        /// Who.
+        robot: RobotName,
+        /// Name of the layer.
+        layer: String,
+        /// How many cells have another number than before.
+        cells: u32,
+        /// What was added to the sum of the layer.
+        change: f64,
+    },
+    /// A robot's action on a layer was refused.
+    LayerRefused {
+        /// Who.
+        robot: RobotName,
+        /// Name of the layer, as the robot has it.
+        layer: String,
+        /// Why.
+        because: LayerRefusal,
+    },
     /// The simulator refuses what a robot does. It says so once for each reason, and how often at the end of the run.
     Warned {
         /// Who.
@@ -408,6 +428,8 @@ impl Event {
             Self::Guest { .. } => "guest",
             Self::SiteChanged { .. } => "site_changed",
             Self::SiteRefused { .. } => "site_refused",
+            Self::LayerChanged { .. } => "layer_changed",
+            Self::LayerRefused { .. } => "layer_refused",
             Self::Warned { .. } => "warned",
             Self::Judged { .. } => "judged",
             Self::Tick { .. } => "tick",
@@ -606,6 +628,25 @@ impl Event {
                 robot,
                 LogKind::Site,
                 format!("site {site} is not changed: {because}"),
+            ),
+            Self::LayerChanged {
+                robot,
+                layer,
+                cells,
+                change,
+            } => says(
+                robot,
+                LogKind::Layer,
+                format!("layer {layer}: {change:+.3} in {cells} cells"),
+            ),
+            Self::LayerRefused {
+                robot,
+                layer,
+                because,
+            } => says(
+                robot,
+                LogKind::Layer,
+                format!("layer {layer} is not changed: {because}"),
             ),
             Self::Warned { robot, text } => says(robot, LogKind::Say, format!("warning: {text}")),
             Self::Judged {

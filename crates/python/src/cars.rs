@@ -7,8 +7,8 @@ use crate::payload::read_payload;
 use crate::scoped_borrow::with_cars;
 use crate::stream::Stream;
 use crate::values::{
-    command, point, read_point, sensed_body, sensed_robot, sensed_site, site_result, state, tuple,
-    variables,
+    command, layer_result, point, read_point, sensed_body, sensed_layer, sensed_robot, sensed_site,
+    site_result, state, tuple, variables,
 };
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -138,6 +138,26 @@ impl Cars {
     fn site_results<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         let results = with_cars(|cars| cars.site_results().to_vec())?;
         tuple(py, &results, |result| site_result(py, result))
+    }
+
+    /// What it senses now of the layers that have a range, by name.
+    #[getter]
+    fn layers<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        let layers = with_cars(|cars| cars.layers().to_vec())?;
+        tuple(py, &layers, |layer| sensed_layer(py, layer))
+    }
+
+    /// What it senses now of a layer; None if there is no such layer, or none of its cells is in range.
+    fn layer<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let layer = with_cars(|cars| cars.layer(name).cloned())?;
+        layer.map(|layer| sensed_layer(py, &layer)).transpose()
+    }
+
+    /// What became of its actions on layers in the tick before, in their order.
+    #[getter]
+    fn layer_results<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        let results = with_cars(|cars| cars.layer_results().to_vec())?;
+        tuple(py, &results, |result| layer_result(py, result))
     }
 
     /// Its parameters, as an instance of the dataclass ``kind``: numbers in SI units.

@@ -5,8 +5,8 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyBool, PyDict, PyMapping, PyString, PyTuple, PyType};
 use robot::{
-    Action, Point, PublicState, ReceivedCommand, SensedBody, SensedKind, SensedSite, SiteAction,
-    SiteResult, StateVariables, Variable,
+    Action, LayerAction, LayerResult, Point, PublicState, ReceivedCommand, SensedBody, SensedKind,
+    SensedLayer, SensedSite, SiteAction, SiteResult, StateVariables, Variable,
 };
 
 use crate::payload::json_value;
@@ -89,6 +89,33 @@ pub(crate) fn site_result<'py>(
     CLASS
         .import(py, DATA, "SiteResult")?
         .call1((&result.site, refused))
+}
+
+/// What it senses of a layer.
+pub(crate) fn sensed_layer<'py>(
+    py: Python<'py>,
+    layer: &SensedLayer,
+) -> PyResult<Bound<'py, PyAny>> {
+    static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    let rows = tuple(py, &layer.rows, |row| {
+        let values = PyTuple::new(py, &row.values)?;
+        let fields = (row.row, row.column, values);
+        Ok(fields.into_pyobject(py)?.into_any())
+    })?;
+    let fields = (&layer.name, layer.cell_m, rows);
+    CLASS.import(py, DATA, "SensedLayer")?.call1(fields)
+}
+
+/// What became of an action on a layer.
+pub(crate) fn layer_result<'py>(
+    py: Python<'py>,
+    result: &LayerResult,
+) -> PyResult<Bound<'py, PyAny>> {
+    static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    let refused = result.refused.map(robot::LayerRefusal::name);
+    CLASS
+        .import(py, DATA, "LayerResult")?
+        .call1((&result.layer, result.change, refused))
 }
 
 /// What a robot published of itself.
@@ -181,6 +208,7 @@ pub(crate) fn read_action(value: &Bound<'_, PyAny>) -> PyResult<Action> {
         behavior_state: field(value, "behavior_state", "a text")?,
         state_variables: read_variables(&variables)?,
         site_actions: read_site_actions(&value.getattr("site_actions")?)?,
+        layer_actions: read_layer_actions(&value.getattr("layer_actions")?)?,
     })
 }
 
@@ -210,6 +238,30 @@ fn read_site_actions(value: &Bound<'_, PyAny>) -> PyResult<Vec<SiteAction>> {
             add,
             only_if: read("only_if")?,
             site: action.getattr("site")?.extract()?,
+        });
+    }
+    Ok(actions)
+}
+
+/// Actions on layers.
+fn read_layer_actions(value: &Bound<'_, PyAny>) -> PyResult<Vec<LayerAction>> {
+    let mut actions = Vec::new();
+    for action in value.try_iter()? {
+        let action = action?;
+        let field = |name: &str| {
+            action.getattr(name).map_err(|_| {
+                let expected = "a sequence of cars.LayerAction";
+                wrong_field("layer_actions", expected, value)
+            })
+        };
+        let at = field("at")?;
+        actions.push(LayerAction {
+            layer: field("layer")?.extract()?,
+            at: read_point(&at)
+                .map_err(|_| wrong_field("layer_actions", "LayerActions at a cars.Point", &at))?,
+            radius_m: field("radius_m")?.extract()?,
+            set: field("set")?.extract()?,
+            add: field("add")?.extract()?,
         });
     }
     Ok(actions)

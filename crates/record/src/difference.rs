@@ -264,6 +264,8 @@ fn is_environment(event: &Event) -> bool {
             | Event::Guest { .. }
             | Event::SiteChanged { .. }
             | Event::SiteRefused { .. }
+            | Event::LayerChanged { .. }
+            | Event::LayerRefused { .. }
             | Event::Missed { .. }
             | Event::DoneLate { .. }
             | Event::Judged { .. }

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use protocol::messages::{
-    Awaited, Cut, DisplayUnit, GuestMood, LogRecord, Panel, Point, Report, SiteFrame, Standing,
-    StateVariables,
+    Awaited, Cut, DisplayUnit, GuestMood, LayerFrame, LogRecord, Panel, Point, Report, SiteFrame,
+    Standing, StateVariables,
 };
 use protocol::{Epoch, Event, Message, RobotName, RunName, Tick};
 use schemars::JsonSchema;
@@ -43,6 +43,9 @@ pub struct Header {
     /// The sites as they are at the start, by name.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sites: Vec<SiteFrame>,
+    /// The layers as they are at the start, by name.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub layers: Vec<LayerFrame>,
     /// The robots of the scenario, by name.
     pub robots: Vec<RobotName>,
 }
@@ -64,6 +67,19 @@ impl Header {
             }
         }
         sites
+    }
+
+    /// The layers after a tick, by name.
+    #[must_use]
+    pub fn layers_of(&self, frame: &Frame) -> Vec<LayerFrame> {
+        let mut layers = self.layers.clone();
+        for layer in &mut layers {
+            let mut changed = frame.layers.iter();
+            if let Some(now) = changed.find(|now| now.name == layer.name) {
+                layer.clone_from(now);
+            }
+        }
+        layers
     }
 
     /// What every reader of the format shows of the file.
@@ -270,6 +286,9 @@ pub struct Frame {
     /// The states of sites that are others than at the start, by name of the site.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub sites: BTreeMap<String, StateVariables>,
+    /// The layers that are others than at the start, whole, by name.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub layers: Vec<LayerFrame>,
     /// Pairs of robots between which the medium lets nothing through.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub cuts: Vec<Cut>,

@@ -40,6 +40,7 @@ fn header() -> Header {
         body_m: 0.5,
         display_unit: DisplayUnit::Feet,
         sites: Vec::new(),
+        layers: Vec::new(),
         obstacles: vec![[1.0, 2.0]],
         robots: vec![name("Butler"), name("Leguin")],
     }
@@ -66,6 +67,7 @@ fn report(tick: Tick) -> Report {
         commands: (tick % 3) as u32,
         log: vec![format!("line {tick}")],
         site_actions: Vec::new(),
+        layer_actions: Vec::new(),
     }
 }
 
@@ -109,6 +111,7 @@ fn tick(tick: Tick) -> RecordedTick {
             guest_moods: [(GuestMood::Waiting, vec![3, 7])].into(),
             expectations: Vec::new(),
             sites: BTreeMap::new(),
+            layers: Vec::new(),
             cuts: vec![Cut {
                 from: name("Butler"),
                 to: name("Leguin"),

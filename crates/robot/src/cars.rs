@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use lockstep::Sent;
 use protocol::messages::{
-    CommandText, MAX_ENTRIES, MAX_TEXT_BYTES, Payload, Performative, Point, PublicState,
-    SensedBody, SensedRobot, SensedSite, SiteResult, StateVariables, Target, TickUpdate, Welcome,
+    CommandText, LayerResult, MAX_ENTRIES, MAX_TEXT_BYTES, Payload, Performative, Point,
+    PublicState, SensedBody, SensedLayer, SensedRobot, SensedSite, SiteResult, StateVariables,
+    Target, TickUpdate, Welcome,
 };
 use protocol::plain::cut;
 use protocol::random::Stream;
@@ -219,6 +220,24 @@ impl<'a> Cars<'a> {
     #[must_use]
     pub fn site_results(&self) -> &'a [SiteResult] {
         &self.news.site_results
+    }
+
+    /// What it senses now of the layers that have a range, by name.
+    #[must_use]
+    pub fn layers(&self) -> &'a [SensedLayer] {
+        &self.news.layers
+    }
+
+    /// What it senses now of a layer; `None` if there is no such layer, or none of its cells is in range.
+    #[must_use]
+    pub fn layer(&self, name: &str) -> Option<&'a SensedLayer> {
+        self.news.layers.iter().find(|layer| layer.name == name)
+    }
+
+    /// What became of its actions on layers in the tick before, in their order.
+    #[must_use]
+    pub fn layer_results(&self) -> &'a [LayerResult] {
+        &self.news.layer_results
     }
 
     /// Writes a line to the log of the run. Long lines are truncated, and lines beyond the limit of a tick are dropped; the log

@@ -1,6 +1,6 @@
 //! What a robot implements: one method from what it perceives to what it does.
 
-use protocol::messages::{Panel, Point, SiteAction, StateVariables, Variable};
+use protocol::messages::{LayerAction, Panel, Point, SiteAction, StateVariables, Variable};
 
 use crate::cars::Cars;
 use crate::error::{BadParameters, ParametersCheck};
@@ -81,6 +81,8 @@ pub struct Action {
     pub state_variables: StateVariables,
     /// What it does to sites, in this order. What became of it is in [`Cars::site_results`] in the next tick.
     pub site_actions: Vec<SiteAction>,
+    /// What it does to layers, in this order. What became of it is in [`Cars::layer_results`] in the next tick.
+    pub layer_actions: Vec<LayerAction>,
 }
 
 impl Action {
@@ -141,6 +143,13 @@ impl Action {
     #[must_use]
     pub fn on_site(mut self, action: SiteAction) -> Self {
         self.site_actions.push(action);
+        self
+    }
+
+    /// Does this to a layer.
+    #[must_use]
+    pub fn on_layer(mut self, action: LayerAction) -> Self {
+        self.layer_actions.push(action);
         self
     }
 

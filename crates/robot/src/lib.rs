@@ -55,8 +55,9 @@ pub use host::{Host, HostError, HostOptions, Stopper};
 pub use local::LocalHost;
 pub use network::{PeerNetwork, Undelivered};
 pub use protocol::messages::{
-    Clock, Command, CommandText, Correction, End, Face, KnownSite, Panel, Parameters, Payload,
-    Point, PublicState, Rays, Report, SensedBody, SensedKind, SensedRobot, SensedSite, SiteAction,
+    Clock, Command, CommandText, Correction, End, Face, KnownSite, LayerAction, LayerRefusal,
+    LayerResult, Panel, Parameters, Payload, Point, PublicState, Rays, Report, SensedBody,
+    SensedCell, SensedKind, SensedLayer, SensedRobot, SensedRow, SensedSite, SiteAction,
     SiteRefusal, SiteResult, StateVariables, TickUpdate, Tone, Variable, Welcome, Widget,
 };
 pub use protocol::random::Stream;

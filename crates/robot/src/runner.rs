@@ -276,6 +276,7 @@ impl Runner {
             commands: u32::try_from(commands.len()).unwrap_or(u32::MAX),
             log,
             site_actions: action.site_actions,
+            layer_actions: action.layer_actions,
         };
 
         // The simulator would refuse a message beyond the limits, and wait for another one.
@@ -328,6 +329,10 @@ fn is_small(report: &Report) -> bool {
             texts += name.len() + value.as_str().map_or(0, str::len);
         }
         texts += action.add.keys().map(String::len).sum::<usize>();
+    }
+    for action in &report.layer_actions {
+        texts += action.layer.len();
+        entries += 1;
     }
 
     texts * MAX_ESCAPED + entries * MAX_ENTRY + MAX_REST <= MAX_MESSAGE_BYTES

@@ -12,6 +12,7 @@ use super::change::{Change, Parent};
 use super::fault::Fault;
 use super::guests::GuestRules;
 use super::lateness::Lateness;
+use super::layers::LayerSpec;
 use super::network::Network;
 use super::sensing::Sensing;
 use super::sites::{SiteSpec, start_states};
@@ -63,6 +64,8 @@ pub struct Scenario {
     pub walls: Vec<Wall>,
     /// The sites by name.
     pub sites: BTreeMap<String, SiteSpec>,
+    /// The layers by name.
+    pub layers: BTreeMap<String, LayerSpec>,
     /// The robots by name.
     pub robots: BTreeMap<RobotName, RobotSpec>,
     /// Rules for late robots.

@@ -8,6 +8,7 @@ pub mod files;
 mod floor_plan;
 pub mod guests;
 mod lateness;
+mod layers;
 pub mod network;
 mod over_time;
 mod placing;
@@ -35,6 +36,7 @@ pub use checked::{to_wire, to_world};
 pub use fault::{Fault, FaultEnd};
 pub use guests::GuestRules;
 pub use lateness::Lateness;
+pub use layers::{LayerSpec, Peak};
 pub use network::Network;
 pub use sensing::Sensing;
 pub use sites::{OnConflict, SiteSpec, SiteVariable};
@@ -128,6 +130,7 @@ impl Scenario {
         let placed = placing::place_at_random(&mut self);
         placed.map_err(|error| FileError::new(format!("with the seed {seed}, {error}")))?;
         placing::place_sites_at_random(&mut self)
+            .and_then(|()| placing::place_peaks_at_random(&mut self))
             .map_err(|(_, error)| FileError::new(format!("with the seed {seed}, {error}")))?;
         Ok(self)
     }

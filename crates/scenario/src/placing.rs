@@ -2,6 +2,7 @@
 //! here name them.
 
 use protocol::RobotName;
+use protocol::messages::Point;
 use world::{Footprint, HallError, Placer, Region, World};
 
 use super::checked::{Obstacle, Scenario, to_wire};
@@ -113,32 +114,73 @@ pub(super) fn place_at_random(scenario: &mut Scenario) -> Result<(), PlacingErro
 /// # Errors
 /// The name of a site that has no place, and why.
 pub(super) fn place_sites_at_random(scenario: &mut Scenario) -> Result<(), (String, String)> {
-    let is_any_random = scenario.sites.values().any(|site| site.drawn.is_some());
-    if !is_any_random {
-        return Ok(());
+    let mut drawn = Vec::new();
+    for (name, site) in &scenario.sites {
+        drawn.extend(site.drawn.map(|region| (name.clone(), region)));
+    }
+
+    let places = free_places(scenario, drawn, "site")?;
+    for (name, at) in places {
+        if let Some(site) = scenario.sites.get_mut(&name) {
+            site.at = at;
+        }
+    }
+    Ok(())
+}
+
+/// Places the peaks of layers whose places are random, as sites: those of a layer are called as it and a number from 1, `dust/1`.
+///
+/// # Errors
+/// The name of a layer with a peak that has no place, and why.
+pub(super) fn place_peaks_at_random(scenario: &mut Scenario) -> Result<(), (String, String)> {
+    let layers: Vec<String> = scenario.layers.keys().cloned().collect();
+    for layer in layers {
+        let mut drawn = Vec::new();
+        for (index, peak) in scenario.layers[&layer].peaks.iter().enumerate() {
+            let name = format!("{layer}/{}", index + 1);
+            drawn.extend(peak.drawn.map(|region| (name, region)));
+        }
+
+        let places = free_places(scenario, drawn, "peak");
+        let places = places.map_err(|(_, reason)| (layer.clone(), reason))?;
+        let spec = scenario.layers.get_mut(&layer);
+        let peaks = spec.into_iter().flat_map(|spec| &mut spec.peaks);
+        let drawn = peaks.filter(|peak| peak.drawn.is_some());
+        for (peak, (_, at)) in drawn.zip(places) {
+            peak.at = at;
+        }
+    }
+    Ok(())
+}
+
+/// Places where a body is inside the field and on no obstacle, by name, in regions, each by the stream of its name.
+fn free_places(
+    scenario: &Scenario,
+    drawn: Vec<(String, Region)>,
+    what: &str,
+) -> Result<Vec<(String, Point)>, (String, String)> {
+    if drawn.is_empty() {
+        return Ok(Vec::new());
     }
 
     let mut hall = scenario.hall();
     hall.robots.clear();
     let placer = Placer::new(&hall);
-    let seed = scenario.seed;
-    for (name, site) in &mut scenario.sites {
-        let Some(region) = site.drawn else {
-            continue;
-        };
+    let mut places = Vec::new();
+    for (name, region) in drawn {
         let refuse = |reason: String| (name.clone(), reason);
         // What is placed in a copy leaves no trace.
         let mut placer = placer.clone().map_err(|error| refuse(error.to_string()))?;
-        let mut stream = protocol::random::stream(seed, &format!("at/{name}"));
+        let mut stream = protocol::random::stream(scenario.seed, &format!("at/{name}"));
         let at = placer.place(None, region, &mut stream).ok_or_else(|| {
             refuse(format!(
-                "there is no free place for site {name} in {} draws: the field is too full",
+                "there is no free place for {what} {name} in {} draws: the field is too full",
                 Placer::TRIES
             ))
         })?;
-        site.at = to_wire(at);
+        places.push((name, to_wire(at)));
     }
-    Ok(())
+    Ok(places)
 }
 
 impl PlacingError {

@@ -5,6 +5,7 @@ pub(super) mod change;
 mod expect;
 pub(super) mod fault;
 mod guests;
+mod layer;
 pub(super) mod mood;
 mod network;
 mod numbers;
@@ -34,6 +35,7 @@ use bulk_name::BulkName;
 use change::{ChangeTable, ParentTable};
 use fault::FaultTable;
 use guests::GuestsTable;
+use layer::LayerTable;
 use network::NetworkTable;
 use numbers::positive;
 use place::StartPlace;
@@ -93,6 +95,8 @@ pub(super) struct ScenarioFile {
     obstacles: Vec<ObstacleTable>,
     #[serde(default, rename = "site", skip_serializing_if = "Vec::is_empty")]
     sites: Vec<Spanned<SiteTable>>,
+    #[serde(default, rename = "layer", skip_serializing_if = "Vec::is_empty")]
+    layers: Vec<Spanned<LayerTable>>,
     #[serde(default, rename = "wall", skip_serializing_if = "Vec::is_empty")]
     walls: Vec<WallTable>,
     floor_plan: Option<Spanned<FloorPlanTable>>,
@@ -163,6 +167,9 @@ impl ScenarioFile {
         }
         for site in &mut self.sites {
             site.as_mut().forget_place();
+        }
+        for layer in &mut self.layers {
+            layer.as_mut().forget_places();
         }
         for obstacle in &mut self.obstacles {
             obstacle.forget();
@@ -236,6 +243,14 @@ impl ScenarioFile {
             &robots.keys().cloned().collect(),
             source,
         )?;
+        let (layers, layer_spans) = layer::check(
+            &self.layers,
+            layer::Setting {
+                field_m: size.0.map(|length| length.0),
+                tick_s,
+                source,
+            },
+        )?;
         let record = record(self.record, source)?;
         let network = network::check(self.network, &robots, tick_s, source)?;
         let faults = fault::check(self.faults, &robots, &lateness, tick_s, settled, source)?;
@@ -268,6 +283,7 @@ impl ScenarioFile {
                 .collect(),
             walls: fixed.walls.into_iter().map(|(wall, _)| wall).collect(),
             sites,
+            layers,
             lateness,
             robots,
             network,
@@ -286,6 +302,9 @@ impl ScenarioFile {
         placing::place_at_random(&mut scenario).map_err(refuse)?;
         placing::place_sites_at_random(&mut scenario).map_err(|(site, reason)| {
             FileError::at(source, site_spans.get(&site).cloned(), &reason)
+        })?;
+        placing::place_peaks_at_random(&mut scenario).map_err(|(layer, reason)| {
+            FileError::at(source, layer_spans.get(&layer).cloned(), &reason)
         })?;
         if settled == 0 {
             placing::check(&scenario).map_err(refuse)?;
@@ -585,6 +604,8 @@ impl From<&checked::Scenario> for ScenarioFile {
         let obstacles = scenario.obstacles.iter().map(ObstacleTable::of);
         let sites = scenario.sites.iter();
         let sites = sites.filter_map(|(name, spec)| SiteTable::of(name, spec));
+        let layers = scenario.layers.iter();
+        let layers = layers.map(|(name, spec)| unplaced(LayerTable::of(name, spec)));
         let robots = scenario.robots.iter();
         let robots = robots.map(|(name, spec)| unplaced(RawRobot::of(name, spec, lateness)));
 
@@ -611,6 +632,7 @@ impl From<&checked::Scenario> for ScenarioFile {
             parent: scenario.parent.as_ref().map(ParentTable::from),
             obstacles: obstacles.collect(),
             sites: sites.map(unplaced).collect(),
+            layers: layers.collect(),
             walls: WallTable::of_all(&scenario.walls),
             // The record has what is on it, and does not need the drawing.
             floor_plan: None,

@@ -124,6 +124,41 @@ impl TickDigest {
         }
     }
 
+    /// Adds what became of a robot's actions on layers.
+    pub fn layer_actions(&mut self, events: &[Event]) {
+        for event in events {
+            match event {
+                Event::LayerChanged {
+                    robot,
+                    layer,
+                    cells,
+                    change,
+                } => {
+                    self.text(robot.as_str());
+                    self.text(layer);
+                    self.integer(u64::from(*cells));
+                    self.number(*change);
+                }
+                Event::LayerRefused {
+                    robot,
+                    layer,
+                    because,
+                } => {
+                    self.text(robot.as_str());
+                    self.text(layer);
+                    self.text(because.name());
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// Adds the numbers of a layer, by their digest.
+    pub fn layer(&mut self, name: &str, cells: u128) {
+        self.text(name);
+        self.bytes.extend_from_slice(&cells.to_le_bytes());
+    }
+
     /// Adds the report of a robot and the commands that it sent; only its name if it did not report.
     pub fn report(&mut self, robot: &RobotName, report: Option<(&Report, &[SentCommand])>) {
         self.text(robot.as_str());

@@ -245,6 +245,7 @@ mod tests {
             commands: 0,
             log: log.iter().map(|line| (*line).to_owned()).collect(),
             site_actions: Vec::new(),
+            layer_actions: Vec::new(),
         }
     }
 

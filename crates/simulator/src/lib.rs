@@ -7,6 +7,7 @@
 
 pub mod digest;
 mod guests;
+pub mod layers;
 pub mod medium;
 pub mod recorder;
 mod sensing;

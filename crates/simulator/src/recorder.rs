@@ -570,6 +570,7 @@ pub fn header(run: &RunName, simulation: &Simulation) -> Header {
             .map(|obstacle| [obstacle.at.x, obstacle.at.y])
             .collect(),
         sites: crate::sites::Sites::new(scenario).frames(),
+        layers: crate::layers::Layers::new(scenario).frames(),
         robots: simulation.names().to_vec(),
     }
 }
@@ -607,6 +608,7 @@ fn set_frame(frame: &mut Frame, simulation: &Simulation, record: &TickRecord) {
     frame.guest_moods = simulation.guest_moods();
     frame.tick = record.tick;
     frame.sites = simulation.sites().changed();
+    frame.layers = simulation.layers().changed();
     frame.cuts = simulation.cuts();
     frame.unreachable.clone_from(simulation.unreachable());
     frame.expectations = simulation.standings();

@@ -21,6 +21,7 @@ use world::{Body, HallError, MoveOutcome, Reaction, World};
 
 use crate::digest::{Digest, TickDigest};
 use crate::guests::GuestState;
+use crate::layers::Layers;
 use crate::medium::{Arrival, Medium, SentCommand};
 use crate::sensing::{Viewpoint, ranges_m};
 use crate::sites::{SiteOrders, Sites, most_bytes};
@@ -43,6 +44,9 @@ pub type Reports = TickOutcome<Arc<Report>, CommandText>;
 
 /// Reports and commands by robot.
 type ReportsByName = BTreeMap<RobotName, (Arc<Report>, Vec<Sent<CommandText>>)>;
+
+/// A robot and its report of a tick.
+type NamedReport = (RobotName, Arc<Report>);
 
 /// A complete tick. Copies share its events.
 #[derive(Debug, Clone)]
@@ -81,6 +85,7 @@ pub struct Simulation {
     world: World<Stream>,
     guests: GuestState,
     sites: Sites,
+    layers: Layers,
     medium: Medium,
     /// Robots with the bodies around them in their news.
     with_bodies: BTreeSet<RobotName>,
@@ -160,6 +165,7 @@ impl Simulation {
             now: 0,
             guests: GuestState::new(scenario.guest_rules.clone(), scenario.guests.count),
             sites: Sites::new(&scenario),
+            layers: Layers::new(&scenario),
             world,
             medium,
             names,
@@ -253,6 +259,7 @@ impl Simulation {
         let reactions = self.reactions();
         let verdicts = self.world.advance_with(&self.proposals(), &reactions);
         self.note_moves(&verdicts);
+        self.layers.pass_tick();
 
         let places = self.world.robots().iter().copied().map(to_wire);
         let decision = self.medium.decide(self.now, places.collect());
@@ -426,7 +433,9 @@ impl Simulation {
             digest.place(body.x, body.y);
         }
         self.note_reports(outcome.reports, &mut digest);
-        self.act_on_sites(&mut digest);
+        let reports = self.reports_of(self.now);
+        self.act_on_sites(&reports, &mut digest);
+        self.act_on_layers(&reports, &mut digest);
         self.note_guests();
 
         self.tick = self.now;
@@ -516,10 +525,9 @@ impl Simulation {
     }
 
     /// Carries out what robots do to sites by their reports of the tick.
-    fn act_on_sites(&mut self, digest: &mut TickDigest) {
-        let reports = self.reports_of(self.now);
+    fn act_on_sites(&mut self, reports: &[NamedReport], digest: &mut TickDigest) {
         let mut orders = Vec::new();
-        for (robot, report) in &reports {
+        for (robot, report) in reports {
             if !report.site_actions.is_empty() {
                 orders.push(SiteOrders {
                     robot,
@@ -532,6 +540,24 @@ impl Simulation {
         let events = self.sites.carry_out(&orders);
         digest.sites(&events);
         self.events.extend(events);
+    }
+
+    /// Carries out what robots do to layers by their reports of the tick.
+    fn act_on_layers(&mut self, reports: &[NamedReport], digest: &mut TickDigest) {
+        self.layers.begin_actions();
+        // They are in the order of names.
+        for (robot, report) in reports {
+            if report.layer_actions.is_empty() {
+                continue;
+            }
+            let at = self.location(robot).unwrap_or_default();
+            let events = self.layers.carry_out(robot, at, &report.layer_actions);
+            digest.layer_actions(&events);
+            self.events.extend(events);
+        }
+        for (name, cells) in self.layers.digests() {
+            digest.layer(name, cells);
+        }
     }
 
     /// A robot has done a tick of which its report does not count, because the clock goes on without it.
@@ -750,6 +776,8 @@ impl Simulation {
                 ranges: self.sensed_ranges(index),
                 sites: self.sensed_sites(index, &viewpoint),
                 site_results: self.sites.results(name).to_vec(),
+                layers: self.layers.near(to_wire(self.world.robots()[index])),
+                layer_results: self.layers.results(name).to_vec(),
             };
             // A robot without news gets none: silence says that all is as it expects.
             if !news.is_empty() {
@@ -1257,6 +1285,12 @@ impl Simulation {
         self.sites.state(name)
     }
 
+    /// The layers.
+    #[must_use]
+    pub fn layers(&self) -> &Layers {
+        &self.layers
+    }
+
     /// Whether a robot's last move was blocked.
     #[must_use]
     pub fn is_blocked(&self, name: &RobotName) -> bool {
@@ -1306,7 +1340,7 @@ impl Simulation {
     }
 
     /// The reports for a tick, of the robots that have not missed it.
-    pub(crate) fn reports_of(&self, tick: Tick) -> Vec<(RobotName, Arc<Report>)> {
+    pub(crate) fn reports_of(&self, tick: Tick) -> Vec<NamedReport> {
         let mut reports = Vec::new();
         for (name, report) in &self.reports {
             if report.tick == tick {

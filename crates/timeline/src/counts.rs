@@ -109,6 +109,8 @@ impl Counts {
             | Event::Guest { .. }
             | Event::SiteChanged { .. }
             | Event::SiteRefused { .. }
+            | Event::LayerChanged { .. }
+            | Event::LayerRefused { .. }
             | Event::Warned { .. }
             | Event::Judged { .. }
             | Event::Tick { .. }

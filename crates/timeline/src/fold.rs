@@ -169,6 +169,8 @@ impl Timeline {
             | Event::Guest { .. }
             | Event::SiteChanged { .. }
             | Event::SiteRefused { .. }
+            | Event::LayerChanged { .. }
+            | Event::LayerRefused { .. }
             | Event::Warned { .. }
             | Event::Judged { .. }
             | Event::Tick { .. }

@@ -266,6 +266,7 @@ fn report_of(clock: Clock) -> Report {
         commands: 0,
         log: Vec::new(),
         site_actions: Vec::new(),
+        layer_actions: Vec::new(),
     }
 }
 

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use protocol::keys::{QUERIES, STATE};
+use system_tests::python::python;
 use system_tests::{Lab, programs, root, subcommands_in};
 
 /// Pages that are not in the book.
@@ -227,6 +228,29 @@ fn the_examples_of_files_are_right() {
         let (status, text) = lab.cars_without_out(&["check", path.to_str().unwrap()]);
         assert_eq!(status, 0, "{text}\n{file}");
     }
+}
+
+/// The page of layers has a scenario, a robot, and what the robot prints.
+#[test]
+fn the_robot_of_the_page_of_layers_cleans() {
+    let page = read(&docs().join("layers.md"));
+    let block = |begin: &str| {
+        let (_, rest) = page.split_once(begin).unwrap();
+        rest.split_once("```").unwrap().0.to_owned()
+    };
+
+    let lab = Lab::new();
+    let scenario = lab.write("dust.toml", &block("```toml\n"));
+    let robot = lab.write("clean.py", &block("```python\n"));
+    let output = python()
+        .arg(robot)
+        .current_dir(scenario.parent().unwrap())
+        .output()
+        .unwrap();
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{error}");
+    let printed = String::from_utf8_lossy(&output.stdout);
+    assert_eq!(printed, block("$ python clean.py\n"), "{error}");
 }
 
 /// Whoever tries the examples in a checkout has not changed it.

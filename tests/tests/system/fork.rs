@@ -5,6 +5,8 @@ use system_tests::{Lab, assert_same, eventually, root};
 
 const HALL: &str = "launch/hors_doeuvres.toml";
 const SCENARIO: &str = "configs/hors_doeuvres.toml";
+const DUST: &str = "layer=[{ name = \"dust\", cell = \"2 ft\", decay = 0.1, diffuse = 0.05, \
+                    peaks = [{ at = \"random\", radius = \"10 ft\", height = 15 }] }]";
 
 /// The lines of a run's events up to and including the end of a tick.
 fn up_to(lab: &Lab, run: &str, tick: u64) -> Vec<u8> {
@@ -27,6 +29,8 @@ fn a_fork_without_changes_is_the_run_also_after_faults_and_commands_by_hand() {
     let mut args = vec!["launch", HALL, "--no-console", "--duration", "60 s"];
     args.extend(["--speed", "max", "--paused", "--set", "on_late=continue"]);
     args.extend(["--set", "network.commands.loss=0.2", "--set", crash]);
+    // A layer that goes on changing by itself.
+    args.extend(["--set", DUST]);
     let mut launch = lab.start("parent", &args);
     lab.until_ready("parent");
     lab.step("parent", 6);

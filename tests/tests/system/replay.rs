@@ -313,6 +313,46 @@ fn the_log_of_a_replay_is_that_of_the_run() {
     assert!(!lab.file(run, "endpoint").exists());
 }
 
+/// The layer loses a quarter in each tick.
+#[test]
+fn a_replay_shows_the_layers_of_each_tick() {
+    const DUST: &str = "layer=[{ name = \"dust\", cell = \"2 ft\", decay = 0.5, value = 1, \
+                        peaks = [{ at = [\"20 ft\", \"30 ft\"], radius = \"10 ft\", height = 15 }] }]";
+    let lab = Lab::new();
+    let run = "replay-layers";
+    lab.ok(&[
+        "run",
+        HALL,
+        "--run",
+        run,
+        "--duration",
+        "10 s",
+        "--quiet",
+        "--set",
+        DUST,
+    ]);
+    let (mut running, endpoint) = replay(&lab, run, &[run, "--paused"]);
+    let observer = Observer::connect(run, &endpoint);
+
+    let mut start = None;
+    for tick in [0, 3, 20, 7, 8, 0, 19] {
+        lab.ctl(run, &["seek", &tick.to_string()]);
+        let frame = observer.frame(tick);
+        let [dust] = &frame.layers[..] else {
+            panic!("{:?}", frame.layers);
+        };
+        assert_eq!((dust.columns, dust.rows), (25, 25));
+        let [min, max] = *start.get_or_insert([dust.min, dust.max]);
+        assert_eq!(min, 1.0);
+        // What was added at the peak is nearly all of 15, and the scale stays.
+        assert!((14.0..=16.0).contains(&max), "{max}");
+        let left = |number: f64| (0..tick).fold(number, |left, _| left * 0.75);
+        assert_eq!([dust.min, dust.max], [min, max].map(left));
+        assert_eq!(dust.scale[1], max);
+    }
+    interrupt(&mut running);
+}
+
 #[test]
 fn a_replay_is_paused_stepped_and_sought_in_both_directions() {
     let lab = Lab::new();

@@ -253,6 +253,7 @@ impl Hand {
             commands: 0,
             log: vec![],
             site_actions: Vec::new(),
+            layer_actions: Vec::new(),
         }
     }
 

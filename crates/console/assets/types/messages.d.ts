@@ -234,7 +234,17 @@ export type Presence = "here" | "gone" | "lost";
  * Kinds of log lines, to filter by.
  */
 export type LogKind =
-  "run" | "membership" | "emotion" | "behavior" | "command" | "network" | "say" | "site" | "verdict" | "late";
+  | "run"
+  | "membership"
+  | "emotion"
+  | "behavior"
+  | "command"
+  | "network"
+  | "say"
+  | "site"
+  | "layer"
+  | "verdict"
+  | "late";
 /**
  * One element of a panel.
  */
@@ -656,6 +666,10 @@ export interface WorldFrame {
    */
   jumps?: number;
   /**
+   * The layers, by name.
+   */
+  layers?: LayerFrame[];
+  /**
    * Centers of the fixed obstacles, meters.
    */
   obstacles: [number, number][];
@@ -748,6 +762,47 @@ export interface Flight {
    */
   tick: number;
   to: RobotName;
+}
+/**
+ * A layer as observers see it: whole, with 256 levels between the least and the greatest number of its cells.
+ */
+export interface LayerFrame {
+  /**
+   * Side of a cell, meters. The first cell is in the lower left corner of the field; the last ones may reach over its edge.
+   */
+  cell_m: number;
+  /**
+   * Number of columns.
+   */
+  columns: number;
+  /**
+   * A byte for each cell, row by row from below, in Base64: its number is about `min + (max - min) * byte / 255`.
+   */
+  levels: string;
+  /**
+   * The greatest number of a cell.
+   */
+  max: number;
+  /**
+   * The least number of a cell.
+   */
+  min: number;
+  /**
+   * Its name.
+   */
+  name: string;
+  /**
+   * Number of rows.
+   */
+  rows: number;
+  /**
+   * The numbers at the ends of a color scale: the bounds of the layer, or where it has none the least and the greatest number of a cell
+   * now and at the start.
+   *
+   * @minItems 2
+   * @maxItems 2
+   */
+  scale: [number, number];
 }
 /**
  * A robot in a [`WorldFrame`].

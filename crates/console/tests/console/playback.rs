@@ -6,7 +6,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use protocol::messages::{
-    Awaited, Cut, DisplayUnit, FaultKind, Panel, Performative, Point, Reason, Report, Widget,
+    Awaited, Cut, DisplayUnit, FaultKind, LayerFrame, Panel, Performative, Point, Reason, Report,
+    Widget,
 };
 use protocol::{Event, RobotName, RunName};
 use recording::content::Missed;
@@ -33,6 +34,7 @@ fn header() -> Header {
         body_m: 0.6096,
         display_unit: DisplayUnit::Feet,
         sites: Vec::new(),
+        layers: Vec::new(),
         obstacles: vec![[1.0, 2.0]],
         robots: vec![robot("Butler")],
     }
@@ -52,6 +54,7 @@ fn report(tick: u64) -> Report {
         commands: 0,
         log: Vec::new(),
         site_actions: Vec::new(),
+        layer_actions: Vec::new(),
     }
 }
 
@@ -138,6 +141,52 @@ fn ticks(list: &Value) -> Vec<u64> {
         .iter()
         .map(|element| element["tick"].as_u64().unwrap())
         .collect()
+}
+
+/// A layer of one cell.
+fn layer(number: f64) -> LayerFrame {
+    LayerFrame {
+        name: "dust".to_owned(),
+        cell_m: 20.0,
+        columns: 1,
+        rows: 1,
+        min: number,
+        max: number,
+        scale: [0.0, 9.0],
+        levels: "AA==".to_owned(),
+    }
+}
+
+#[test]
+fn a_tick_has_the_layers_that_are_not_as_at_the_start() {
+    let folder = tempfile::tempdir().unwrap();
+    let header = Header {
+        layers: vec![layer(9.0)],
+        ..header()
+    };
+    let mut writer = Writer::create(&file(folder.path()), &header, "").unwrap();
+    for tick in 0..6 {
+        let mut recorded = recorded_tick(tick);
+        if tick >= 2 {
+            recorded.frame.layers = vec![layer(9.0 - tick as f64)];
+        }
+        writer.tick(&recorded.view()).unwrap();
+    }
+    writer.finish().unwrap();
+
+    let console = open(folder.path());
+    let start = &console.get("recording").json()["layers"];
+    assert_eq!(start[0]["max"], 9.0);
+    let later = [
+        (3, [json!(6.0), json!(5.0)]),
+        (1, [Value::Null, json!(7.0)]),
+    ];
+    for (from, expected) in later {
+        let range = get_range(&console, from, 2);
+        let ticks = range["ticks"].as_array().unwrap().iter();
+        let shown: Vec<Value> = ticks.map(|tick| tick["layers"][0]["max"].clone()).collect();
+        assert_eq!(shown, expected);
+    }
 }
 
 #[test]

@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 
 use protocol::Message;
 use protocol::messages::{
-    End, KnownSite, MAX_TEXT_BYTES, Panel, Parameters, Payload, Performative, Point, PublicState,
-    Rays, SensedRobot, SensedSite, SiteAction, SiteResult, StateVariables, Variable,
+    End, KnownSite, LayerAction, LayerResult, MAX_TEXT_BYTES, Panel, Parameters, Payload,
+    Performative, Point, PublicState, Rays, SensedLayer, SensedRobot, SensedSite, SiteAction,
+    SiteResult, StateVariables, Variable,
 };
 use protocol::plain::escape_line;
 use protocol::{RobotName, RunName, Tick};
@@ -23,6 +24,7 @@ const DONE_FIELDS: &[&str] = &[
     "behavior_state",
     "state_variables",
     "site_actions",
+    "layer_actions",
 ];
 /// Most unknown fields that are named.
 const MAX_UNKNOWN: usize = 5;
@@ -64,6 +66,8 @@ pub(super) enum ToProgram<'a> {
         sensed: &'a [SensedRobot],
         #[serde(skip_serializing_if = "<[_]>::is_empty")]
         sites: &'a [SensedSite],
+        #[serde(skip_serializing_if = "<[_]>::is_empty")]
+        layers: &'a [SensedLayer],
         #[serde(skip_serializing_if = "Option::is_none")]
         last_state_variables: Option<&'a StateVariables>,
     },
@@ -81,6 +85,10 @@ pub(super) enum ToProgram<'a> {
         sites: &'a [SensedSite],
         #[serde(skip_serializing_if = "<[_]>::is_empty")]
         site_results: &'a [SiteResult],
+        #[serde(skip_serializing_if = "<[_]>::is_empty")]
+        layers: &'a [SensedLayer],
+        #[serde(skip_serializing_if = "<[_]>::is_empty")]
+        layer_results: &'a [LayerResult],
     },
     /// The answer to `query`, `percept`, `ranges` or `random`.
     Answer {
@@ -142,6 +150,7 @@ impl<'a> ToProgram<'a> {
         tick: Tick,
         sensed: &'a [SensedRobot],
         sites: &'a [SensedSite],
+        layers: &'a [SensedLayer],
     ) -> Self {
         Self::Init {
             protocol: welcome.protocol,
@@ -163,6 +172,7 @@ impl<'a> ToProgram<'a> {
             parameters: &welcome.parameters,
             sensed,
             sites,
+            layers,
             last_state_variables: welcome
                 .last_state
                 .as_ref()
@@ -256,6 +266,7 @@ pub(super) struct DoneLine {
     pub(super) behavior_state: String,
     pub(super) state_variables: StateVariables,
     pub(super) site_actions: Vec<SiteAction>,
+    pub(super) layer_actions: Vec<LayerAction>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -269,6 +280,7 @@ struct RawDone {
     behavior_state: String,
     state_variables: BTreeMap<String, Value>,
     site_actions: Vec<SiteAction>,
+    layer_actions: Vec<LayerAction>,
 }
 
 impl ReadLine {
@@ -413,6 +425,7 @@ fn check_done(raw: RawDone) -> Result<DoneLine, String> {
         behavior_state: state.behavior_state,
         state_variables: state.state_variables,
         site_actions: raw.site_actions,
+        layer_actions: raw.layer_actions,
     })
 }
 
@@ -454,7 +467,7 @@ mod tests {
             "roster":["A","B"],"parameters":{"v_mps":1e-7}}"#;
         let mut welcome: Welcome = serde_json::from_str(welcome).unwrap();
         assert_eq!(
-            line(&ToProgram::init(&welcome, 6, &[], &[])),
+            line(&ToProgram::init(&welcome, 6, &[], &[], &[])),
             "{\"type\":\"init\",\"protocol\":2,\"run\":\"r\",\"name\":\"A\",\"generation\":2,\"epoch\":3,\"tick\":6,\"seed\":5,\
              \"stream\":\"robot/A#2\",\"tick_s\":0.5,\"field_m\":[9.0,8.5],\"body_m\":0.6,\"sensing_range_m\":2.0,\
              \"location\":{\"x\":1.0,\"y\":2.0},\"roster\":[\"A\",\"B\"],\"parameters\":{\"v_mps\":1e-7},\"sensed\":[]}\n"
@@ -465,7 +478,7 @@ mod tests {
             kind: "task".to_owned(),
             location: Point::new(3.0, 4.0),
         });
-        let known = line(&ToProgram::init(&welcome, 6, &[], &[]));
+        let known = line(&ToProgram::init(&welcome, 6, &[], &[], &[]));
         let expected = "\"roster\":[\"A\",\"B\"],\"known_sites\":[{\"name\":\"T1\",\"kind\":\"task\",\
                         \"location\":{\"x\":3.0,\"y\":4.0}}],\"parameters\"";
         assert!(known.contains(expected), "{known}");
@@ -482,6 +495,8 @@ mod tests {
             sensed: &[],
             sites: &[],
             site_results: &[],
+            layers: &[],
+            layer_results: &[],
         };
         assert_eq!(
             line(&quiet),
@@ -506,6 +521,8 @@ mod tests {
             sensed: &sensed,
             sites: &[],
             site_results: &[],
+            layers: &[],
+            layer_results: &[],
         };
         assert_eq!(
             line(&busy),

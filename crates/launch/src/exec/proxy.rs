@@ -206,6 +206,8 @@ impl ProgramRobot {
                 sensed: cars.sensed_robots(),
                 sites: cars.sites(),
                 site_results: cars.site_results(),
+                layers: cars.layers(),
+                layer_results: cars.layer_results(),
             };
 
             // What the program says after an `init` in the middle of a run may arrive before this line is sent.
@@ -268,6 +270,7 @@ impl Robot for ProgramRobot {
             cars.tick(),
             cars.sensed_robots(),
             cars.sites(),
+            cars.layers(),
         ));
         self.is_initializing = true;
         if let Err(reason) = begun {
@@ -291,6 +294,7 @@ impl Robot for ProgramRobot {
             behavior_state: self.done.behavior_state.clone(),
             state_variables: self.done.state_variables.clone(),
             site_actions: self.done.site_actions.clone(),
+            layer_actions: self.done.layer_actions.clone(),
         }
     }
 

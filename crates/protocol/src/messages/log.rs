@@ -74,6 +74,8 @@ pub enum LogKind {
     Say,
     /// A robot changed a site, or was refused to.
     Site,
+    /// A robot changed a layer, or was refused to.
+    Layer,
     /// It was decided whether an expectation is met.
     Verdict,
     /// The clock waits; wall-clock matter, not part of the run's record.

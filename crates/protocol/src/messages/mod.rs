@@ -1,6 +1,7 @@
 //! The messages, one module for each pair of participants.
 
 mod control;
+mod layer;
 mod limits;
 mod log;
 mod numbers;
@@ -19,6 +20,10 @@ pub use crate::codec::FieldError;
 pub use control::{
     Awaited, Control, ControlAnswer, FaultKind, FaultOrder, Intervention, LogFile, OnLate, Phase,
     Presence, ProcessOrder, Range, Reason, RobotStatus, Setup, SetupAnswer, Status,
+};
+pub use layer::{
+    LayerAction, LayerFrame, LayerRefusal, LayerResult, MAX_LAYER_ACTIONS, MAX_LAYER_CELLS,
+    MAX_LAYER_VALUE, MAX_LAYERS, MAX_SENSED_CELLS, SensedCell, SensedLayer, SensedRow, cell_center,
 };
 pub(crate) use limits::is_false;
 pub use limits::{MAX_ENTRIES, MAX_LINE_BYTES, MAX_TEXT_BYTES};

@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::control::{Awaited, FaultKind, Phase, Presence};
+use super::layer::LayerFrame;
 use super::limits::{counted, few, finite, is_zero, short};
 use super::numbers::{Epoch, Generation, Seq, Tick};
 use super::point::Point;
@@ -63,6 +64,9 @@ pub struct WorldFrame {
     /// The sites, by name.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sites: Vec<SiteFrame>,
+    /// The layers, by name.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub layers: Vec<LayerFrame>,
     /// Commands that were sent, or whose fate was decided, since the frame before; the newest [`MAX_FLIGHTS`] of them.
     #[serde(default)]
     pub flights: Vec<Flight>,

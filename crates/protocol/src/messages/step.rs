@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::layer::{LayerAction, LayerResult, SensedLayer, check_layer_actions};
 use super::limits::{counted, few, finite, is_false, is_zero, short};
 use super::numbers::{Epoch, Generation, Tick};
 use super::payload::Payload;
@@ -277,6 +278,12 @@ pub struct TickUpdate {
     /// What became of its actions on sites in the tick before, in their order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub site_results: Vec<SiteResult>,
+    /// What it senses of the layers that have a range, by name; in every tick, as sites.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub layers: Vec<SensedLayer>,
+    /// What became of its actions on layers in the tick before, in their order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub layer_results: Vec<LayerResult>,
 }
 
 impl TickUpdate {
@@ -304,6 +311,8 @@ impl TickUpdate {
             ranges,
             sites,
             site_results,
+            layers,
+            layer_results,
         } = self;
 
         joined.is_none()
@@ -317,6 +326,8 @@ impl TickUpdate {
             && ranges.is_empty()
             && sites.is_empty()
             && site_results.is_empty()
+            && layers.is_empty()
+            && layer_results.is_empty()
     }
 }
 
@@ -399,6 +410,9 @@ pub struct Report {
     /// What it does to sites, in this order. It is carried out when all reports of the tick are in.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub site_actions: Vec<SiteAction>,
+    /// What it does to layers, in this order, at the same time.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub layer_actions: Vec<LayerAction>,
 }
 
 impl Report {
@@ -431,6 +445,7 @@ impl Message for Report {
         few(self.commands as usize, "commands")?;
         few(self.log.len(), "log")?;
         check_site_actions(&self.site_actions)?;
+        check_layer_actions(&self.layer_actions)?;
         self.log.iter().try_for_each(|line| short(line, "log"))
     }
 }

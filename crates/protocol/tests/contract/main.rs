@@ -8,10 +8,11 @@ mod schema;
 use std::path::{Path, PathBuf};
 
 use protocol::messages::{
-    Clock, Command, Control, Correction, Delivery, End, Face, JoinRequest, LogRecord, MAX_ENTRIES,
-    MAX_SITE_ACTIONS, MAX_SITE_VARIABLES, MAX_TEXT_BYTES, NEWS_FLAGS, Panel, Payload, Performative,
-    Point, Report, SensedBody, SensedKind, SensedRobot, SensedSite, SiteAction, SiteRefusal,
-    SiteResult, Target, TickPanel, TickUpdate, Tone, Variable, Widget,
+    Clock, Command, Control, Correction, Delivery, End, Face, JoinRequest, LayerAction,
+    LayerRefusal, LayerResult, LogRecord, MAX_ENTRIES, MAX_LAYER_ACTIONS, MAX_SITE_ACTIONS,
+    MAX_SITE_VARIABLES, MAX_TEXT_BYTES, NEWS_FLAGS, Panel, Payload, Performative, Point, Report,
+    SensedBody, SensedKind, SensedLayer, SensedRobot, SensedRow, SensedSite, SiteAction,
+    SiteRefusal, SiteResult, Target, TickPanel, TickUpdate, Tone, Variable, Widget,
 };
 use protocol::{Message, RobotName, RunName, decode, encode};
 use serde::Serialize;
@@ -45,6 +46,7 @@ fn report() -> Report {
                 .and_add("stock", -1.0)
                 .only_if("done", false),
         ],
+        layer_actions: vec![LayerAction::add("dust", Point::new(0.1, 0.2), 0.3, -0.1)],
     }
 }
 
@@ -87,6 +89,20 @@ fn news() -> TickUpdate {
                 refused: Some(SiteRefusal::OutOfRange),
             },
         ],
+        layers: vec![SensedLayer {
+            name: "dust".into(),
+            cell_m: 0.1,
+            rows: vec![SensedRow {
+                row: 3,
+                column: 4,
+                values: vec![0.1 + 0.2, 1e-300],
+            }],
+        }],
+        layer_results: vec![LayerResult {
+            layer: "mist".into(),
+            change: 0.0,
+            refused: Some(LayerRefusal::UnknownLayer),
+        }],
         bodies: vec![SensedBody {
             kind: SensedKind::Guest,
             location: Point::new(0.1 + 0.2, 1e-300),
@@ -269,13 +285,20 @@ fn malformed_messages_are_named_by_key_sender_and_field() {
             r#""proposal":[0.3,-2.0]"#,
             "proposal",
         ),
-        (r#""done":false}}]}"#, r#""done":false}}]} trailing"#, "."),
+        (r#""add":-0.1}]}"#, r#""add":-0.1}]} trailing"#, "."),
         (
             r#""add":{"stock":-1.0}"#,
             r#""add":{"stock":"x"}"#,
             "site_actions[0].add.stock",
         ),
         (r#""site":"T3""#, r#""site":7"#, "site_actions[0].site"),
+        (
+            r#""radius_m":0.3"#,
+            r#""radius_m":-0.3"#,
+            "layer_actions.radius_m",
+        ),
+        (r#""add":-0.1"#, r#""add":1e999"#, "layer_actions[0].add"),
+        (r#","add":-0.1"#, "", "layer_actions"),
     ] {
         assert!(good.contains(from), "{from} is not in {good}");
         let error = decode::<Report>(key, "Butler", good.replace(from, to).as_bytes()).unwrap_err();
@@ -354,6 +377,23 @@ fn actions_on_sites_are_bounded() {
     );
     let long = SiteAction::set("T".repeat(65), "done", true);
     assert_eq!(check(vec![long]).unwrap_err(), "site_actions.site");
+}
+
+#[test]
+fn actions_on_layers_are_bounded() {
+    let check = |actions: Vec<LayerAction>| {
+        let report = Report {
+            layer_actions: actions,
+            ..report()
+        };
+        decode::<Report>("key", "Butler", &encode(&report)).map_err(|error| error.field)
+    };
+    let one = LayerAction::set("dust", Point::new(1.0, 2.0), 0.0, 1.0);
+    assert!(check(vec![one.clone(); MAX_LAYER_ACTIONS]).is_ok());
+    let many = check(vec![one; MAX_LAYER_ACTIONS + 1]);
+    assert_eq!(many.unwrap_err(), "layer_actions");
+    let long = LayerAction::set("d".repeat(65), Point::new(1.0, 2.0), 0.0, 1.0);
+    assert_eq!(check(vec![long]).unwrap_err(), "layer_actions.layer");
 }
 
 #[test]

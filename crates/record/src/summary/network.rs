@@ -90,6 +90,8 @@ impl NetworkSummary {
             | Event::Guest { .. }
             | Event::SiteChanged { .. }
             | Event::SiteRefused { .. }
+            | Event::LayerChanged { .. }
+            | Event::LayerRefused { .. }
             | Event::Warned { .. }
             | Event::CommandSent { .. }
             | Event::CommandDelayed { .. }

@@ -194,7 +194,7 @@ impl SiteSpec {
 }
 
 /// Checks a word that paths and conditions name.
-fn check_word(word: &str, what: &str) -> Result<(), String> {
+pub(super) fn check_word(word: &str, what: &str) -> Result<(), String> {
     let is_plain = word
         .chars()
         .all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-');

@@ -171,6 +171,7 @@ impl Player {
             guest_moods: frame.guest_moods.clone(),
             obstacles: header.obstacles.clone(),
             sites: header.sites_of(frame),
+            layers: header.layers_of(frame),
             cuts: frame.cuts.clone(),
             expectations: frame.standings(self.events()),
             display_unit: header.display_unit,

@@ -18,5 +18,6 @@ pub(crate) fn report(tick: Tick, proposal: Point) -> Report {
         commands: 0,
         log: Vec::new(),
         site_actions: Vec::new(),
+        layer_actions: Vec::new(),
     }
 }

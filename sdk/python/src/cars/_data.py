@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple, Optional, Union
 
@@ -95,6 +95,62 @@ class SiteResult(NamedTuple):
     """What became of an action on a site."""
 
     site: str
+    refused: Optional[str]
+    """Why it was refused; None if it was carried out."""
+
+
+class LayerCell(NamedTuple):
+    """A cell of a layer: its column and row in the grid, from 0, its center, and its number."""
+
+    column: int
+    row: int
+    center: Point
+    value: float
+
+
+class SensedLayer(NamedTuple):
+    """The part of a layer that a robot senses: all cells whose centers are within the range of the layer."""
+
+    name: str
+    cell_m: float
+    """Side of a cell, meters."""
+    rows: tuple[tuple[int, int, tuple[float, ...]], ...]
+    """The cells, row by row from below: the row, the column of the first cell, and the numbers from left to right."""
+
+    def value_at(self, place: Point) -> Optional[float]:
+        """The number of the cell in which a place is; None if the robot does not sense this cell."""
+        at_column, at_row = math.floor(place.x / self.cell_m), math.floor(place.y / self.cell_m)
+        for row, column, values in self.rows:
+            if row == at_row and 0 <= at_column - column < len(values):
+                return values[at_column - column]
+        return None
+
+    def cells(self) -> Iterator[LayerCell]:
+        """The cells, row by row from below, each row from left to right."""
+        for row, first, values in self.rows:
+            for column, value in enumerate(values, first):
+                yield LayerCell(column, row, Point((column + 0.5) * self.cell_m, (row + 0.5) * self.cell_m), value)
+
+
+@dataclass
+class LayerAction:
+    """What a robot does to a layer: to the cell in which a place is, and to all cells whose centers are within a radius of it."""
+
+    layer: str
+    at: Point
+    radius_m: float = 0.0
+    set: Optional[float] = None
+    """What the numbers of the cells are set to."""
+    add: Optional[float] = None
+    """What is added to the number of each cell, after it was set."""
+
+
+class LayerResult(NamedTuple):
+    """What became of an action on a layer."""
+
+    layer: str
+    change: float
+    """What it added to the sum of the layer."""
     refused: Optional[str]
     """Why it was refused; None if it was carried out."""
 

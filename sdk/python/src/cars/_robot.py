@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from ._data import Point, SiteAction, StateVariables
+from ._data import LayerAction, Point, SiteAction, StateVariables
 from .panel import Panel
 
 if TYPE_CHECKING:
@@ -32,6 +32,8 @@ class Action:
     """Further variables that it publishes: numbers, flags and texts by name."""
     site_actions: Sequence[SiteAction] = ()
     """What it does to sites, in this order; what became of it is in ``cars.site_results`` in the next tick."""
+    layer_actions: Sequence[LayerAction] = ()
+    """What it does to layers, in this order; what became of it is in ``cars.layer_results`` in the next tick."""
 
     @classmethod
     def stay(cls, cars: Cars, **published: Any) -> Action:

@@ -194,6 +194,7 @@ impl Host {
             commands: stated,
             log,
             site_actions: Vec::new(),
+            layer_actions: Vec::new(),
         }
     }
 

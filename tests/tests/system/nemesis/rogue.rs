@@ -405,6 +405,7 @@ fn report(epoch: Epoch, tick: Tick, generation: Generation) -> Report {
         commands: 0,
         log: Vec::new(),
         site_actions: Vec::new(),
+        layer_actions: Vec::new(),
     }
 }
 
