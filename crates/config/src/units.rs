@@ -3,7 +3,7 @@
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// Units with their dimensions and their values in SI units.
-const UNITS: [(&str, Dimension, f64); 13] = [
+const UNITS: [(&str, Dimension, f64); 19] = [
     ("m", Dimension::Length, 1.0),
     ("cm", Dimension::Length, 0.01),
     ("km", Dimension::Length, 1000.0),
@@ -18,6 +18,16 @@ const UNITS: [(&str, Dimension, f64); 13] = [
     ("h", Dimension::Time, 3600.0),
     ("rad", Dimension::Angle, 1.0),
     ("deg", Dimension::Angle, std::f64::consts::PI / 180.0),
+    ("rad/s", Dimension::TurnRate, 1.0),
+    ("deg/s", Dimension::TurnRate, std::f64::consts::PI / 180.0),
+    ("m/s2", Dimension::Acceleration, 1.0),
+    ("ft/s2", Dimension::Acceleration, 0.3048),
+    ("rad/s2", Dimension::TurnAcceleration, 1.0),
+    (
+        "deg/s2",
+        Dimension::TurnAcceleration,
+        std::f64::consts::PI / 180.0,
+    ),
 ];
 
 /// What a quantity measures.
@@ -31,6 +41,12 @@ pub enum Dimension {
     Time,
     /// Radians.
     Angle,
+    /// Radians per second.
+    TurnRate,
+    /// Meters per second squared.
+    Acceleration,
+    /// Radians per second squared.
+    TurnAcceleration,
 }
 
 impl Dimension {
@@ -40,6 +56,9 @@ impl Dimension {
             Self::Speed => "a speed such as \"2 ft/s\" or \"0.5 m/s\"",
             Self::Time => "a time such as \"0.5 s\" or \"10 min\"",
             Self::Angle => "an angle such as \"90 deg\"",
+            Self::TurnRate => "a turn rate such as \"90 deg/s\"",
+            Self::Acceleration => "an acceleration such as \"0.5 m/s2\"",
+            Self::TurnAcceleration => "a turn acceleration such as \"180 deg/s2\"",
         }
     }
 }
@@ -118,6 +137,18 @@ quantity_type! {
     /// A time, seconds.
     Time, Dimension::Time, "s"
 }
+quantity_type! {
+    /// A turn rate, radians per second.
+    TurnRate, Dimension::TurnRate, "rad/s"
+}
+quantity_type! {
+    /// An acceleration, meters per second squared.
+    Acceleration, Dimension::Acceleration, "m/s2"
+}
+quantity_type! {
+    /// A turn acceleration, radians per second squared.
+    TurnAcceleration, Dimension::TurnAcceleration, "rad/s2"
+}
 
 #[cfg(test)]
 mod tests {
@@ -128,6 +159,11 @@ mod tests {
         assert_eq!(quantity("50 ft"), Some((15.24, Dimension::Length)));
         assert_eq!(quantity("2ft/s"), Some((0.6096, Dimension::Speed)));
         assert_eq!(quantity("1e-1 s"), Some((0.1, Dimension::Time)));
+        assert_eq!(quantity("2 m/s2"), Some((2.0, Dimension::Acceleration)));
+        assert_eq!(
+            quantity("180 deg/s"),
+            Some((std::f64::consts::PI, Dimension::TurnRate))
+        );
         for other in [
             "50",
             "ft",

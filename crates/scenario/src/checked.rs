@@ -6,7 +6,7 @@ use observe::{Expectation, RunSetting, TickCondition};
 use protocol::messages::{DisplayUnit, Parameters, Point};
 use protocol::{RobotName, Tick};
 use serde::{Deserialize, Serialize};
-use world::{Field, Guests, Hall, Region, Shape, Shapes, Wall};
+use world::{Field, Guests, Hall, Region, Shape, Shapes, Wall, Wheels};
 
 use super::change::{Change, Parent};
 use super::fault::Fault;
@@ -169,6 +169,8 @@ pub struct RobotSpec {
     pub drawn: Option<Region>,
     /// Shape of its body; a square of the scenario's size if there is none.
     pub shape: Option<Shape>,
+    /// How it drives, if it drives like wheels.
+    pub wheels: Option<Wheels>,
     /// Parameters of the robot; lengths, speeds and times are SI numbers.
     pub parameters: Parameters,
 }
@@ -241,6 +243,9 @@ impl Scenario {
             hall.robots.push(to_world(robot.at));
             if let Some(shape) = robot.shape {
                 hall.shapes.robots.insert(index, shape);
+            }
+            if let Some(wheels) = robot.wheels {
+                hall.shapes.wheels.insert(index, wheels);
             }
         }
         hall

@@ -99,7 +99,7 @@ pub(super) fn place_at_random(scenario: &mut Scenario) -> Result<(), PlacingErro
             continue;
         };
         let region = robot.drawn.unwrap_or(Region::Field);
-        let footprint = robot.shape.map(Footprint::from);
+        let footprint = Footprint::of_robot(robot.shape, robot.wheels.as_ref(), scenario.body_m);
         let Some(at) = placer.place(footprint, region, &mut stream) else {
             return Err(PlacingError::no_room(region, Some(name), None));
         };

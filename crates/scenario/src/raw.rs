@@ -2,6 +2,7 @@
 
 mod bulk_name;
 pub(super) mod change;
+mod drive;
 mod expect;
 pub(super) mod fault;
 mod guests;
@@ -33,6 +34,7 @@ use toml::Spanned;
 
 use bulk_name::BulkName;
 use change::{ChangeTable, ParentTable};
+use drive::DriveTable;
 use fault::FaultTable;
 use guests::GuestsTable;
 use layer::LayerTable;
@@ -133,6 +135,7 @@ struct RawRobot {
     at: StartPlace,
     size: Option<Spanned<Size>>,
     radius: Option<Spanned<Length>>,
+    drive: Option<DriveTable>,
     on_late: Option<OnLate>,
     params_from: Option<Spanned<PathBuf>>,
     #[serde(default)]
@@ -486,6 +489,7 @@ fn spec(
         at: to_wire(at),
         drawn,
         shape: solids::shape(robot.size.as_ref(), robot.radius.as_ref(), source)?,
+        wheels: drive::check(robot.drive.as_ref(), source)?,
         parameters: to_parameters(&parameters),
     })
 }
@@ -653,6 +657,7 @@ impl RawRobot {
             at: StartPlace::of(to_world(spec.at), spec.drawn),
             size,
             radius,
+            drive: spec.wheels.as_ref().map(DriveTable::of),
             on_late: lateness.own.get(name).copied(),
             params_from: None,
             params: params.collect(),

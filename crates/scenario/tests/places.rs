@@ -1,11 +1,12 @@
 //! Places: patterns, regions, sizes and walls, as written in a file, drawn from the seed, and written out.
 
+use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::Path;
 
 use config::{Changes, FileError, Source};
 use protocol::messages::Point;
 use scenario::Scenario;
-use world::{Region, Shape};
+use world::{Region, Shape, Wheels};
 
 fn parse(text: &str) -> Result<Scenario, FileError> {
     let source = Source {
@@ -337,5 +338,68 @@ fn what_cannot_be_placed_is_refused_with_line_and_reason() {
         let error = shown(&text);
         assert!(error.contains(line), "no {line:?} in\n{error}\n{text}");
         assert!(error.contains(reason), "no {reason:?} in\n{error}");
+    }
+}
+
+#[test]
+fn drives_are_read_and_written() {
+    let file = |drive: &str| {
+        format!("[[robot]]\nname = \"A\"\nat = [\"5 m\", \"5 m\"]\ndrive = {drive}\n")
+    };
+    let limits = "{ max_speed = \"36 km/h\", max_turn = \"90 deg/s\", max_acceleration = \"0.5 m/s2\", \
+                  max_turn_acceleration = \"180 deg/s2\", heading = \"180 deg\" }";
+    let scenario = parse(&file(limits)).unwrap();
+    let expected = Wheels {
+        max_speed_mps: 10.0,
+        max_turn_radps: FRAC_PI_2,
+        max_acceleration_mps2: 0.5,
+        max_turn_acceleration_radps2: PI,
+        heading_rad: PI,
+    };
+    assert_eq!(scenario.robots["A"].wheels, Some(expected));
+
+    let free = parse(&file("{}")).unwrap();
+    let unlimited = free.robots["A"].wheels.unwrap();
+    assert!(unlimited.max_speed_mps.is_infinite() && unlimited.max_turn_radps.is_infinite());
+    let plain = parse(&bulk("\"random\"", 2)).unwrap();
+    assert_eq!(plain.robots["S1"].wheels, None);
+    for scenario in [scenario, free] {
+        let written = scenario.to_toml().unwrap();
+        let read = parse(&written).unwrap();
+        assert_eq!(read.robots["A"].wheels, scenario.robots["A"].wheels);
+        assert_eq!(read.to_toml().unwrap(), written);
+    }
+
+    // All of a table in bulk drive, and one lies where it has room with its heading.
+    let bulk = bulk("\"random\"", 3);
+    let bulk = format!("{bulk}size = [\"8 m\", \"0.2 m\"]\ndrive = {{ heading = \"90 deg\" }}\n");
+    let scenario = parse(&format!("[field]\nsize = [\"9 m\", \"9 m\"]\n{bulk}")).unwrap();
+    for robot in scenario.robots.values() {
+        assert!((4.0..5.0).contains(&robot.at.y), "{:?}", robot.at);
+        assert_eq!(robot.wheels.unwrap().heading_rad, FRAC_PI_2);
+    }
+
+    for (drive, reason) in [
+        (
+            "{ max_turn = \"0 deg/s\" }",
+            "max_turn must be more than zero",
+        ),
+        (
+            "{ max_turn = \"90 deg\" }",
+            "is not a turn rate such as \"90 deg/s\"",
+        ),
+        (
+            "{ max_acceleration = \"-1 m/s2\" }",
+            "max_acceleration must be more than zero",
+        ),
+        (
+            "{ max_turn_acceleration = 3 }",
+            "a turn acceleration such as \"180 deg/s2\"",
+        ),
+        ("{ max_sped = \"1 m/s\" }", "unknown field `max_sped`"),
+    ] {
+        let error = shown(&file(drive));
+        assert!(error.contains(reason), "no {reason:?} in\n{error}");
+        assert!(error.contains("drive = {"), "no place in\n{error}");
     }
 }

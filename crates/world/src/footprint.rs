@@ -7,6 +7,7 @@
 use crate::limits::TOLERANCE_M;
 use crate::point::Point;
 use crate::shape::{Shape, Wall};
+use crate::wheels::Wheels;
 
 /// How far a body may overlap a wall on its way from one place to another.
 ///
@@ -39,6 +40,17 @@ impl Footprint {
             shape,
             ahead: Point::new(cos, sin),
         }
+    }
+
+    /// A robot as it lies at its start; `None` for one without a shape of its own and without wheels, which is a square of the
+    /// field.
+    #[must_use]
+    pub fn of_robot(shape: Option<Shape>, wheels: Option<&Wheels>, body_m: f64) -> Option<Self> {
+        let Some(wheels) = wheels else {
+            return shape.map(Self::from);
+        };
+        let shape = shape.unwrap_or(Shape::square(body_m));
+        Some(Self::turned(shape, wheels.heading_rad))
     }
 
     /// The shape.

@@ -154,13 +154,6 @@ impl<R: Rng> World<R> {
         verdicts
     }
 
-    /// Has a robot with [`Wheels`] want a velocity from the next tick on. At first it wants none. Without effect on other robots.
-    pub fn drive(&mut self, robot: usize, wanted: Velocity) {
-        if let Some(driven) = self.driven.get_mut(&robot) {
-            driven.wanted = wanted;
-        }
-    }
-
     /// Where the robots with wheels drive in the tick.
     fn drives(&self) -> BTreeMap<usize, Drive> {
         let drive = |driven: &Driven| {
@@ -244,6 +237,13 @@ impl<R: Rng> World<R> {
 }
 
 impl<R> World<R> {
+    /// Has a robot with [`Wheels`] want a velocity from the next tick on. At first it wants none. Without effect on other robots.
+    pub fn drive(&mut self, robot: usize, wanted: Velocity) {
+        if let Some(driven) = self.driven.get_mut(&robot) {
+            driven.wanted = wanted;
+        }
+    }
+
     /// The field and the size of bodies.
     #[must_use]
     pub fn field(&self) -> &Field {

@@ -32,11 +32,7 @@ impl Shapes {
     /// The footprint of a robot at its start; `None` for a square of the field along the axes.
     pub(crate) fn robot(&self, index: usize, body_m: f64) -> Option<Footprint> {
         let shape = self.robots.get(&index).copied();
-        let Some(wheels) = self.wheels.get(&index) else {
-            return shape.map(Footprint::from);
-        };
-        let shape = shape.unwrap_or(Shape::square(body_m));
-        Some(Footprint::turned(shape, wheels.heading_rad))
+        Footprint::of_robot(shape, self.wheels.get(&index), body_m)
     }
 
     /// Checks everything that needs no place.

@@ -1,6 +1,6 @@
 //! Numbers as written in the file: triangular distributions, and what must be positive.
 
-use config::units::{Length, Speed, Time};
+use config::units::{Acceleration, Length, Speed, Time, TurnAcceleration, TurnRate};
 use config::{FileError, Source};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
@@ -46,6 +46,24 @@ impl CheckedNumber for Speed {
 }
 
 impl CheckedNumber for Length {
+    fn number(self) -> f64 {
+        self.0
+    }
+}
+
+impl CheckedNumber for TurnRate {
+    fn number(self) -> f64 {
+        self.0
+    }
+}
+
+impl CheckedNumber for Acceleration {
+    fn number(self) -> f64 {
+        self.0
+    }
+}
+
+impl CheckedNumber for TurnAcceleration {
     fn number(self) -> f64 {
         self.0
     }
