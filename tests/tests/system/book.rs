@@ -201,6 +201,7 @@ fn the_examples_of_files_are_right() {
     let mut parts = examples("scenario-files.md");
     let complete = parts.remove(0);
     parts.extend(examples("faults.md"));
+    parts.extend(examples("expectations.md"));
     let mut files = vec![complete.clone()];
     for part in parts {
         // A key before the tables replaces the one of the complete example.
@@ -215,7 +216,7 @@ fn the_examples_of_files_are_right() {
     }
     files.extend(examples("launch-files.md"));
     files.extend(examples("first-experiment.md"));
-    assert_eq!(files.len(), 17);
+    assert_eq!(files.len(), 20);
 
     let lab = Lab::new();
     // A drawing that one of them names.

@@ -9,6 +9,9 @@ const TASKS: &str = r#"
 duration = "60 s"
 end_when = { sites = "T*", by = "all", variable = "stock", at_most = 0 }
 
+[sensing]
+rays = { count = 4, range = "4 m" }
+
 [[site]]
 name = "T{1..2}"
 at = { line = { from = ["2 m", "4 m"], to = ["3 m", "4 m"] } }
