@@ -52,7 +52,7 @@ enum Tally<'a> {
     Time(TimeTally),
     Between(BetweenTally<'a>),
     Share(ShareTally<'a>),
-    Number(NumberTally<'a>),
+    Number(Box<NumberTally<'a>>),
     Stalled(StalledTally<'a>),
     Ratio(RatioTally<'a>),
     Expression(&'a Expression),
@@ -130,12 +130,12 @@ impl<'a> Tally<'a> {
                 durations: Durations::default(),
             }),
             MeasureSource::Share(quantity) => Self::Share(ShareTally::new(quantity, setting)),
-            MeasureSource::Number(number) => Self::Number(NumberTally {
+            MeasureSource::Number(number) => Self::Number(Box::new(NumberTally {
                 definition: number,
                 gauge: QuantityGauge::new(&number.quantity, setting),
                 values: None,
                 undefined: None,
-            }),
+            })),
             MeasureSource::Stalled(stalled) => Self::Stalled(StalledTally {
                 definition: stalled,
                 values: vec![None; stalled.progress.len()],

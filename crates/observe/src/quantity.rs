@@ -990,8 +990,6 @@ pub(crate) struct QuantityGauge {
     robots: Vec<RobotName>,
     walked: Vec<Walk>,
     coverage: Option<CoveredArea>,
-    /// Range of the scenario's radios, meters.
-    radio_range_m: Option<f64>,
     /// The sites, in the order of their names.
     sites: Vec<String>,
     /// The number of the sites, until one of them changes.
@@ -1018,13 +1016,16 @@ impl QuantityGauge {
             RunQuantity::Sites { sites, .. } => sites.of_sites(setting),
             _ => Vec::new(),
         };
+        let mut quantity = quantity.clone();
+        if let RunQuantity::Components { range_m, .. } = &mut quantity {
+            *range_m = range_m.or(setting.radio_range_m);
+        }
         Self {
-            quantity: quantity.clone(),
+            quantity,
             sites,
             of_sites: None,
             walked: vec![Walk::default(); robots.len()],
             coverage,
-            radio_range_m: setting.radio_range_m,
             robots,
         }
     }
@@ -1070,7 +1071,7 @@ impl QuantityGauge {
                 Ok(coverage.share())
             }
             RunQuantity::Components { range_m, .. } => {
-                let range_m = range_m.or(self.radio_range_m).ok_or(Undefined::NoRobot)?;
+                let range_m = range_m.ok_or(Undefined::NoRobot)?;
                 Ok(components(&places(&self.robots, seen)?, range_m) as f64)
             }
             RunQuantity::Sites {
