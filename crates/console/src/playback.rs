@@ -100,6 +100,8 @@ struct List(Vec<u8>);
 struct RobotHead<'a> {
     name: &'a RobotName,
     location: Point,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    heading_rad: Option<f64>,
     blocked: bool,
     presence: Presence,
 }
@@ -375,6 +377,7 @@ impl List {
         let head = to_json(&RobotHead {
             name: &robot.name,
             location: robot.location,
+            heading_rad: robot.heading_rad,
             blocked: robot.blocked,
             presence,
         });

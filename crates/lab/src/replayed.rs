@@ -104,6 +104,8 @@ impl Robot for Replayed {
                 let mut action = self.last.as_ref().map_or_else(Action::default, action);
                 action.proposal = cars.location();
                 action.speed_mps = 0.0;
+                action.velocity = None;
+                action.site_actions.clear();
                 action
             }
             Err(error) => {
@@ -125,6 +127,7 @@ pub(crate) fn action(report: &Report) -> Action {
         state_variables: report.state_variables.clone(),
         site_actions: report.site_actions.clone(),
         layer_actions: report.layer_actions.clone(),
+        velocity: report.velocity,
     }
 }
 

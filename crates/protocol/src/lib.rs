@@ -6,6 +6,7 @@
 //! SI units and REP 103 throughout: meters, seconds, radians counter-clockwise from +x.
 
 pub mod access;
+mod angle;
 pub mod codec;
 pub mod event;
 pub mod keys;
@@ -17,6 +18,7 @@ pub mod plain;
 pub mod random;
 pub mod time;
 
+pub use angle::published_angle;
 pub use codec::{FieldError, Malformed, Message, decode, encode};
 pub use event::{Event, Line};
 pub use messages::{Epoch, Generation, Seq, Tick};

@@ -7,8 +7,8 @@ use crate::payload::read_payload;
 use crate::scoped_borrow::with_cars;
 use crate::stream::Stream;
 use crate::values::{
-    command, layer_result, point, read_point, sensed_body, sensed_layer, sensed_robot, sensed_site,
-    site_result, state, tuple, variables,
+    command, layer_result, point, pose, read_point, sensed_body, sensed_layer, sensed_robot,
+    sensed_site, site_result, state, tuple, variables,
 };
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -70,6 +70,13 @@ impl Cars {
     #[getter]
     fn location<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         point(py, with_cars(|cars| cars.location())?)
+    }
+
+    /// Where it stands and looks, and the velocity that it has reached, if the scenario has it drive like wheels; None otherwise.
+    #[getter]
+    fn pose<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let of_robot = with_cars(|cars| cars.pose())?;
+        of_robot.map(|of_robot| pose(py, of_robot)).transpose()
     }
 
     /// The commands that arrived in this tick, in the order of senders and of their sending.
@@ -248,6 +255,12 @@ impl Cars {
         let action = with_cars(|cars| robot::Action::go(cars, goal, speed_mps))?;
         let proposal = point(py, action.proposal)?;
         Ok((proposal, action.speed_mps, action.direction_rad))
+    }
+
+    /// Speed and direction of a robot that drives like wheels.
+    fn _drive(&self, linear_mps: f64) -> PyResult<(f64, f64)> {
+        let action = with_cars(|cars| robot::Action::drive(cars, linear_mps, 0.0))?;
+        Ok((action.speed_mps, action.direction_rad))
     }
 }
 

@@ -5,8 +5,9 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyBool, PyDict, PyMapping, PyString, PyTuple, PyType};
 use robot::{
-    Action, LayerAction, LayerResult, Point, PublicState, ReceivedCommand, SensedBody, SensedKind,
-    SensedLayer, SensedSite, SiteAction, SiteResult, StateVariables, Variable,
+    Action, LayerAction, LayerResult, Point, Pose, PublicState, ReceivedCommand, SensedBody,
+    SensedKind, SensedLayer, SensedSite, SiteAction, SiteResult, StateVariables, Variable,
+    Velocity,
 };
 
 use crate::payload::json_value;
@@ -24,6 +25,21 @@ pub(crate) fn point(py: Python<'_>, point: Point) -> PyResult<Bound<'_, PyAny>> 
 pub(crate) fn read_point(value: &Bound<'_, PyAny>) -> PyResult<Point> {
     let [x, y] = value.extract()?;
     Ok(Point::new(x, y))
+}
+
+/// The pose of a robot that drives like wheels.
+pub(crate) fn pose<'py>(py: Python<'py>, pose: Pose) -> PyResult<Bound<'py, PyAny>> {
+    static VELOCITY: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    static POSE: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    let Velocity {
+        linear_mps,
+        angular_radps,
+    } = pose.velocity;
+    let velocity = VELOCITY
+        .import(py, DATA, "Velocity")?
+        .call1((linear_mps, angular_radps))?;
+    let fields = (point(py, pose.location)?, pose.heading_rad, velocity);
+    POSE.import(py, DATA, "Pose")?.call1(fields)
 }
 
 /// A command that arrived.
@@ -209,7 +225,22 @@ pub(crate) fn read_action(value: &Bound<'_, PyAny>) -> PyResult<Action> {
         state_variables: read_variables(&variables)?,
         site_actions: read_site_actions(&value.getattr("site_actions")?)?,
         layer_actions: read_layer_actions(&value.getattr("layer_actions")?)?,
+        velocity: read_velocity(&value.getattr("velocity")?)?,
     })
+}
+
+/// The velocity that a robot wants, if any.
+fn read_velocity(value: &Bound<'_, PyAny>) -> PyResult<Option<Velocity>> {
+    if value.is_none() {
+        return Ok(None);
+    }
+    let [linear_mps, angular_radps] = value
+        .extract()
+        .map_err(|_| wrong_field("velocity", "a cars.Velocity or None", value))?;
+    Ok(Some(Velocity {
+        linear_mps,
+        angular_radps,
+    }))
 }
 
 /// Actions on sites.

@@ -332,6 +332,9 @@ pub struct PlacedRobot {
     pub name: RobotName,
     /// Its center.
     pub location: Point,
+    /// Its heading, radians counter-clockwise from +x, if it drives like wheels.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub heading_rad: Option<f64>,
     /// Whether its last move was refused.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub blocked: bool,

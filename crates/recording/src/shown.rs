@@ -67,6 +67,7 @@ fn robot_frame(robot: &PlacedRobot, report: &Report) -> RobotFrame {
         location: robot.location,
         speed_mps: report.speed_mps,
         direction_rad: report.direction_rad,
+        heading_rad: robot.heading_rad,
         blocked: robot.blocked,
         emotion_state: report.emotion_state.clone(),
         behavior_state: report.behavior_state.clone(),

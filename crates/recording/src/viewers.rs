@@ -173,10 +173,11 @@ const ROBOT_COLORS: [[f64; 3]; 4] = [
     [0.8, 0.47, 0.65],
 ];
 
-/// The direction of a robot; that of x for one without a report.
+/// The heading of a robot, or the direction of one that does not drive; that of x for one without a report.
 fn direction_rad(tick: &TickView<'_>, robot: &PlacedRobot) -> f64 {
     let report = tick.reports.get(&robot.name);
-    report.map_or(0.0, |report| report.direction_rad)
+    let reported = report.map_or(0.0, |report| report.direction_rad);
+    robot.heading_rad.unwrap_or(reported)
 }
 
 /// The beginning of an entity of a scene, which stays until another one with its id replaces it.

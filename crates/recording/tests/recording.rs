@@ -68,6 +68,7 @@ fn report(tick: Tick) -> Report {
         log: vec![format!("line {tick}")],
         site_actions: Vec::new(),
         layer_actions: Vec::new(),
+        velocity: None,
     }
 }
 
@@ -93,12 +94,14 @@ fn tick(tick: Tick) -> RecordedTick {
                 PlacedRobot {
                     name: name("Butler"),
                     location: Point { x: 0.1, y: 0.3 },
+                    heading_rad: Some(-1.25),
                     blocked: tick.is_multiple_of(4),
                     missed: None,
                 },
                 PlacedRobot {
                     name: name("Leguin"),
                     location: Point { x: 0.7, y: 1e-9 },
+                    heading_rad: None,
                     blocked: false,
                     missed: is_missed.then_some(Missed {
                         last_report: tick.checked_sub(1),

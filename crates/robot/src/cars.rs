@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use lockstep::Sent;
 use protocol::messages::{
-    CommandText, LayerResult, MAX_ENTRIES, MAX_TEXT_BYTES, Payload, Performative, Point,
+    CommandText, LayerResult, MAX_ENTRIES, MAX_TEXT_BYTES, Payload, Performative, Point, Pose,
     PublicState, SensedBody, SensedLayer, SensedRobot, SensedSite, SiteResult, StateVariables,
     Target, TickUpdate, Welcome,
 };
@@ -110,6 +110,13 @@ impl<'a> Cars<'a> {
     #[must_use]
     pub fn location(&self) -> Point {
         self.location
+    }
+
+    /// Where the robot stands and looks, and the velocity that it has reached, if the scenario has it drive like wheels
+    /// ([`Action::drive`](crate::Action::drive)); `None` for any other robot.
+    #[must_use]
+    pub fn pose(&self) -> Option<Pose> {
+        self.news.pose
     }
 
     /// The commands that arrived in this tick, in the order of senders and of their sending (`setCommand`).

@@ -1,6 +1,10 @@
 //! What a robot implements: one method from what it perceives to what it does.
 
-use protocol::messages::{LayerAction, Panel, Point, SiteAction, StateVariables, Variable};
+use std::f64::consts::PI;
+
+use protocol::messages::{
+    LayerAction, Panel, Point, SiteAction, StateVariables, Variable, Velocity,
+};
 
 use crate::cars::Cars;
 use crate::error::{BadParameters, ParametersCheck};
@@ -83,6 +87,9 @@ pub struct Action {
     pub site_actions: Vec<SiteAction>,
     /// What it does to layers, in this order. What became of it is in [`Cars::layer_results`] in the next tick.
     pub layer_actions: Vec<LayerAction>,
+    /// The velocity that the robot wants, if the scenario has it drive like wheels: it counts in the place of the proposal. See
+    /// [`Action::drive`].
+    pub velocity: Option<Velocity>,
 }
 
 impl Action {
@@ -122,6 +129,31 @@ impl Action {
             speed_mps,
             direction_rad: libm::atan2(toward.1, toward.0),
             ..Self::default()
+        }
+    }
+
+    /// Drive: forward at `linear_mps` (backward if it is negative), and turn counter-clockwise at `angular_radps`. For robots that
+    /// the scenario gives a `drive`, which have a [`Cars::pose`]: the simulator applies the robot's limits, and moves it. The
+    /// published speed is the one that is wanted.
+    #[must_use]
+    pub fn drive(cars: &Cars<'_>, linear_mps: f64, angular_radps: f64) -> Self {
+        let heading_rad = cars.pose().map_or(0.0, |pose| pose.heading_rad);
+        let direction_rad = if linear_mps >= 0.0 {
+            heading_rad
+        } else if heading_rad > 0.0 {
+            heading_rad - PI
+        } else {
+            heading_rad + PI
+        };
+
+        Self {
+            speed_mps: linear_mps.abs(),
+            direction_rad,
+            velocity: Some(Velocity {
+                linear_mps,
+                angular_radps,
+            }),
+            ..Self::stay(cars)
         }
     }
 

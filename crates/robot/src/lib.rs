@@ -56,18 +56,10 @@ pub use local::LocalHost;
 pub use network::{PeerNetwork, Undelivered};
 pub use protocol::messages::{
     Clock, Command, CommandText, Correction, End, Face, KnownSite, LayerAction, LayerRefusal,
-    LayerResult, Panel, Parameters, Payload, Point, PublicState, Rays, Report, SensedBody,
+    LayerResult, Panel, Parameters, Payload, Point, Pose, PublicState, Rays, Report, SensedBody,
     SensedCell, SensedKind, SensedLayer, SensedRobot, SensedRow, SensedSite, SiteAction,
-    SiteRefusal, SiteResult, StateVariables, TickUpdate, Tone, Variable, Welcome, Widget,
+    SiteRefusal, SiteResult, StateVariables, TickUpdate, Tone, Variable, Velocity, Welcome, Widget,
 };
 pub use protocol::random::Stream;
-pub use protocol::{RobotName, RobotPattern, RunName, Tick};
+pub use protocol::{RobotName, RobotPattern, RunName, Tick, published_angle};
 pub use runner::{Runner, TickResult};
-
-/// Rounds an angle to 1e-6 rad, so that languages whose arc tangents differ in the last bit publish the same number.
-#[must_use]
-pub fn published_angle(angle_rad: f64) -> f64 {
-    let rounded = (angle_rad * 1e6 + 0.5).floor() / 1e6;
-    // Minus zero is another text than zero.
-    if rounded == 0.0 { 0.0 } else { rounded }
-}

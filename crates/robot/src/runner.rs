@@ -5,7 +5,9 @@ use std::sync::Arc;
 
 use lockstep::{Begin, Sent, Turn};
 use protocol::codec::MAX_MESSAGE_BYTES;
-use protocol::messages::{CommandText, Panel, Point, PublicState, Report, TickUpdate, Welcome};
+use protocol::messages::{
+    CommandText, Panel, Point, PublicState, Report, TickUpdate, Velocity, Welcome,
+};
 use protocol::random::{Stream, stream};
 use protocol::{FieldError, Message, Tick, encode};
 
@@ -167,9 +169,9 @@ impl Runner {
         if turn.begin == Begin::Init {
             self.proposal = self.welcome.location;
         }
-        let location = news
-            .correction
-            .map_or(self.proposal, |correction| correction.location);
+        let told = news.correction.map(|correction| correction.location);
+        let told = told.or(news.pose.map(|pose| pose.location));
+        let location = told.unwrap_or(self.proposal);
         if turn.begin == Begin::TakeOver {
             // When its process asked to join, before or after the moves of this tick or of an earlier one, is wall clock.
             let welcome = Arc::make_mut(&mut self.welcome);
@@ -252,6 +254,14 @@ impl Runner {
             is_finite
         });
 
+        let velocity = action.velocity.map(|velocity| Velocity {
+            linear_mps: finite_or(velocity.linear_mps, 0.0),
+            angular_radps: finite_or(velocity.angular_radps, 0.0),
+        });
+        if velocity != action.velocity {
+            log.push("error: the velocity is not a number; braking".to_owned());
+        }
+
         let state = PublicState {
             epoch: self.welcome.epoch,
             tick,
@@ -277,6 +287,7 @@ impl Runner {
             log,
             site_actions: action.site_actions,
             layer_actions: action.layer_actions,
+            velocity,
         };
 
         // The simulator would refuse a message beyond the limits, and wait for another one.

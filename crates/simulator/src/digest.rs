@@ -5,6 +5,7 @@ use protocol::messages::{Payload, Point, Report, StateVariables, Variable};
 use protocol::{Event, RobotName, Tick};
 
 use crate::medium::SentCommand;
+use world::Pose;
 use xxhash_rust::xxh3::xxh3_128;
 
 /// A chain of digests, one for each tick; each covers all ticks before it.
@@ -66,6 +67,13 @@ impl TickDigest {
     pub fn place(&mut self, x_m: f64, y_m: f64) {
         self.number(x_m);
         self.number(y_m);
+    }
+
+    /// Adds heading and velocity of a robot with wheels.
+    pub fn pose(&mut self, pose: &Pose) {
+        self.number(pose.heading_rad);
+        self.number(pose.velocity.linear_mps);
+        self.number(pose.velocity.angular_radps);
     }
 
     fn point(&mut self, point: Point) {
@@ -190,6 +198,12 @@ impl TickDigest {
         }
         for line in &report.log {
             self.text(line);
+        }
+        // Only of robots that propose one, so that the digests of all others are as ever.
+        if let Some(velocity) = report.velocity {
+            self.text("velocity");
+            self.number(velocity.linear_mps);
+            self.number(velocity.angular_radps);
         }
     }
 }

@@ -246,6 +246,7 @@ mod tests {
             log: log.iter().map(|line| (*line).to_owned()).collect(),
             site_actions: Vec::new(),
             layer_actions: Vec::new(),
+            velocity: None,
         }
     }
 

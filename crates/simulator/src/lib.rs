@@ -6,6 +6,7 @@
 //! It owns the environment and the clock. It does not know the robots' emotions: there is no dependency on `affect`.
 
 pub mod digest;
+mod driving;
 mod guests;
 pub mod layers;
 pub mod medium;

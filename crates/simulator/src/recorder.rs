@@ -592,6 +592,7 @@ fn set_frame(frame: &mut Frame, simulation: &Simulation, record: &TickRecord) {
         frame.robots.push(PlacedRobot {
             name: name.clone(),
             location: simulation.location(name).unwrap_or_default(),
+            heading_rad: simulation.pose(name).map(|pose| pose.heading_rad),
             blocked: simulation.is_blocked(name),
             missed: is_missed.then(|| Missed {
                 last_report: last.map(|report| report.tick),

@@ -18,7 +18,7 @@ pub(crate) struct Viewpoint<'a> {
     tick: Tick,
     robot: &'a RobotName,
     at: Point,
-    /// Direction of motion that it reported last, radians.
+    /// Where it looks, radians.
     heading_rad: f64,
     /// What may hide something from it; obstacles by index.
     opaque: Vec<(Option<usize>, Opaque)>,

@@ -9,9 +9,9 @@ use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::event::{Blocker, Cause, WaitedFor};
 use protocol::messages::{
     CommandText, Correction, Cut, Delivery, End, FaultKind, GuestMood, HeldProcess, Intervention,
-    NEWS_FLAGS, OnLate, Parameters, ParametersOffer, Point, ProcessOrder, PublicState, Report,
-    SensedBody, SensedKind, SensedRobot, SensedSite, Standing, StateVariables, Target, TickUpdate,
-    Welcome,
+    NEWS_FLAGS, OnLate, Parameters, ParametersOffer, Point, Pose, ProcessOrder, PublicState,
+    Report, SensedBody, SensedKind, SensedRobot, SensedSite, Standing, StateVariables, Target,
+    TickUpdate, Welcome,
 };
 use protocol::random::{Stream, stream};
 use protocol::{
@@ -20,6 +20,7 @@ use protocol::{
 use world::{Body, HallError, MoveOutcome, Reaction, World};
 
 use crate::digest::{Digest, TickDigest};
+use crate::driving::{Driving, pose};
 use crate::guests::GuestState;
 use crate::layers::Layers;
 use crate::medium::{Arrival, Medium, SentCommand};
@@ -83,6 +84,7 @@ pub struct Simulation {
     /// Tick of the bodies' locations: the last complete tick or the one in progress.
     now: Tick,
     world: World<Stream>,
+    driving: Driving,
     guests: GuestState,
     sites: Sites,
     layers: Layers,
@@ -167,6 +169,7 @@ impl Simulation {
             sites: Sites::new(&scenario),
             layers: Layers::new(&scenario),
             world,
+            driving: Driving::default(),
             medium,
             names,
             with_bodies: BTreeSet::new(),
@@ -256,6 +259,7 @@ impl Simulation {
         self.change_scenario();
 
         // Robots move by what they proposed in the tick before, guests by their own stream, and by the faces of that tick.
+        self.drive_robots();
         let reactions = self.reactions();
         let verdicts = self.world.advance_with(&self.proposals(), &reactions);
         self.note_moves(&verdicts);
@@ -431,6 +435,11 @@ impl Simulation {
         let mut digest = self.digest.tick(self.now);
         for body in self.world.robots().iter().chain(self.world.guests()) {
             digest.place(body.x, body.y);
+        }
+        for index in 0..self.names.len() {
+            if let Some(pose) = self.world.pose(index) {
+                digest.pose(&pose);
+            }
         }
         self.note_reports(outcome.reports, &mut digest);
         let reports = self.reports_of(self.now);
@@ -645,6 +654,17 @@ impl Simulation {
         proposals
     }
 
+    /// Has the robots with wheels drive as they reported.
+    fn drive_robots(&mut self) {
+        for (index, name) in self.names.iter().enumerate() {
+            let is_silent = self.silent.contains(name);
+            let report = self.reports.get(name).filter(|_| !is_silent);
+            let report = report.map(Arc::as_ref);
+            let warning = self.driving.drive(&mut self.world, index, name, report);
+            self.events.extend(warning);
+        }
+    }
+
     /// What guests do in the tick at the robots' faces.
     fn reactions(&self) -> Vec<Reaction> {
         let mut reactions = Vec::new();
@@ -768,6 +788,7 @@ impl Simulation {
                     location: to_wire(self.world.robots()[index]),
                     blocked: is_refused,
                 }),
+                pose: pose(&self.world, index),
                 commands: self.deliveries(name),
                 in_range: self.robots_in_range(name),
                 unreachable: self.unreachable.get(name).cloned().unwrap_or_default(),
@@ -1140,8 +1161,11 @@ impl Simulation {
         )
     }
 
-    /// The direction of motion that a robot reported last, radians.
+    /// Where a robot looks, radians: its heading, or the direction of motion that it reported last if it does not drive.
     fn heading_rad(&self, of: usize) -> f64 {
+        if let Some(pose) = pose(&self.world, of) {
+            return pose.heading_rad;
+        }
         let report = self.reports.get(&self.names[of]);
         report.map_or(0.0, |report| report.direction_rad)
     }
@@ -1265,6 +1289,12 @@ impl Simulation {
     pub fn location(&self, name: &RobotName) -> Option<Point> {
         let index = self.index(name)?;
         Some(to_wire(self.world.robots()[index]))
+    }
+
+    /// The pose of a robot that drives like wheels; `None` for any other one.
+    #[must_use]
+    pub fn pose(&self, name: &RobotName) -> Option<Pose> {
+        pose(&self.world, self.index(name)?)
     }
 
     /// Guests that are not content, by their index, by mood.

@@ -267,6 +267,7 @@ fn report_of(clock: Clock) -> Report {
         log: Vec::new(),
         site_actions: Vec::new(),
         layer_actions: Vec::new(),
+        velocity: None,
     }
 }
 

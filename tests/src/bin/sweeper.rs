@@ -28,7 +28,11 @@ impl Robot for Sweeper {
         let here = cars.location();
         let mut goal = here;
         let mut most = 0.0;
-        for cell in cars.layer("dust").into_iter().flat_map(|dust| dust.cells()) {
+        for cell in cars
+            .layer("dust")
+            .into_iter()
+            .flat_map(robot::SensedLayer::cells)
+        {
             if cell.value > most {
                 most = cell.value;
                 goal = cell.center;

@@ -254,6 +254,7 @@ impl Hand {
             log: vec![],
             site_actions: Vec::new(),
             layer_actions: Vec::new(),
+            velocity: None,
         }
     }
 

@@ -828,6 +828,10 @@ export interface RobotFrame {
    * Incarnation; above 1 it has returned.
    */
   generation: number;
+  /**
+   * Its heading, radians counter-clockwise from +x, if it drives like wheels: its body is turned by it.
+   */
+  heading_rad?: number | null;
   location: Point;
   name: RobotName;
   presence: Presence;

@@ -55,6 +55,7 @@ fn report(tick: u64) -> Report {
         log: Vec::new(),
         site_actions: Vec::new(),
         layer_actions: Vec::new(),
+        velocity: None,
     }
 }
 
@@ -82,6 +83,7 @@ fn recorded_tick(tick: u64) -> RecordedTick {
     let butler = PlacedRobot {
         name: robot("Butler"),
         location: Point::new(0.1 + 0.2, tick as f64),
+        heading_rad: (tick == 1).then_some(0.5),
         blocked: false,
         missed: None,
     };

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use protocol::Message;
 use protocol::messages::{
     End, KnownSite, LayerAction, LayerResult, MAX_TEXT_BYTES, Panel, Parameters, Payload,
-    Performative, Point, PublicState, Rays, SensedLayer, SensedRobot, SensedSite, SiteAction,
-    SiteResult, StateVariables, Variable,
+    Performative, Point, Pose, PublicState, Rays, SensedLayer, SensedRobot, SensedSite, SiteAction,
+    SiteResult, StateVariables, Variable, Velocity,
 };
 use protocol::plain::escape_line;
 use protocol::{RobotName, RunName, Tick};
@@ -25,6 +25,7 @@ const DONE_FIELDS: &[&str] = &[
     "state_variables",
     "site_actions",
     "layer_actions",
+    "velocity",
 ];
 /// Most unknown fields that are named.
 const MAX_UNKNOWN: usize = 5;
@@ -59,6 +60,8 @@ pub(super) enum ToProgram<'a> {
         #[serde(skip_serializing_if = "Option::is_none")]
         rays: Option<Rays>,
         location: Point,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pose: Option<Pose>,
         roster: &'a [RobotName],
         #[serde(skip_serializing_if = "<[_]>::is_empty")]
         known_sites: &'a [KnownSite],
@@ -75,6 +78,8 @@ pub(super) enum ToProgram<'a> {
     Tick {
         tick: Tick,
         location: Point,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pose: Option<Pose>,
         #[serde(skip_serializing_if = "std::ops::Not::not")]
         blocked: bool,
         #[serde(skip_serializing_if = "<[_]>::is_empty")]
@@ -148,6 +153,7 @@ impl<'a> ToProgram<'a> {
     pub(super) fn init(
         welcome: &'a Welcome,
         tick: Tick,
+        pose: Option<Pose>,
         sensed: &'a [SensedRobot],
         sites: &'a [SensedSite],
         layers: &'a [SensedLayer],
@@ -167,6 +173,7 @@ impl<'a> ToProgram<'a> {
             sensing_range_m: welcome.sensing_range_m,
             rays: welcome.rays,
             location: welcome.location,
+            pose,
             roster: &welcome.roster,
             known_sites: &welcome.known_sites,
             parameters: &welcome.parameters,
@@ -267,6 +274,7 @@ pub(super) struct DoneLine {
     pub(super) state_variables: StateVariables,
     pub(super) site_actions: Vec<SiteAction>,
     pub(super) layer_actions: Vec<LayerAction>,
+    pub(super) velocity: Option<Velocity>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -281,6 +289,7 @@ struct RawDone {
     state_variables: BTreeMap<String, Value>,
     site_actions: Vec<SiteAction>,
     layer_actions: Vec<LayerAction>,
+    velocity: Option<Velocity>,
 }
 
 impl ReadLine {
@@ -426,6 +435,7 @@ fn check_done(raw: RawDone) -> Result<DoneLine, String> {
         state_variables: state.state_variables,
         site_actions: raw.site_actions,
         layer_actions: raw.layer_actions,
+        velocity: raw.velocity,
     })
 }
 
@@ -467,7 +477,7 @@ mod tests {
             "roster":["A","B"],"parameters":{"v_mps":1e-7}}"#;
         let mut welcome: Welcome = serde_json::from_str(welcome).unwrap();
         assert_eq!(
-            line(&ToProgram::init(&welcome, 6, &[], &[], &[])),
+            line(&ToProgram::init(&welcome, 6, None, &[], &[], &[])),
             "{\"type\":\"init\",\"protocol\":2,\"run\":\"r\",\"name\":\"A\",\"generation\":2,\"epoch\":3,\"tick\":6,\"seed\":5,\
              \"stream\":\"robot/A#2\",\"tick_s\":0.5,\"field_m\":[9.0,8.5],\"body_m\":0.6,\"sensing_range_m\":2.0,\
              \"location\":{\"x\":1.0,\"y\":2.0},\"roster\":[\"A\",\"B\"],\"parameters\":{\"v_mps\":1e-7},\"sensed\":[]}\n"
@@ -478,7 +488,7 @@ mod tests {
             kind: "task".to_owned(),
             location: Point::new(3.0, 4.0),
         });
-        let known = line(&ToProgram::init(&welcome, 6, &[], &[], &[]));
+        let known = line(&ToProgram::init(&welcome, 6, None, &[], &[], &[]));
         let expected = "\"roster\":[\"A\",\"B\"],\"known_sites\":[{\"name\":\"T1\",\"kind\":\"task\",\
                         \"location\":{\"x\":3.0,\"y\":4.0}}],\"parameters\"";
         assert!(known.contains(expected), "{known}");
@@ -490,6 +500,7 @@ mod tests {
         let quiet = ToProgram::Tick {
             tick: 6,
             location,
+            pose: None,
             blocked: false,
             commands: &[],
             sensed: &[],
@@ -516,6 +527,14 @@ mod tests {
         let busy = ToProgram::Tick {
             tick: 6,
             location,
+            pose: Some(Pose {
+                location,
+                heading_rad: 1.5,
+                velocity: Velocity {
+                    linear_mps: 0.25,
+                    angular_radps: -1.0,
+                },
+            }),
             blocked: true,
             commands: &commands,
             sensed: &sensed,

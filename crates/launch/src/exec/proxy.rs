@@ -201,6 +201,7 @@ impl ProgramRobot {
             let told = ToProgram::Tick {
                 tick: cars.tick(),
                 location: cars.location(),
+                pose: cars.pose(),
                 blocked: cars.was_blocked(),
                 commands: &commands,
                 sensed: cars.sensed_robots(),
@@ -268,6 +269,7 @@ impl Robot for ProgramRobot {
         let begun = self.begin(&ToProgram::init(
             welcome,
             cars.tick(),
+            cars.pose(),
             cars.sensed_robots(),
             cars.sites(),
             cars.layers(),
@@ -295,6 +297,7 @@ impl Robot for ProgramRobot {
             state_variables: self.done.state_variables.clone(),
             site_actions: self.done.site_actions.clone(),
             layer_actions: self.done.layer_actions.clone(),
+            velocity: self.done.velocity,
         }
     }
 

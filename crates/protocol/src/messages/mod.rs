@@ -1,6 +1,7 @@
 //! The messages, one module for each pair of participants.
 
 mod control;
+mod drive;
 mod layer;
 mod limits;
 mod log;
@@ -21,6 +22,7 @@ pub use control::{
     Awaited, Control, ControlAnswer, FaultKind, FaultOrder, Intervention, LogFile, OnLate, Phase,
     Presence, ProcessOrder, Range, Reason, RobotStatus, Setup, SetupAnswer, Status,
 };
+pub use drive::{Pose, Velocity};
 pub use layer::{
     LayerAction, LayerFrame, LayerRefusal, LayerResult, MAX_LAYER_ACTIONS, MAX_LAYER_CELLS,
     MAX_LAYER_VALUE, MAX_LAYERS, MAX_SENSED_CELLS, SensedCell, SensedLayer, SensedRow, cell_center,

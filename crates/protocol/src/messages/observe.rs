@@ -236,6 +236,9 @@ pub struct RobotFrame {
     pub speed_mps: f64,
     /// Direction of motion, radians counter-clockwise from +x.
     pub direction_rad: f64,
+    /// Its heading, radians counter-clockwise from +x, if it drives like wheels: its body is turned by it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub heading_rad: Option<f64>,
     /// Whether its last move was refused.
     pub blocked: bool,
     /// Its emotion state.

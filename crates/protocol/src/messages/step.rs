@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::drive::{Pose, Velocity};
 use super::layer::{LayerAction, LayerResult, SensedLayer, check_layer_actions};
 use super::limits::{counted, few, finite, is_false, is_zero, short};
 use super::numbers::{Epoch, Generation, Tick};
@@ -251,6 +252,9 @@ pub struct TickUpdate {
     /// Where it stands, if not where it proposed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub correction: Option<Correction>,
+    /// Its pose, in every tick, if the scenario has it drive like wheels.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pose: Option<Pose>,
     /// Commands that arrive now, in the order in which they count: by sender, then in the order in which they were sent. One
     /// that the medium has doubled is listed twice.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -303,6 +307,7 @@ impl TickUpdate {
             joined,
             rejoin,
             correction,
+            pose,
             commands,
             in_range,
             unreachable,
@@ -318,6 +323,7 @@ impl TickUpdate {
         joined.is_none()
             && rejoin.is_none()
             && correction.is_none()
+            && pose.is_none()
             && commands.is_empty()
             && in_range.is_none()
             && unreachable.is_empty()
@@ -413,6 +419,9 @@ pub struct Report {
     /// What it does to layers, in this order, at the same time.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub layer_actions: Vec<LayerAction>,
+    /// The velocity that it means to have, if the scenario has it drive like wheels: it counts in the place of the proposal.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub velocity: Option<Velocity>,
 }
 
 impl Report {
@@ -446,6 +455,7 @@ impl Message for Report {
         few(self.log.len(), "log")?;
         check_site_actions(&self.site_actions)?;
         check_layer_actions(&self.layer_actions)?;
+        self.velocity.as_ref().map_or(Ok(()), Velocity::check)?;
         self.log.iter().try_for_each(|line| short(line, "log"))
     }
 }

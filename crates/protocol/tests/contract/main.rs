@@ -10,9 +10,9 @@ use std::path::{Path, PathBuf};
 use protocol::messages::{
     Clock, Command, Control, Correction, Delivery, End, Face, JoinRequest, LayerAction,
     LayerRefusal, LayerResult, LogRecord, MAX_ENTRIES, MAX_LAYER_ACTIONS, MAX_SITE_ACTIONS,
-    MAX_SITE_VARIABLES, MAX_TEXT_BYTES, NEWS_FLAGS, Panel, Payload, Performative, Point, Report,
-    SensedBody, SensedKind, SensedLayer, SensedRobot, SensedRow, SensedSite, SiteAction,
-    SiteRefusal, SiteResult, Target, TickPanel, TickUpdate, Tone, Variable, Widget,
+    MAX_SITE_VARIABLES, MAX_TEXT_BYTES, NEWS_FLAGS, Panel, Payload, Performative, Point, Pose,
+    Report, SensedBody, SensedKind, SensedLayer, SensedRobot, SensedRow, SensedSite, SiteAction,
+    SiteRefusal, SiteResult, Target, TickPanel, TickUpdate, Tone, Variable, Velocity, Widget,
 };
 use protocol::{Message, RobotName, RunName, decode, encode};
 use serde::Serialize;
@@ -47,6 +47,10 @@ fn report() -> Report {
                 .only_if("done", false),
         ],
         layer_actions: vec![LayerAction::add("dust", Point::new(0.1, 0.2), 0.3, -0.1)],
+        velocity: Some(Velocity {
+            linear_mps: -0.1,
+            angular_radps: 1.0 / 3.0,
+        }),
     }
 }
 
@@ -59,6 +63,11 @@ fn news() -> TickUpdate {
         correction: Some(Correction {
             location: Point::new(1.0, 2.0),
             blocked: true,
+        }),
+        pose: Some(Pose {
+            location: Point::new(1.0, 2.0),
+            heading_rad: -0.5,
+            velocity: Velocity::default(),
         }),
         commands: vec![Delivery {
             from: name("Butler"),
@@ -285,7 +294,12 @@ fn malformed_messages_are_named_by_key_sender_and_field() {
             r#""proposal":[0.3,-2.0]"#,
             "proposal",
         ),
-        (r#""add":-0.1}]}"#, r#""add":-0.1}]} trailing"#, "."),
+        (r#"333}}"#, r#"333}} trailing"#, "."),
+        (
+            r#""linear_mps":-0.1"#,
+            r#""linear_mps":null"#,
+            "velocity.linear_mps",
+        ),
         (
             r#""add":{"stock":-1.0}"#,
             r#""add":{"stock":"x"}"#,

@@ -97,6 +97,7 @@ fn robot_frame(simulation: &Simulation, status: &Status, name: &RobotName) -> Ro
         location: simulation.location(name).unwrap_or_default(),
         speed_mps: report.map_or(0.0, |report| report.speed_mps),
         direction_rad: report.map_or(0.0, |report| report.direction_rad),
+        heading_rad: simulation.pose(name).map(|pose| pose.heading_rad),
         blocked: simulation.is_blocked(name),
         emotion_state: report
             .map(|report| report.emotion_state.clone())

@@ -19,5 +19,6 @@ pub(crate) fn report(tick: Tick, proposal: Point) -> Report {
         log: Vec::new(),
         site_actions: Vec::new(),
         layer_actions: Vec::new(),
+        velocity: None,
     }
 }

@@ -16,6 +16,7 @@ from ._data import (
     LayerCell,
     LayerResult,
     Point,
+    Pose,
     PublicState,
     Rays,
     SensedBody,
@@ -26,6 +27,7 @@ from ._data import (
     SiteResult,
     StateVariables,
     Variable,
+    Velocity,
     Welcome,
 )
 from ._entry import main, take_part
@@ -76,6 +78,7 @@ __all__ = [
     "Panel",
     "Picture",
     "Point",
+    "Pose",
     "PublicState",
     "Rays",
     "RecordError",
@@ -95,6 +98,7 @@ __all__ = [
     "UnknownRobot",
     "Unreachable",
     "Variable",
+    "Velocity",
     "Verdict",
     "Welcome",
     "__version__",

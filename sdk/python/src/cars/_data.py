@@ -28,6 +28,25 @@ class Point(NamedTuple):
         return math.sqrt(dx * dx + dy * dy)
 
 
+class Velocity(NamedTuple):
+    """A velocity in the robot's own frame, as ``cmd_vel`` has it in ROS."""
+
+    linear_mps: float
+    """Speed along its heading, m/s; negative backward."""
+    angular_radps: float
+    """Turn rate, rad/s, counter-clockwise."""
+
+
+class Pose(NamedTuple):
+    """Where a robot that drives like wheels stands, where it looks, and how it moves."""
+
+    location: Point
+    heading_rad: float
+    """Its heading, radians counter-clockwise from +x."""
+    velocity: Velocity
+    """The velocity that it has reached."""
+
+
 class _SenderAndText(NamedTuple):
     sender: str
     text: str

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from ._data import LayerAction, Point, SiteAction, StateVariables
+from ._data import LayerAction, Point, SiteAction, StateVariables, Velocity
 from .panel import Panel
 
 if TYPE_CHECKING:
@@ -34,6 +34,8 @@ class Action:
     """What it does to sites, in this order; what became of it is in ``cars.site_results`` in the next tick."""
     layer_actions: Sequence[LayerAction] = ()
     """What it does to layers, in this order; what became of it is in ``cars.layer_results`` in the next tick."""
+    velocity: Velocity | None = None
+    """The velocity that it wants, if the scenario has it drive like wheels: it counts in the place of the proposal."""
 
     @classmethod
     def stay(cls, cars: Cars, **published: Any) -> Action:
@@ -46,6 +48,15 @@ class Action:
         last step, which may be shorter; at the goal it is 0."""
         proposal, speed_mps, direction_rad = cars._go(goal, speed_mps)
         return cls(proposal, speed_mps, direction_rad, **published)
+
+    @classmethod
+    def drive(cls, cars: Cars, linear_mps: float, angular_radps: float, **published: Any) -> Action:
+        """Drive forward (backward if ``linear_mps`` is negative) and turn counter-clockwise, and publish these fields. For robots
+        that the scenario gives a ``drive``, which have a ``cars.pose``: the simulator applies the robot's limits, and moves it.
+        The published speed is the one that is wanted."""
+        speed_mps, direction_rad = cars._drive(linear_mps)
+        velocity = Velocity(linear_mps, angular_radps)
+        return cls(cars.location, speed_mps, direction_rad, velocity=velocity, **published)
 
 
 class Robot(ABC):

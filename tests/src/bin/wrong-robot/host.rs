@@ -26,7 +26,7 @@ const QUEUE: usize = 4096;
 /// What arrives from the bus. Malformed messages are dropped before.
 pub(crate) enum Event {
     Clock(Clock),
-    News(TickUpdate),
+    News(Box<TickUpdate>),
     Simulator(bool),
     Reply(RobotName, Option<Reply>),
 }
@@ -200,7 +200,7 @@ impl Host {
         let key = self.keys.news(&self.name);
         let news = self.bus.subscribe(&key, move |key, bytes| {
             if let Some(news) = wrong.read(key, bytes) {
-                let _ = queue.send(Event::News(news));
+                let _ = queue.send(Event::News(Box::new(news)));
             }
         })?;
         self.declared.push(news);
@@ -304,7 +304,7 @@ impl Host {
     fn handle(&mut self, event: Event) -> Result<(), Failure> {
         match event {
             Event::Clock(clock) => self.on_clock(clock),
-            Event::News(news) => self.on_news(news),
+            Event::News(news) => self.on_news(*news),
             Event::Simulator(is_present) => {
                 if !is_present && self.wrong.is("end.gone:hasty") {
                     self.leave.get_or_insert(Leave::SimulatorGone);

@@ -195,6 +195,7 @@ impl Host {
             log,
             site_actions: Vec::new(),
             layer_actions: Vec::new(),
+            velocity: None,
         }
     }
 

@@ -406,6 +406,7 @@ fn report(epoch: Epoch, tick: Tick, generation: Generation) -> Report {
         log: Vec::new(),
         site_actions: Vec::new(),
         layer_actions: Vec::new(),
+        velocity: None,
     }
 }
 

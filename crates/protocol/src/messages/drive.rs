@@ -1,0 +1,35 @@
+//! Robots that drive like wheels.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::limits::finite;
+use super::point::Point;
+use crate::codec::FieldError;
+
+/// A velocity in the robot's own frame, as `cmd_vel` has it in ROS.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Velocity {
+    /// Speed along its heading, m/s; negative backward.
+    pub linear_mps: f64,
+    /// Turn rate, rad/s, counter-clockwise.
+    pub angular_radps: f64,
+}
+
+impl Velocity {
+    pub(super) fn check(&self) -> Result<(), FieldError> {
+        finite(self.linear_mps, "velocity.linear_mps")?;
+        finite(self.angular_radps, "velocity.angular_radps")
+    }
+}
+
+/// Where a robot that drives like wheels stands, where it looks, and how it moves.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Pose {
+    /// Its center, meters.
+    pub location: Point,
+    /// Its heading, radians counter-clockwise from +x, in [-pi, pi], in whole millionths.
+    pub heading_rad: f64,
+    /// The velocity that it has reached.
+    pub velocity: Velocity,
+}
