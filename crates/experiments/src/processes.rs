@@ -112,14 +112,14 @@ pub(super) fn read(
 ) -> Result<(), LabError> {
     let recording = Recording::open(&run.file(RECORDING))?;
     let mut ticks = Ticks::of(recording);
-    let mut states = LastStates::default();
+    let mut states = LastStates::new(scenario);
     let mut sites = SiteStates::new(&scenario.setting());
     while let Some(tick) = ticks.next_tick()? {
         let number = tick.tick();
         let mut events = tick.events;
         // The end of the run is observed by itself, as it is where robots run in this process.
         let end = events.pop_if(|event| matches!(event, Event::End { .. }));
-        states.note(tick.reports, tick.frame.robots);
+        states.note(number, tick.reports, tick.frame.robots);
         sites.note(&events);
 
         let has_ended = end.is_some();
@@ -133,6 +133,7 @@ pub(super) fn read(
                 events: &events,
                 state: &|robot| states.of(robot),
                 site: &|site| sites.of(site),
+                layer: &|layer| states.layer(layer),
             });
         }
         if has_ended {

@@ -294,6 +294,7 @@ fn follow_with(
             events: &record.events,
             state: &|robot| simulation.robot_state(robot),
             site: &|site| simulation.site_state(site),
+            layer: &|layer| simulation.layers().cells(layer),
         });
         Ok(())
     })?;

@@ -36,7 +36,7 @@ pub fn judge(
     expectations: &[Expectation],
 ) -> Result<Verdicts, LabError> {
     let mut record = Record::of_events(&files.events)?;
-    let mut recorded = ReportsByTick::open(files, expectations)?;
+    let mut recorded = ReportsByTick::open(files, scenario, expectations)?;
     let setting = scenario.setting();
     let mut watches = Monitors::new(expectations, &setting);
     let mut sites = SiteStates::new(&setting);
@@ -61,6 +61,11 @@ pub fn judge(
             events: &entry.events,
             state: &|robot| recorded.as_ref().and_then(|states| states.last.of(robot)),
             site: &|site| sites.of(site),
+            layer: &|layer| {
+                recorded
+                    .as_ref()
+                    .and_then(|states| states.last.layer(layer))
+            },
         });
         verdicts.note(&judged);
     }
@@ -97,7 +102,11 @@ struct ReportsByTick {
 
 impl ReportsByTick {
     /// Opens the recording, if the expectations need it.
-    fn open(files: &EpochFiles, expectations: &[Expectation]) -> Result<Option<Self>, LabError> {
+    fn open(
+        files: &EpochFiles,
+        scenario: &Scenario,
+        expectations: &[Expectation],
+    ) -> Result<Option<Self>, LabError> {
         let mut needing = expectations.iter().filter(|one| one.needs_states());
         let Some(first) = needing.next() else {
             return Ok(None);
@@ -114,7 +123,7 @@ impl ReportsByTick {
         let recording = Recording::open(&files.recording)?;
         Ok(Some(Self {
             ticks: Ticks::of(recording),
-            last: LastStates::default(),
+            last: LastStates::new(scenario),
         }))
     }
 
@@ -124,7 +133,7 @@ impl ReportsByTick {
             return Ok(false);
         };
 
-        self.last.note(tick.reports, tick.frame.robots);
+        self.last.note(tick.tick(), tick.reports, tick.frame.robots);
         Ok(true)
     }
 }

@@ -43,7 +43,7 @@ pub enum TickConditionError {
     /// It is not one of the conditions that there are.
     #[error(
         "a condition is an event (`event = …`), a state of a robot or of several (`robot = …` or `robots = …` with `behavior`, \
-         `emotion` or `variable`), a state of a site or of several (`site = …` or `sites = …` with `variable`), a number of places (`walked`, `distance`, `inside`, `covered`, `components`), `overlap`, \
+         `emotion` or `variable`), a state of a site or of several (`site = …` or `sites = …` with `variable`), a number of places (`walked`, `distance`, `inside`, `covered`, `components`) or of a `layer`, `overlap`, \
          `stalled`, or several conditions (`all = […]`)"
     )]
     Unknown,
@@ -205,6 +205,8 @@ struct ConditionTable {
     covered: Option<PlaceTable>,
     #[serde(skip_serializing_if = "Option::is_none")]
     components: Option<PlaceTable>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    layer: Option<PlaceTable>,
     #[serde(skip_serializing_if = "Option::is_none")]
     all: Option<Vec<TickCondition>>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -376,6 +378,7 @@ impl ConditionTable {
             self.inside.take(),
             self.covered.take(),
             self.components.take(),
+            self.layer.take(),
         ];
         let mut places = PlaceKind::ALL
             .into_iter()
@@ -608,6 +611,7 @@ impl ConditionTable {
                 PlaceKind::Inside => &mut self.inside,
                 PlaceKind::Covered => &mut self.covered,
                 PlaceKind::Components => &mut self.components,
+                PlaceKind::Layer => &mut self.layer,
             };
             *place = Some(table);
             return;
@@ -643,7 +647,8 @@ impl ConditionTable {
             }
             RunQuantity::Between { .. }
             | RunQuantity::Covered { .. }
-            | RunQuantity::Components { .. } => {}
+            | RunQuantity::Components { .. }
+            | RunQuantity::Layer { .. } => {}
         }
     }
 

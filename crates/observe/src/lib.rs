@@ -4,6 +4,7 @@ mod comparison;
 mod condition;
 pub mod expect;
 mod expression;
+mod layers;
 pub mod measure;
 mod pattern;
 mod places;
@@ -47,6 +48,8 @@ pub struct RunSetting {
     pub roster: Vec<RobotName>,
     /// The sites, with their states at the start: the types of their variables never change.
     pub sites: BTreeMap<String, StateVariables>,
+    /// Names of the layers.
+    pub layers: Vec<String>,
 }
 
 impl RunSetting {
@@ -75,6 +78,8 @@ pub struct Observation<'a> {
     pub state: &'a dyn Fn(&RobotName) -> Option<RobotState<'a>>,
     /// The state of a site after the tick.
     pub site: &'a dyn Fn(&str) -> Option<&'a StateVariables>,
+    /// The numbers of the cells of a layer after the tick.
+    pub layer: &'a dyn Fn(&str) -> Option<&'a [f64]>,
 }
 
 impl Observation<'_> {

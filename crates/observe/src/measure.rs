@@ -315,7 +315,7 @@ pub enum MeasureError {
     /// It has no kind, or several.
     #[error(
         "a measure has exactly one of `summary`, `count`, `time`, `between`, `share`, `variable`, `walked`, `distance`, `inside`, \
-         `covered`, `components`, `stalled`, `jain`, `ratio` and `expression`; a part of a ratio is neither ratio nor expression"
+         `covered`, `components`, `layer`, `stalled`, `jain`, `ratio` and `expression`; a part of a ratio is neither ratio nor expression"
     )]
     NotOne,
     /// It names a part of the run and counts no events.
@@ -385,6 +385,7 @@ struct RawMeasure {
     inside: Option<Spanned<PlaceTable>>,
     covered: Option<Spanned<PlaceTable>>,
     components: Option<Spanned<PlaceTable>>,
+    layer: Option<Spanned<PlaceTable>>,
     stalled: Option<Spanned<Stalled>>,
     jain: Option<Spanned<RawJain>>,
     ratio: Option<Spanned<Ratio>>,
@@ -407,6 +408,7 @@ struct RawRatioTerm {
     inside: Option<Spanned<PlaceTable>>,
     covered: Option<Spanned<PlaceTable>>,
     components: Option<Spanned<PlaceTable>>,
+    layer: Option<Spanned<PlaceTable>>,
     stalled: Option<Spanned<Stalled>>,
     jain: Option<Spanned<RawJain>>,
 }
@@ -478,6 +480,7 @@ impl TryFrom<RawMeasure> for Measure {
             inside: raw.inside,
             covered: raw.covered,
             components: raw.components,
+            layer: raw.layer,
             stalled: raw.stalled,
             jain: raw.jain,
         };
@@ -551,6 +554,7 @@ impl RawRatioTerm {
             place(PlaceKind::Inside, self.inside)?,
             place(PlaceKind::Covered, self.covered)?,
             place(PlaceKind::Components, self.components)?,
+            place(PlaceKind::Layer, self.layer)?,
             self.stalled
                 .map(|stalled| spanned(stalled, MeasureSource::Stalled)),
             self.jain.map(|jain| spanned(jain, RawJain::source)),

@@ -700,6 +700,7 @@ mod tests {
             radio_range_m: None,
             roster: roster.to_vec(),
             sites: BTreeMap::new(),
+            layers: Vec::new(),
         }
     }
 
@@ -773,6 +774,7 @@ mod tests {
                 })
             },
             site: &|_| None,
+            layer: &|_| None,
         });
     }
 

@@ -1,4 +1,4 @@
-//! Numbers of robots, teams, places and sites, one in each tick: a condition compares it, and a measure takes it over a run.
+//! Numbers of robots, teams, places, sites and layers, one in each tick: a condition compares it, and a measure takes it over a run.
 //!
 //! [`RunQuantity`] is what there is to look at: what comes with another kind of subject is added there.
 
@@ -11,7 +11,8 @@ use protocol::pattern::matches;
 use protocol::{Event, RobotName, RobotPattern};
 use serde::{Deserialize, Serialize};
 
-use crate::comparison::{ValueTest, in_words, number_of, type_in_words};
+use crate::comparison::{TestError, TestTable, ValueTest, in_words, number_of, type_in_words};
+use crate::layers;
 use crate::places::{CoveredArea, FieldRegion, components, least_distance_m};
 use crate::words::{Word, WordKind};
 use crate::{Observation, RobotState, RunSetting};
@@ -65,6 +66,15 @@ pub enum RunQuantity {
         /// Name of the variable.
         variable: String,
         /// If it is given: the number of each is whether it passes. Otherwise it is that of the variable; a flag is 1 or 0.
+        test: Option<ValueTest>,
+    },
+    /// The cells of a layer, combined to one number.
+    Layer {
+        /// Name of the layer.
+        name: String,
+        /// How the numbers of the cells are combined.
+        by: By,
+        /// If it is given: the number of each cell is whether it passes.
         test: Option<ValueTest>,
     },
 }
@@ -178,6 +188,9 @@ pub(crate) enum Undefined {
     /// A site does not have the variable, or it is of another type.
     #[error("the site {0} has no such `{1}` in its state")]
     NoSite(String, String),
+    /// The run has no such layer.
+    #[error("there is no layer {0}")]
+    NoLayer(String),
     /// A share is negative.
     #[error("the number of {0} is {1}, and shares are 0 or more")]
     Negative(String, f64),
@@ -248,6 +261,20 @@ pub enum QuantityError {
     /// The field would have too many cells, or none.
     #[error("{0}")]
     Cells(String),
+    /// What the cells of a layer are compared with is wrong.
+    #[error(transparent)]
+    Test(#[from] TestError),
+    /// The cells of a layer cannot be combined in this way.
+    #[error("the cells of a `layer` become one number by {0}: write it as `by`")]
+    ByCells(&'static str),
+    /// A layer that the run does not have.
+    #[error("no layer of this scenario is called {name}; {known}")]
+    UnknownLayer {
+        /// The name.
+        name: String,
+        /// The layers that there are, in words.
+        known: String,
+    },
     /// A site, or a pattern of sites, that the run does not have.
     #[error("no site of this scenario is called {name}; {known}")]
     UnknownSite {
@@ -288,9 +315,10 @@ pub(crate) enum PlaceKind {
     Inside,
     Covered,
     Components,
+    Layer,
 }
 
-/// A number of places as written.
+/// A number of places or of a layer as written.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(crate) struct PlaceTable {
@@ -314,6 +342,12 @@ pub(crate) struct PlaceTable {
     now: bool,
     #[serde(skip_serializing_if = "Option::is_none")]
     range: Option<Length>,
+    /// Of a layer.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    name: Option<String>,
+    /// If it is given: the number of each cell is whether it passes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    each: Option<TestTable>,
     /// In measures only: a condition is about each tick.
     #[serde(rename = "as", skip_serializing_if = "Option::is_none")]
     pub(crate) number: Option<OfValues>,
@@ -339,12 +373,13 @@ struct DiscTable {
 }
 
 impl PlaceKind {
-    pub(crate) const ALL: [Self; 5] = [
+    pub(crate) const ALL: [Self; 6] = [
         Self::Walked,
         Self::Distance,
         Self::Inside,
         Self::Covered,
         Self::Components,
+        Self::Layer,
     ];
 
     /// Its key in files.
@@ -355,6 +390,7 @@ impl PlaceKind {
             Self::Inside => "inside",
             Self::Covered => "covered",
             Self::Components => "components",
+            Self::Layer => "layer",
         }
     }
 
@@ -366,6 +402,7 @@ impl PlaceKind {
             Self::Inside => &["rectangle", "disc"],
             Self::Covered => &["radius", "cell", "now"],
             Self::Components => &["range"],
+            Self::Layer => &["name", "each"],
         }
     }
 }
@@ -381,6 +418,8 @@ impl PlaceTable {
             ("cell", self.cell.is_some()),
             ("now", self.now),
             ("range", self.range.is_some()),
+            ("name", self.name.is_some()),
+            ("each", self.each.is_some()),
         ] {
             if is_given && !kind.keys().contains(&name) {
                 return Err(QuantityError::Foreign(key, name));
@@ -434,10 +473,32 @@ impl PlaceTable {
                 },
                 team: whole(key, self.robot.as_ref(), self.robots, self.by)?,
             }),
+            PlaceKind::Layer => self.check_layer(),
         }
     }
 
-    /// The table of a number of places; `None` for another one.
+    fn check_layer(self) -> Result<RunQuantity, QuantityError> {
+        let key = PlaceKind::Layer.key();
+        for (name, is_given) in [
+            ("robot", self.robot.is_some()),
+            ("robots", self.robots.is_some()),
+        ] {
+            if is_given {
+                return Err(QuantityError::Foreign(key, name));
+            }
+        }
+
+        let test = match self.each {
+            Some(table) => Some(table.check()?.ok_or(TestError::Nothing)?),
+            None => None,
+        };
+        let by = layers::check(self.by, test.is_some()).map_err(QuantityError::ByCells)?;
+        let name = self.name;
+        let name = name.ok_or(QuantityError::Lacks(key, "the `name` of a layer"))?;
+        Ok(RunQuantity::Layer { name, by, test })
+    }
+
+    /// The table of a number of places or of a layer; `None` for another one.
     pub(crate) fn of(quantity: &RunQuantity) -> Option<(PlaceKind, Self)> {
         let mut table = Self::default();
         let kind = match quantity {
@@ -490,6 +551,12 @@ impl PlaceTable {
                 PlaceKind::Components
             }
             RunQuantity::Sites { .. } => return None,
+            RunQuantity::Layer { name, by, test } => {
+                table.name = Some(name.clone());
+                table.by = Some(*by);
+                table.each = test.as_ref().map(|test| TestTable::of(Some(test)));
+                PlaceKind::Layer
+            }
         };
         Some((kind, table))
     }
@@ -706,6 +773,10 @@ impl RunQuantity {
                 by: Some(By::All | By::Any),
                 ..
             }
+            | Self::Layer {
+                by: By::All | By::Any,
+                ..
+            }
             | Self::Sites {
                 by: None,
                 test: Some(_),
@@ -755,14 +826,14 @@ impl RunQuantity {
             .unwrap_or_default()
     }
 
-    /// The robots; `None` for a number of sites.
+    /// The robots; `None` for a number of sites or a layer.
     fn team(&self) -> Option<&Team> {
         match self {
             Self::Each { team, .. }
             | Self::Between { team, .. }
             | Self::Covered { team, .. }
             | Self::Components { team, .. } => Some(team),
-            Self::Sites { .. } => None,
+            Self::Sites { .. } | Self::Layer { .. } => None,
         }
     }
 
@@ -831,6 +902,12 @@ impl RunQuantity {
                 test,
                 ..
             } => check_sites(sites, variable, test.as_ref(), setting),
+            Self::Layer { name, .. } if !setting.layers.contains(name) => {
+                Err(QuantityError::UnknownLayer {
+                    name: name.clone(),
+                    known: in_words("it has", setting.layers.iter().map(String::as_str)),
+                })
+            }
             _ => Ok(()),
         }
     }
@@ -961,6 +1038,13 @@ impl fmt::Display for RunQuantity {
                     Some(by) => write!(f, " ({by})"),
                     None => Ok(()),
                 }
+            }
+            Self::Layer { name, by, test } => {
+                write!(f, "the cells of the layer {name}")?;
+                if let Some(test) = test {
+                    write!(f, " {test}")?;
+                }
+                write!(f, " ({by})")
             }
         }
     }
@@ -1093,6 +1177,11 @@ impl QuantityGauge {
                 };
                 self.of_sites = Some(value);
                 Ok(value)
+            }
+            RunQuantity::Layer { name, by, test } => {
+                let cells = (seen.layer)(name);
+                let value = cells.and_then(|cells| layers::combine(cells, *by, test.as_ref()));
+                value.ok_or_else(|| Undefined::NoLayer(name.clone()))
             }
         }
     }

@@ -223,6 +223,7 @@ mod tests {
             events: &events,
             state: &|_| None,
             site: &|_| None,
+            layer: &|_| None,
         });
 
         let unheard = words.unheard().into_iter();

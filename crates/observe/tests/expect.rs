@@ -49,6 +49,7 @@ fn setting() -> RunSetting {
         radio_range_m: None,
         roster: roster(),
         sites: BTreeMap::new(),
+        layers: Vec::new(),
     }
 }
 
@@ -102,6 +103,7 @@ impl Run {
                 })
             },
             site: &|_| None,
+            layer: &|_| None,
         });
         self.tick += 1;
         judgment
@@ -498,6 +500,7 @@ fn each_expectation_is_judged_once() {
             events: &events,
             state: &|_| None,
             site: &|_| None,
+            layer: &|_| None,
         }));
     }
     judged.extend(watches.end(End::Finished));

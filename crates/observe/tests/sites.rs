@@ -36,6 +36,7 @@ fn setting() -> RunSetting {
         body_m: 0.5,
         roster: vec![RobotName::new("R1").unwrap(), RobotName::new("R2").unwrap()],
         sites,
+        layers: Vec::new(),
     }
 }
 
@@ -61,6 +62,7 @@ fn show(ticks: &[Vec<Event>], mut see: impl FnMut(&Observation<'_>)) {
             events,
             state: &|_| None,
             site: &|site| states.of(site),
+            layer: &|_| None,
         });
     }
 }

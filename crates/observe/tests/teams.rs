@@ -43,6 +43,7 @@ fn setting(robots: usize) -> RunSetting {
         radio_range_m: Some(3.0),
         roster: (0..robots).map(robot).collect(),
         sites: BTreeMap::new(),
+        layers: Vec::new(),
     }
 }
 
@@ -104,6 +105,7 @@ impl Run {
                     })
                 },
                 site: &|_| None,
+                layer: &|_| None,
             });
         }
     }

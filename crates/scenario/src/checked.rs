@@ -193,6 +193,7 @@ impl Scenario {
             radio_range_m: self.network.radio.map(|radio| radio.range_m),
             roster: self.roster(),
             sites: start_states(&self.sites),
+            layers: self.layers.keys().cloned().collect(),
         }
     }
 

@@ -265,6 +265,7 @@ impl ScenarioFile {
             radio_range_m: network.radio.map(|radio| radio.range_m),
             roster: robots.keys().cloned().collect(),
             sites: start_states(&sites),
+            layers: layers.keys().cloned().collect(),
         };
         let expectations = expect::check(self.expectations, &setting, source)?;
         let end_when = expect::check_end(self.end_when, &setting, source)?;

@@ -476,6 +476,7 @@ impl Simulation {
             events: &self.events,
             state: &|name| self.robot_state(name),
             site: &|name| self.site_state(name),
+            layer: &|name| self.layers.cells(name),
         });
         self.watches = watches;
         self.events.extend(judged);
@@ -492,6 +493,7 @@ impl Simulation {
             events: &self.events,
             state: &|name| self.robot_state(name),
             site: &|name| self.site_state(name),
+            layer: &|name| self.layers.cells(name),
         });
         self.end_when = Some(end_when);
     }

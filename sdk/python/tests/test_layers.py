@@ -34,6 +34,17 @@ diffuse = 0.07
 name = "something is swept"
 eventually = { event = "layer_changed", layer = "dust" }
 within = "15 s"
+[[expect]]
+name = "much is swept"
+eventually = { layer = { name = "dust", by = "sum" }, below = 100 }
+within = "15 s"
+[[expect]]
+name = "the trail fades"
+never = { layer = { name = "trail", by = "mean", each = { above = 0.2 } }, above = 0.9 }
+[[expect]]
+name = "the trail is long"
+eventually = { layer = { name = "trail", by = "count", each = { above = 0.05 } }, at_least = 12 }
+within = "15 s"
 [[robot]]
 name = "A"
 at = ["3 m", "4 m"]
@@ -64,6 +75,11 @@ def test_the_same_run_in_one_process_and_as_programs_of_two_languages(lab: Lab, 
     assert own.summary["digest"] in launched[-1]
 
     assert cars.run(scenario, robots=both, out=lab.folder, name="judged").verdict == "pass"
+
+    # To judge the record, layers are computed again from what robots reported: to the last bit, as the reasons say.
+    judged = " ".join(lab.cars("expect", "judged", "--out", str(lab.folder)).split())
+    for event in lab.of_kind("judged", "judged"):
+        assert event["because"] in judged
 
     changed = lab.of_kind("own", "layer_changed")
     assert {event["layer"] for event in changed} == {"dust", "trail"}

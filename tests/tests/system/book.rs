@@ -202,7 +202,9 @@ fn the_examples_of_files_are_right() {
     let complete = parts.remove(0);
     parts.extend(examples("faults.md"));
     parts.extend(examples("expectations.md"));
-    let mut files = vec![complete.clone()];
+    let mut layers = examples("layers.md");
+    let mut files = vec![complete.clone(), layers.remove(0)];
+    parts.extend(layers);
     for part in parts {
         // A key before the tables replaces the one of the complete example.
         if part.contains(CONTINUE) {

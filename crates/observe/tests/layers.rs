@@ -1,0 +1,222 @@
+//! Layers in conditions, expectations and measures.
+
+#![expect(
+    clippy::unwrap_used,
+    reason = "a test that cannot set up its subject fails"
+)]
+
+use std::collections::BTreeMap;
+
+use observe::{
+    Evaluation, Expectation, Measure, Measured, Observation, Probe, RunSetting, TickCondition,
+};
+use protocol::RobotName;
+use serde::{Deserialize, Serialize};
+
+fn setting() -> RunSetting {
+    RunSetting {
+        tick_s: 0.5,
+        ticks: 20,
+        field_m: [4.0, 2.0],
+        body_m: 0.5,
+        roster: vec![RobotName::new("R1").unwrap()],
+        sites: BTreeMap::new(),
+        layers: vec!["dust".to_owned(), "heat".to_owned()],
+    }
+}
+
+/// The dust after each tick.
+const DUST: [[f64; 4]; 3] = [
+    [4.0, 2.0, 0.0, 1.0],
+    [3.0, 1.0, 0.0, 0.0],
+    [1.0, 0.0, -1.0, 0.0],
+];
+
+/// Shows a run with this dust, whose last tick is shown again at the end.
+fn show(mut see: impl FnMut(&Observation<'_>)) {
+    for tick in [0, 1, 2, 2] {
+        see(&Observation {
+            tick: tick as u64,
+            tick_s: 0.5,
+            events: &[],
+            state: &|_| None,
+            site: &|_| None,
+            layer: &|name| (name == "dust").then_some(&DUST[tick][..]),
+        });
+    }
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+struct File {
+    c: TickCondition,
+}
+
+fn condition(text: &str) -> Result<TickCondition, String> {
+    let file: Result<File, _> = toml::from_str(&format!("c = {text}"));
+    let condition = file.map_err(|error| error.message().to_owned())?.c;
+    condition
+        .check(&setting())
+        .map_err(|error| error.to_string())?;
+    Ok(condition)
+}
+
+/// The ticks in which a condition holds.
+fn holds_in(text: &str) -> Vec<u64> {
+    let condition = condition(text).unwrap();
+    let mut evaluation = Evaluation::new(&condition, &setting());
+    let mut ticks = Vec::new();
+    show(|seen| {
+        if evaluation.holds(seen).is_some() && !ticks.contains(&seen.tick) {
+            ticks.push(seen.tick);
+        }
+    });
+    ticks
+}
+
+fn measured(text: &str) -> Measured {
+    let measure: Measure = toml::from_str(&format!("name = 'x'\n{text}")).unwrap();
+    measure.check(&setting()).unwrap();
+    let mut probe = Probe::new(&measure, &setting(), (0.0, 1.0));
+    show(|seen| probe.observe(seen));
+    probe.measured(&serde_json::Value::Null, &BTreeMap::new())
+}
+
+#[test]
+fn a_condition_compares_one_number_of_the_cells() {
+    for (text, ticks) in [
+        (
+            "{ layer = { name = 'dust', by = 'sum' }, at_most = 4 }",
+            vec![1, 2],
+        ),
+        (
+            "{ layer = { name = 'dust', by = 'mean' }, is = 1.75 }",
+            vec![0],
+        ),
+        (
+            "{ layer = { name = 'dust', by = 'max' }, above = 3 }",
+            vec![0],
+        ),
+        (
+            "{ layer = { name = 'dust', by = 'min' }, below = 0 }",
+            vec![2],
+        ),
+        (
+            "{ layer = { name = 'dust', by = 'mean', each = { below = 1 } }, at_least = 0.5 }",
+            vec![1, 2],
+        ),
+        (
+            "{ layer = { name = 'dust', by = 'count', each = { above = 0 } }, is = 2 }",
+            vec![1],
+        ),
+        (
+            "{ layer = { name = 'dust', by = 'all', each = { at_most = 1 } } }",
+            vec![2],
+        ),
+        (
+            "{ layer = { name = 'dust', by = 'any', each = { is = [4, 5] } } }",
+            vec![0],
+        ),
+        (
+            "{ layer = { name = 'dust', by = 'sum' }, at_most = 4, for = '0.5 s' }",
+            vec![2],
+        ),
+        // It has no cells to be seen.
+        (
+            "{ layer = { name = 'heat', by = 'sum' }, at_least = 0 }",
+            vec![],
+        ),
+    ] {
+        assert_eq!(holds_in(text), ticks, "{text}");
+        let written = toml::to_string(&File {
+            c: condition(text).unwrap(),
+        })
+        .unwrap();
+        let again: File = toml::from_str(&written).unwrap();
+        assert_eq!(again.c, condition(text).unwrap(), "{written}");
+    }
+}
+
+#[test]
+fn a_measure_takes_one_number_of_the_cells_over_the_run() {
+    for (text, value) in [
+        ("layer = { name = 'dust', by = 'sum' }", 0.0),
+        ("layer = { name = 'dust', by = 'sum', as = 'max' }", 7.0),
+        (
+            "layer = { name = 'dust', by = 'mean', each = { below = 1 }, as = 'end' }",
+            0.75,
+        ),
+        ("layer = { name = 'dust', by = 'max', as = 'min' }", 1.0),
+    ] {
+        assert_eq!(measured(text), Measured::Value { value }, "{text}");
+    }
+    let time = "time = { to = { layer = { name = 'dust', by = 'sum' }, below = 5 } }";
+    assert_eq!(measured(time), Measured::Reached { time_s: 0.5 });
+}
+
+#[test]
+fn what_no_layer_has_is_refused_with_its_reason() {
+    for (text, reason) in [
+        (
+            "{ layer = { name = 'mist', by = 'sum' }, above = 1 }",
+            "no layer of this scenario is called mist; it has dust, heat",
+        ),
+        (
+            "{ layer = { name = 'dust' }, above = 1 }",
+            "become one number by \"sum\", \"mean\", \"max\" or \"min\"",
+        ),
+        (
+            "{ layer = { name = 'dust', by = 'jain' }, above = 1 }",
+            "become one number by \"sum\"",
+        ),
+        (
+            "{ layer = { name = 'dust', by = 'count' }, above = 1 }",
+            "become one number by \"sum\"",
+        ),
+        (
+            "{ layer = { name = 'dust', by = 'sum', each = { above = 1 } }, above = 1 }",
+            "by \"mean\", \"count\", \"all\" or \"any\"",
+        ),
+        (
+            "{ layer = { name = 'dust', by = 'mean', each = {} }, above = 1 }",
+            "`each` needs",
+        ),
+        (
+            "{ layer = { by = 'sum' }, above = 1 }",
+            "`layer` needs the `name` of a layer",
+        ),
+        (
+            "{ layer = { name = 'dust', robots = '*', by = 'sum' }, above = 1 }",
+            "`layer` has no `robots`",
+        ),
+        (
+            "{ layer = { name = 'dust', range = '1 m', by = 'sum' }, above = 1 }",
+            "`layer` has no `range`",
+        ),
+        (
+            "{ covered = { robots = '*', radius = '1 m', cell = '1 m', name = 'dust' }, above = 1 }",
+            "`covered` has no `name`",
+        ),
+        (
+            "{ layer = { name = 'dust', by = 'sum' } }",
+            "`layer` needs `at_least`",
+        ),
+        (
+            "{ layer = { name = 'dust', by = 'all', each = { above = 1 } }, above = 1 }",
+            "is true or false",
+        ),
+    ] {
+        let error = condition(text).unwrap_err();
+        assert!(error.contains(reason), "{text}: {error}");
+    }
+}
+
+#[test]
+fn expectations_on_layers_need_what_robots_reported() {
+    #[derive(Deserialize)]
+    struct Expectations {
+        expect: Vec<Expectation>,
+    }
+    let text = "[[expect]]\nname = 'clean'\neventually = { layer = { name = 'dust', by = 'max' }, below = 1 }\nwithin = '5 s'\n";
+    let file: Expectations = toml::from_str(text).unwrap();
+    assert!(file.expect[0].needs_states());
+}
