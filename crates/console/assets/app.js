@@ -244,7 +244,7 @@ function choose(robot) {
   panels.chosen = chosen;
   plan.touch();
   panels.render();
-  markStale("strips");
+  markStale("bar", "strips");
 
   if (!chosen) return;
   for (const part of ["line", "panel"]) {
@@ -304,6 +304,10 @@ function drawBar() {
     plan.touch();
     drawBar();
   });
+  const { walls, sensing } = store.frame?.static_world ?? {};
+  box("legend-wall").hidden = !walls?.length;
+  box("legend-view").hidden = !plan.chosen || !sensing?.field_of_view_rad;
+  box("legend-rays").hidden = !plan.chosen || !sensing?.rays;
   document.body.dataset.time = isRecording() ? "recording" : player.isLive ? "live" : "past";
   const isPast = isRecording() || store.replayOf !== null;
   box("tab-setup").hidden = isPast;
@@ -489,6 +493,7 @@ Object.assign(window, {
     fps: () => plan.fps(),
     frame: () => store.frame,
     flights: () => (store.frame ? store.flights.at(store.frame.tick, store.frame.tick_s) : []),
+    rays: () => plan.rays(),
     history: () => store.history,
     lines: () => store.log.length,
     log: () => store.log,

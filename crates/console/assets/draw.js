@@ -3,7 +3,7 @@
 
 import { robotColor, stateColors, stateLook } from "./palette.js";
 import { initials } from "./roster.js";
-import { arrow, barrier, cross, disk, envelope, line, nose, ring, text } from "./shapes.js";
+import { arrow, barrier, cross, disk, envelope, line, nose, notch, ring, text } from "./shapes.js";
 
 /** @typedef {import("./camera.js").Camera} Camera */
 /** @typedef {import("./theme.js").Theme} Theme */
@@ -291,16 +291,18 @@ export function body({ context, theme }, { letters, radius, presence, emotion, h
 }
 
 /**
- * Where a robot goes, and what is in its way.
+ * Where a robot goes, and what is in its way. One that stands has a tick mark, if it looks into its direction.
  * @param {Omit<Pen, "camera">} pen
  * @param {Drawn} robot
  * @param {Look} look
  * @param {number} x
  * @param {number} y
+ * @param {boolean} looksAhead
  */
-export function course({ context, theme }, { presence, blocked, direction_rad, speed_mps }, { radius }, x, y) {
+export function course({ context, theme }, { presence, blocked, direction_rad, speed_mps }, { radius }, x, y, looksAhead) {
   if (presence !== "here") return;
   if (speed_mps > 0) nose(context, x, y, radius + RING_PX, direction_rad, theme.robot);
+  else if (looksAhead) notch(context, x, y, radius + RING_PX, direction_rad, theme.robot);
   if (blocked) barrier(context, x, y, radius + RING_PX, direction_rad, theme.warning);
 }
 

@@ -8,7 +8,9 @@ import { faceShapes } from "./face.js";
 import { intensityOf } from "./known.js";
 import { drawScale, scaleWords, shownLayer } from "./layers.js";
 import { arrow, barrier, cross, disk, envelope, line, ring } from "./shapes.js";
+import { drawFan, drawSector } from "./senses.js";
 import { diamond, kindsInLegend } from "./sites.js";
+import { WALL_PX } from "./solids.js";
 import { readTheme } from "./theme.js";
 import { seconds } from "./units.js";
 import { Vector } from "./vector.js";
@@ -197,8 +199,8 @@ function faceStyles({ skin, ink }) {
  * The signs of the plan, drawn by what draws them there.
  * @type {(paper: Vector, words: Words, theme: Theme, frame: WorldFrame | null, plan: import("./plan.js").Plan, y: number) => number} where it ends
  */
-function legend(paper, words, theme, frame, { hasTrails, chosenLayer }, y) {
-  const { robots = [], guest_moods: moods } = frame ?? {};
+function legend(paper, words, theme, frame, { hasTrails, chosen, chosenLayer }, y) {
+  const { robots = [], guest_moods: moods, static_world } = frame ?? {};
   const x = PAD_PX + 12;
   /** @type {(draw: (y: number) => void, label: string) => void} */
   const row = (sign, label) => {
@@ -232,6 +234,21 @@ function legend(paper, words, theme, frame, { hasTrails, chosenLayer }, y) {
     paper.lineWidth = 1;
     paper.strokeRect(x - 5.5, at - 5.5, 11, 11);
   }, "obstacle");
+  if (static_world?.walls?.length) {
+    row((at) => {
+      paper.strokeStyle = theme.obstacle;
+      paper.lineWidth = WALL_PX;
+      paper.beginPath();
+      line(paper, x - 8, at, x + 8, at);
+      paper.stroke();
+    }, "wall");
+  }
+  const sensing = chosen ? static_world?.sensing : undefined;
+  if (sensing?.field_of_view_rad) row((at) => drawSector({ context: paper, theme }, x - 8, at, 18, 0, 0.9), `overlooked by ${chosen}`);
+  if (sensing?.rays) {
+    const ends = [-0.4, 0, 0.4].map((angle) => ({ x: 16 * Math.cos(angle), y: 16 * Math.sin(angle) }));
+    row((at) => drawFan({ context: paper, theme }, x - 8, at, ends.map((end) => ({ x: x - 8 + end.x, y: at + end.y, isHit: true }))), `rays of ${chosen}`);
+  }
   for (const { kind, color } of kindsInLegend(frame?.sites ?? [])) {
     row((at) => diamond({ context: paper, theme }, color, false, x, at, 5.5), kind);
   }

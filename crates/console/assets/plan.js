@@ -5,9 +5,11 @@ import { Camera } from "./camera.js";
 import { Crowd } from "./crowd.js";
 import * as draw from "./draw.js";
 import { Gestures } from "./gestures.js";
-import { drawLayer, shownLayer } from "./layers.js";
+import { shownLayer } from "./layers.js";
 import { Motion } from "./motion.js";
+import { drawSenses, haveDirections, raysOf } from "./senses.js";
 import { drawSites } from "./sites.js";
+import { drawGround, footprint, shapeOf, sizeOf } from "./solids.js";
 import { Ground, Sprites } from "./sprites.js";
 import { onThemeChange, readTheme } from "./theme.js";
 
@@ -55,6 +57,9 @@ export class Plan {
     /** @type {draw.Pen} */
     this.pen = { context, camera: this.camera, theme: readTheme() };
     this.hasTrails = false;
+    /** What stands in the draft that was painted last, and of what.
+     * @type {{key: string, known: WorldFrame["static_world"], standing: import("./solids.js").Standing}} */
+    this.drafted = { key: "", known: undefined, standing: { obstacles: [], body_m: 1 } };
     /** @type {string | null} */
     this.chosen = null;
     /** The layer that was chosen in the legend. @type {string | null} */
@@ -155,22 +160,21 @@ export class Plan {
    */
   paintRun(frame, now_ms) {
     this.lastDraw_ms = now_ms;
-    this.paintGround(frame.obstacles, frame.body_m, true, shownLayer(frame.layers, this.chosenLayer));
+    this.paintGround(frame, true, shownLayer(frame.layers, this.chosenLayer));
     this.paintMoving(this.pen, frame, this.drawRobot);
   }
 
   /**
-   * The field with its obstacles, and the guests on it.
-   * @param {[number, number][]} obstacles
-   * @param {number} body_m
+   * The field with what stands on it, and the guests.
+   * @param {import("./solids.js").Standing} standing
    * @param {boolean} hasGuests
    * @param {import("./types/messages.js").LayerFrame | null} layer
    */
-  paintGround(obstacles, body_m, hasGuests, layer) {
+  paintGround(standing, hasGuests, layer) {
     const { camera, theme } = this.pen;
-    const radius = draw.guestRadius(camera, body_m);
+    const radius = draw.guestRadius(camera, standing.body_m);
     const guests = hasGuests ? draw.guestsAt(camera, this.motion.now_m, radius) : [];
-    this.ground.renew(this.pen, this.canvas, obstacles, body_m, this.step_m(camera), layer);
+    this.ground.renew(this.pen, this.canvas, standing, this.step_m(camera), layer);
     if (this.crowd.takes(guests.length / 2, radius)) {
       this.crowd.draw(this.context, this.ground.pixels(), theme, guests, radius, this.sprites.ratio);
       return;
@@ -188,6 +192,7 @@ export class Plan {
    */
   paintMoving(pen, frame, drawRobot) {
     const { motion } = this;
+    if (this.chosen) drawSenses(pen, frame, this.chosen, motion);
     draw.guestMoods(pen, motion.now_m, frame.guest_moods, draw.guestRadius(pen.camera, frame.body_m));
     drawSites(pen, frame.sites ?? [], frame.body_m);
     if (this.hasTrails) this.paintTrails(pen, frame);
@@ -204,8 +209,10 @@ export class Plan {
 
     for (const robot of frame.robots) {
       const marks = { isLate: late.has(robot.name), isChosen: robot.name === this.chosen };
-      const look = draw.lookOf(robot, pen.camera, frame.body_m, marks);
+      const shape = shapeOf(frame, robot.name);
+      const look = draw.lookOf(robot, pen.camera, Math.min(...sizeOf(shape, frame.body_m)), marks);
       const place = motion.robotsNow.get(robot.name) ?? robot.location;
+      footprint(pen, shape, pen.camera.x(place.x), pen.camera.y(place.y));
       const side = 2 * look.radius;
       taken.robots.push({ x: pen.camera.x(place.x), y: pen.camera.y(place.y), width: side, height: side });
       drawRobot(pen, robot, look, place);
@@ -228,7 +235,7 @@ export class Plan {
     const y = this.camera.y(place.y);
     if (draw.isOutside(this.camera, x, y, draw.reach(look))) return;
     this.sprites.body(this.context, pen.theme, look, x, y);
-    draw.course(pen, robot, look, x, y);
+    draw.course(pen, robot, look, x, y, haveDirections(this.motion.to));
   };
 
   /**
@@ -248,18 +255,40 @@ export class Plan {
 
   /** @param {import("./types/messages.js").Setup} draft */
   paintDraft(draft) {
-    const body_m = this.motion.to?.body_m ?? 0.6096;
-    const obstacles = draft.obstacles.map(({ x, y }) => /** @type {[number, number]} */ ([x, y]));
+    const standing = this.standingOf(draft);
+    const { body_m } = standing;
     // The simulator places the guests: those of a changed set-up have no places yet.
-    this.paintGround(obstacles, body_m, this.editor.isAsApplied && this.motion.to?.tick === 0, null);
+    this.paintGround(standing, this.editor.isAsApplied && this.motion.to?.tick === 0, null);
 
     for (const [name, place] of Object.entries(draft.robots)) {
       const robot = { name, emotion_state: "", blocked: false, presence: /** @type {const} */ ("here"), direction_rad: 0, speed_mps: 0 };
       const marks = { isLate: this.editor.faulty(name), isChosen: name === this.chosen };
-      this.drawRobot(this.pen, robot, draw.lookOf(robot, this.camera, body_m, marks), place);
+      const shape = shapeOf(this.motion.to, name);
+      const look = draw.lookOf(robot, this.camera, Math.min(...sizeOf(shape, body_m)), marks);
+      footprint(this.pen, shape, this.camera.x(place.x), this.camera.y(place.y));
+      this.drawRobot(this.pen, robot, look, place);
     }
 
     this.paintScale(this.pen);
+  }
+
+  /**
+   * What stands in a draft, in which an obstacle at the place of another one keeps its shape.
+   * @param {import("./types/messages.js").Setup} draft
+   * @returns {import("./solids.js").Standing}
+   */
+  standingOf(draft) {
+    const frame = this.motion.to;
+    const known = frame?.static_world;
+    const key = JSON.stringify(draft.obstacles);
+    if (key === this.drafted.key && known === this.drafted.known) return this.drafted.standing;
+
+    const shapes = new Map(frame?.obstacles.map((at, i) => [at.join(), known?.obstacle_shapes?.[i] ?? null]));
+    const obstacles = draft.obstacles.map(({ x, y }) => /** @type {[number, number]} */ ([x, y]));
+    const obstacle_shapes = obstacles.map((at) => shapes.get(at.join()) ?? null);
+    const standing = { obstacles, body_m: frame?.body_m ?? 0.6096, static_world: { ...known, obstacle_shapes } };
+    this.drafted = { key, known, standing };
+    return standing;
   }
 
   /** @param {draw.Pen} pen */
@@ -283,9 +312,13 @@ export class Plan {
    * @returns {string | null}
    */
   robotAt(place) {
-    const reach_m = Math.max((this.motion.to?.body_m ?? 0) / 2, 12 / this.camera.scale);
-    const isHit = (/** @type {Place} */ at) => Math.hypot(at.x - place.x, at.y - place.y) <= reach_m;
-    return [...this.motion.robotsNow].find(([, at]) => isHit(at))?.[0] ?? null;
+    const frame = this.motion.to;
+    const least_m = 12 / this.camera.scale;
+    const isHit = (/** @type {string} */ name, /** @type {Place} */ at) => {
+      const size_m = sizeOf(shapeOf(frame, name), frame?.body_m ?? 0);
+      return Math.hypot(at.x - place.x, at.y - place.y) <= Math.max(...size_m.map((side_m) => side_m / 2), least_m);
+    };
+    return [...this.motion.robotsNow].find(([name, at]) => isHit(name, at))?.[0] ?? null;
   }
 
   /**
@@ -300,8 +333,7 @@ export class Plan {
     draw.outside(pen);
     if (!frame) return;
 
-    draw.field(pen, this.step_m(camera), () => drawLayer(pen, shownLayer(frame.layers, this.chosenLayer)));
-    draw.obstacles(pen, frame.obstacles, frame.body_m);
+    drawGround(pen, frame, this.step_m(camera), shownLayer(frame.layers, this.chosenLayer));
     const radius = draw.guestRadius(camera, frame.body_m);
     draw.guestCircles(pen, draw.guestsAt(camera, this.motion.now_m, radius), radius);
     this.paintMoving(pen, frame, (_, robot, look, place) => {
@@ -309,8 +341,14 @@ export class Plan {
       const y = camera.y(place.y);
       if (draw.isOutside(camera, x, y, draw.reach(look))) return;
       draw.body(pen, look, x, y);
-      draw.course(pen, robot, look, x, y);
+      draw.course(pen, robot, look, x, y, haveDirections(frame));
     });
+  }
+
+  /** The lengths of the rays of the chosen robot, meters. */
+  rays() {
+    const frame = this.motion.to;
+    return frame && this.chosen ? raysOf(frame, this.chosen, this.motion) : [];
   }
 
   /**

@@ -85,6 +85,17 @@ export function nose(context, x, y, radius, angle_rad, color) {
   context.fill();
 }
 
+/** The direction of a robot that stands. @type {(context: Paper, x: number, y: number, radius: number, angle_rad: number, color: string) => void} */
+export function notch(context, x, y, radius, angle_rad, color) {
+  const [right, up] = [Math.cos(angle_rad), Math.sin(angle_rad)];
+  context.beginPath();
+  line(context, x + right * radius, y - up * radius, x + right * (radius + 6), y - up * (radius + 6));
+  context.strokeStyle = color;
+  context.lineWidth = 2.5;
+  context.lineCap = "round";
+  context.stroke();
+}
+
 /** A robot that is blocked. @type {(context: Paper, x: number, y: number, radius: number, angle_rad: number, color: string) => void} */
 export function barrier(context, x, y, radius, angle_rad, color) {
   context.beginPath();

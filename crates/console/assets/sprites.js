@@ -3,7 +3,8 @@
 // are copied onto the plan at whole pixels, so that they stay sharp.
 
 import * as draw from "./draw.js";
-import { areSameLayers, drawLayer } from "./layers.js";
+import { areSameLayers } from "./layers.js";
+import { drawGround } from "./solids.js";
 
 /** @typedef {import("./theme.js").Theme} Theme */
 
@@ -12,14 +13,14 @@ const MOST = 1024;
 /** Places in a pixel, each way. */
 const PLACES = 4;
 
-/** What does not move: the field, a layer and the obstacles. */
+/** What does not move: the field, a layer and what stands on it. */
 export class Ground {
   constructor() {
     this.canvas = document.createElement("canvas");
     this.context = /** @type {CanvasRenderingContext2D} */ (this.canvas.getContext("2d", { alpha: false }));
     this.key = "";
-    /** @type {[number, number][]} */
-    this.obstacles = [];
+    /** @type {Pick<import("./solids.js").Standing, "obstacles" | "static_world">} */
+    this.standing = { obstacles: [] };
     /** @type {import("./types/messages.js").LayerFrame | null} */
     this.layer = null;
     /** Its pixels, if they were asked for. @type {ImageData | null} */
@@ -30,26 +31,25 @@ export class Ground {
    * Draws it anew if anything of it is different.
    * @param {draw.Pen} pen
    * @param {HTMLCanvasElement} plan
-   * @param {[number, number][]} obstacles
-   * @param {number} body_m
+   * @param {import("./solids.js").Standing} standing
    * @param {number} step_m between lines
    * @param {import("./types/messages.js").LayerFrame | null} layer
    */
-  renew({ camera, theme }, plan, obstacles, body_m, step_m, layer) {
+  renew({ camera, theme }, plan, standing, step_m, layer) {
     const { width_px, height_px, field_m, scale, center } = camera;
-    const key = [plan.width, plan.height, width_px, height_px, ...field_m, scale, center.x, center.y, body_m, step_m, theme.field, theme.layer].join();
-    if (key !== this.key || !areSame(obstacles, this.obstacles) || !areSameLayers(layer, this.layer)) {
+    const key = [plan.width, plan.height, width_px, height_px, ...field_m, scale, center.x, center.y, standing.body_m, step_m, theme.field, theme.layer].join();
+    const isSame = areSame(standing.obstacles, this.standing.obstacles) && standing.static_world === this.standing.static_world;
+    if (key !== this.key || !isSame || !areSameLayers(layer, this.layer)) {
       this.key = key;
+      this.standing = standing;
       this.layer = layer;
-      this.obstacles = obstacles;
       this.read = null;
       this.canvas.width = plan.width;
       this.canvas.height = plan.height;
       this.context.setTransform(plan.width / width_px, 0, 0, plan.height / height_px, 0, 0);
       const pen = { context: this.context, camera, theme };
       draw.outside(pen);
-      draw.field(pen, step_m, () => drawLayer(pen, layer));
-      draw.obstacles(pen, obstacles, body_m);
+      drawGround(pen, standing, step_m, layer);
     }
   }
 

@@ -169,6 +169,7 @@ export class Store {
   receive(frame) {
     const last = this.live;
     const isNew = !last || !isSameEpoch(frame, last);
+    if (last && !isNew) frame.static_world = lasting(frame.static_world, last.static_world);
     const isBackward = isNew || frame.tick < last.tick;
     const isChanged = isNew || frame.phase !== last.phase || frame.speed !== last.speed;
     this.live = frame;
@@ -412,6 +413,16 @@ export class Store {
     const late = this.phase === "gathering" ? awaiting : awaiting.filter((awaited) => awaited.since_s >= LATE_S);
     return late.map((awaited) => ({ ...awaited, since_s: awaited.since_s + since_s }));
   }
+}
+
+/**
+ * What does not change in an epoch, of which only some frames tell: the same object as long as nothing of it is new.
+ * @template T
+ * @param {T | undefined} told
+ * @param {T | undefined} known
+ */
+function lasting(told, known) {
+  return told && JSON.stringify(told) !== JSON.stringify(known) ? told : known;
 }
 
 /**

@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use axum::extract::ws::Utf8Bytes;
-use protocol::messages::{Flight, LogRecord, MAX_FLIGHTS, TickPanel, WorldFrame};
+use protocol::messages::{Flight, LogRecord, MAX_FLIGHTS, StaticWorld, TickPanel, WorldFrame};
 use protocol::{Epoch, RobotName, Tick};
 use tokio::sync::watch;
 
@@ -40,6 +40,8 @@ struct FeedState {
     frame_count: u64,
     /// The fates of commands, numbered like the frames that reported them.
     flights: VecDeque<Numbered<Flight>>,
+    /// What does not change in the epoch, numbered like the frame that had it first.
+    static_world: Option<Numbered<Arc<StaticWorld>>>,
     /// The panels of the frame's tick.
     panels: BTreeMap<RobotName, Numbered<Utf8Bytes>>,
     /// Number of the newest of these, counted over all robots, from 1.
@@ -196,16 +198,28 @@ impl FeedState {
     fn put_frame(&mut self, encoded: EncodedFrame) {
         let frame = &encoded.frame;
         let previous = self.frame.as_ref().map(|previous| &previous.frame);
+        let is_new_epoch = previous.is_some_and(|previous| previous.epoch != frame.epoch);
         // Ticks of a new epoch begin at 0 again, and a replay that has been moved tells all anew: a flight of
         // before would be shown in it.
-        if previous
-            .is_some_and(|previous| previous.epoch != frame.epoch || previous.jumps != frame.jumps)
-        {
+        let has_jumped = previous.is_some_and(|previous| previous.jumps != frame.jumps);
+        if is_new_epoch || has_jumped {
             self.flights.clear();
+        }
+        if is_new_epoch {
+            self.static_world = None;
         }
 
         self.frame_count += 1;
         let number = self.frame_count;
+        if let Some(new) = &frame.static_world
+            && self
+                .static_world
+                .as_ref()
+                .is_none_or(|known| *known.value != *new)
+        {
+            let value = Arc::new(new.clone());
+            self.static_world = Some(Numbered { number, value });
+        }
         let flights = frame.flights.iter().cloned();
         self.flights
             .extend(flights.map(|value| Numbered { number, value }));
@@ -349,9 +363,12 @@ impl FeedState {
             .filter(|flight| is_told && flight.number > seen)
             .map(|flight| flight.value.clone())
             .collect();
+        let known = self.static_world.as_ref();
+        let unseen = known.filter(|known| known.number > seen);
         Some(NewFrame {
             encoded: encoded.clone(),
             flights,
+            static_world: unseen.map(|known| known.value.clone()),
         })
     }
 
@@ -382,20 +399,27 @@ struct NewFrame {
     encoded: EncodedFrame,
     /// Flights of the skipped frames and of this one; empty if none were skipped.
     flights: Vec<Flight>,
+    /// What does not change in the epoch, if no frame that the browser got had it.
+    static_world: Option<Arc<StaticWorld>>,
 }
 
 impl NewFrame {
     fn message(self) -> Utf8Bytes {
         let frame = self.encoded.frame;
         // Nothing was skipped: the text that all browsers share is enough.
-        if self.flights.len() <= frame.flights.len() {
+        let has_flights = self.flights.len() <= frame.flights.len();
+        let has_static_world = self.static_world.is_none() || frame.static_world.is_some();
+        if has_flights && has_static_world {
             return self.encoded.text;
         }
 
-        let frame = WorldFrame {
-            flights: self.flights,
-            ..(*frame).clone()
-        };
+        let mut frame = (*frame).clone();
+        if !has_flights {
+            frame.flights = self.flights;
+        }
+        if let Some(unseen) = self.static_world {
+            frame.static_world = Some((*unseen).clone());
+        }
         ServerMessage::Frame { frame: &frame }.text()
     }
 }
@@ -458,6 +482,7 @@ mod tests {
             guests: vec![[1.0, 2.0]],
             guest_moods: BTreeMap::new(),
             obstacles: Vec::new(),
+            static_world: None,
             sites: Vec::new(),
             layers: Vec::new(),
             flights: vec![flight],
@@ -597,6 +622,43 @@ mod tests {
                 .collect();
             assert_eq!(told, [50, 51]);
         }
+    }
+
+    #[test]
+    fn every_browser_gets_what_does_not_change_once() {
+        let feed = Feed::new();
+        let walls = |message: &Value| message["frame"]["static_world"]["walls"].clone();
+        let walled = |tick, from| WorldFrame {
+            static_world: Some(StaticWorld {
+                walls: vec![vec![[from, 0.0], [1.0, 1.0]]],
+                ..StaticWorld::default()
+            }),
+            ..frame(tick)
+        };
+        let mut cursor = Cursor::default();
+        feed.put_frame(frame(0));
+        take_new(&feed, &mut cursor);
+
+        // The frame with it is skipped.
+        feed.put_frame(walled(1, 0.0));
+        feed.put_frame(frame(2));
+
+        let new = take_new(&feed, &mut cursor);
+        assert_eq!(walls(&new[0])[0][0][0], 0.0);
+        assert_eq!(flights(&new[0]).len(), 2);
+        feed.put_frame(frame(3));
+        assert_eq!(walls(&take_new(&feed, &mut cursor)[0]), Value::Null);
+        let late = take_new(&feed, &mut Cursor::default());
+        assert_eq!(walls(&late[1])[0][0][0], 0.0);
+
+        feed.put_frame(walled(4, 0.5));
+        feed.put_frame(frame(5));
+        assert_eq!(walls(&take_new(&feed, &mut cursor)[0])[0][0][0], 0.5);
+        feed.put_frame(WorldFrame {
+            epoch: 2,
+            ..frame(0)
+        });
+        assert_eq!(walls(&take_new(&feed, &mut cursor)[0]), Value::Null);
     }
 
     fn ticks(messages: &[Value]) -> Vec<u64> {

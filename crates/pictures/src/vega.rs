@@ -1,5 +1,6 @@
 //! Charts as data and as views of Vega-Lite (version 5), so that a figure can be drawn anew by others.
 
+use protocol::messages::BodyShape;
 use serde_json::{Value, json};
 use timeline::StateKind;
 
@@ -407,24 +408,35 @@ fn matrix_view(chart: &Matrix) -> Value {
 }
 
 fn floor(chart: &Floor) -> Vec<DataRow> {
-    let area = |kind: &str, [x, y]: [f64; 2], side_m: f64, time_s: Option<f64>| -> DataRow {
+    let area = |kind: &str, [x, y]: [f64; 2], [x_to, y_to]: [f64; 2], time_s| -> DataRow {
+        let time_s: Option<f64> = time_s;
         vec![
             ("kind", kind.to_owned()),
             ("x_from_m", digits(x)),
-            ("x_to_m", digits(x + side_m)),
+            ("x_to_m", digits(x_to)),
             ("y_from_m", digits(y)),
-            ("y_to_m", digits(y + side_m)),
+            ("y_to_m", digits(y_to)),
             ("time_s", time_s.map_or(String::new(), digits)),
         ]
     };
     let mut rows = Vec::new();
     for ((column, row), time_s) in &chart.times_s {
         let corner = [*column, *row].map(|part| f64::from(part) * chart.part_m);
-        rows.push(area("part", corner, chart.part_m, Some(*time_s)));
+        let other = corner.map(|place| place + chart.part_m);
+        rows.push(area("part", corner, other, Some(*time_s)));
     }
-    for center in &chart.obstacles {
-        let corner = center.map(|place| place - chart.body_m / 2.0);
-        rows.push(area("obstacle", corner, chart.body_m, None));
+    for (index, [x, y]) in chart.obstacles.iter().enumerate() {
+        let [width_m, height_m] = chart.size_m(index);
+        let corner = [x - width_m / 2.0, y - height_m / 2.0];
+        let other = [corner[0] + width_m, corner[1] + height_m];
+        let is_disc = matches!(chart.shape(index), Some(BodyShape::Disc(_)));
+        let kind = if is_disc { "disc" } else { "obstacle" };
+        rows.push(area(kind, corner, other, None));
+    }
+    for wall in &chart.static_world.walls {
+        for ends in wall.windows(2) {
+            rows.push(area("wall", ends[0], ends[1], None));
+        }
     }
     rows
 }
@@ -448,6 +460,9 @@ fn floor_view(chart: &Floor) -> Value {
         "layer": [
             { "transform": filter("kind", "part"), "mark": "rect", "encoding": { "color": color } },
             { "transform": filter("kind", "obstacle"), "mark": { "type": "rect", "color": "#4a4a45" } },
+            // A rectangle with such corners is an ellipse in the square around a disc.
+            { "transform": filter("kind", "disc"), "mark": { "type": "rect", "color": "#4a4a45", "cornerRadius": 1000 } },
+            { "transform": filter("kind", "wall"), "mark": { "type": "rule", "color": "#4a4a45", "strokeWidth": 1.5 } },
         ],
     })
 }

@@ -12,6 +12,7 @@ use pictures::{
     Intervals, Matrix, MatrixCell, MatrixLabel, Page, PlottedEstimate, Steps, Table, Text, Trend,
     TrendLine, TrendPoint, state_look,
 };
+use protocol::messages::{BodyShape, StaticWorld};
 use roxmltree::{Document, Node, ParsingOptions};
 use timeline::{StateKind, StateOrder};
 
@@ -163,6 +164,7 @@ fn a_floor_has_a_square_for_each_part() {
         field_m: [15.0, 10.0],
         body_m: 0.6,
         obstacles: vec![[1.0, 1.0], [3.0, 4.0]],
+        static_world: Default::default(),
         part_m: 0.3,
         times_s,
     };
@@ -178,6 +180,49 @@ fn a_floor_has_a_square_for_each_part() {
     assert_eq!(squares, 50);
     // Each obstacle is a group with a square.
     assert_eq!(of_class(&document, "obstacle").len(), 4);
+    assert_eq!(of_class(&document, "wall").len(), 0);
+}
+
+#[test]
+fn a_floor_has_walls_and_the_shapes_of_obstacles() {
+    let chart = Floor {
+        title: "where".to_owned(),
+        field_m: [10.0, 10.0],
+        body_m: 0.5,
+        obstacles: vec![[1.0, 1.0], [3.0, 4.0], [7.0, 7.0]],
+        static_world: StaticWorld {
+            walls: vec![
+                vec![[0.0, 5.0], [5.0, 5.0], [5.0, 9.0]],
+                vec![[8.0, 1.0], [9.0, 1.0]],
+            ],
+            obstacle_shapes: vec![
+                None,
+                Some(BodyShape::Rectangle([3.0, 1.0])),
+                Some(BodyShape::Disc(1.5)),
+            ],
+            ..StaticWorld::default()
+        },
+        part_m: 0.3,
+        times_s: BTreeMap::new(),
+    };
+    let svg = chart.draw();
+    let document = parsed(&svg);
+    let mut obstacles = of_class(&document, "obstacle");
+    obstacles.retain(|node| !node.has_tag_name("g"));
+    let size = |index: usize, name: &str| -> f64 {
+        obstacles[index].attribute(name).unwrap().parse().unwrap()
+    };
+    let px_per_m = size(0, "width") / 0.5;
+    assert!((size(1, "width") / px_per_m - 3.0).abs() < 0.02, "{svg}");
+    assert!((size(1, "height") / px_per_m - 1.0).abs() < 0.02, "{svg}");
+    let disc = obstacles[2].attribute("d").unwrap();
+    let radius: f64 = disc.split(['a', ' ']).nth(2).unwrap().parse().unwrap();
+    assert!((radius / px_per_m - 1.5).abs() < 0.02, "{disc}");
+
+    let walls = of_class(&document, "wall");
+    let path = walls[0].attribute("d").unwrap();
+    assert_eq!((walls.len(), path.matches('M').count()), (1, 2), "{path}");
+    assert_eq!(path.matches('L').count(), 3, "{path}");
 }
 
 #[test]

@@ -61,6 +61,7 @@ fn charts() -> Vec<Chart> {
         field_m: [10.0, 5.0],
         body_m: 0.6,
         obstacles: vec![[1.0, 1.0]],
+        static_world: Default::default(),
         part_m: 0.2,
         times_s: BTreeMap::from([((3, 4), 2.5)]),
     };

@@ -14,7 +14,7 @@ use crate::summary::Summary;
 /// Fields of a report that count epochs and processes, which the record does not compare.
 const REPORT_NOT_COMPARED: [&str; 2] = ["epoch", "generation"];
 /// Fields of a header that name the run and the program.
-const HEADER_NOT_COMPARED: [&str; 4] = ["run", "version", "commit", "protocol"];
+const HEADER_NOT_COMPARED: [&str; 5] = ["run", "version", "commit", "protocol", "static_world"];
 
 /// Fields of a summary that name the run and the program, and those that are wall clock.
 const SUMMARY_NOT_COMPARED: [&str; 3] = ["run", "version", "wall"];

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use protocol::messages::{
     Awaited, Cut, DisplayUnit, GuestMood, LayerFrame, LogRecord, Panel, Point, Report, SiteFrame,
-    Standing, StateVariables,
+    Standing, StateVariables, StaticWorld,
 };
 use protocol::{Epoch, Event, Message, RobotName, RunName, Tick};
 use schemars::JsonSchema;
@@ -40,6 +40,9 @@ pub struct Header {
     pub display_unit: DisplayUnit,
     /// Centers of the fixed obstacles, meters.
     pub obstacles: Vec<[f64; 2]>,
+    /// Walls, shapes of bodies, and where robots look.
+    #[serde(default, skip_serializing_if = "StaticWorld::is_empty")]
+    pub static_world: StaticWorld,
     /// The sites as they are at the start, by name.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sites: Vec<SiteFrame>,

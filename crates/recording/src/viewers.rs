@@ -2,7 +2,7 @@
 //! The run's own channels have everything that these have.
 
 use protocol::RobotName;
-use protocol::messages::LogRecord;
+use protocol::messages::{BodyShape, LogRecord};
 
 use crate::content::{Header, PlacedRobot, TickView};
 use crate::protobuf::Protobuf;
@@ -45,29 +45,64 @@ impl ViewerSchema {
     }
 }
 
-/// The field and its obstacles, which stay.
+/// The field with its obstacles and walls, which stay.
 pub(crate) fn field(to: &mut Protobuf<'_>, header: &Header) {
     to.message(2, |to| {
         entity(to, 0, "field");
-        for [x, y] in &header.obstacles {
-            to.message(8, |to| {
-                cube(to, *x, *y, 0.0, header.body_m, [0.4, 0.4, 0.4]);
-            });
+        for (index, at) in header.obstacles.iter().enumerate() {
+            let shape = header.static_world.obstacle_shapes.get(index);
+            body(to, header, shape.copied().flatten(), *at, 0.0, FIXED_COLOR);
         }
         to.message(11, |to| outline(to, header));
+        for wall in &header.static_world.walls {
+            to.message(11, |to| line(to, header, LINE_STRIP, wall, FIXED_COLOR));
+        }
     });
 }
 
 fn outline(to: &mut Protobuf<'_>, header: &Header) {
     let [width, height] = header.field_m;
-    let corners = [(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)];
-    to.integer(1, LINE_LOOP)
+    let corners = [[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]];
+    line(to, header, LINE_LOOP, &corners, [0.5, 0.5, 0.5]);
+}
+
+fn line(to: &mut Protobuf<'_>, header: &Header, kind: u64, corners: &[[f64; 2]], rgb: [f64; 3]) {
+    to.integer(1, kind)
         .message(2, |to| pose(to, 0.0, 0.0, 0.0, 0.0))
         .double(3, header.body_m / 10.0);
-    for (x, y) in corners {
-        to.message(5, |to| vector(to, x, y, 0.0));
+    for [x, y] in corners {
+        to.message(5, |to| vector(to, *x, *y, 0.0));
     }
-    to.message(6, |to| color(to, [0.5, 0.5, 0.5]));
+    to.message(6, |to| color(to, rgb));
+}
+
+/// A body, as a part of an entity. A square of the run's size is shown in the direction of a robot, a shape as it stands: it does
+/// not turn.
+fn body(
+    to: &mut Protobuf<'_>,
+    header: &Header,
+    shape: Option<BodyShape>,
+    [x, y]: [f64; 2],
+    direction_rad: f64,
+    rgb: [f64; 3],
+) {
+    let height_m = header.body_m * HEIGHT;
+    let (field, direction_rad) = match shape {
+        None => (CUBES, direction_rad),
+        Some(BodyShape::Rectangle(_)) => (CUBES, 0.0),
+        Some(BodyShape::Disc(_)) => (CYLINDERS, 0.0),
+    };
+    let [width_m, length_m] = shape.map_or([header.body_m; 2], BodyShape::size_m);
+    to.message(field, |to| {
+        to.message(1, |to| pose(to, x, y, height_m / 2.0, direction_rad))
+            .message(2, |to| vector(to, width_m, length_m, height_m));
+        if field == CYLINDERS {
+            to.double(3, 1.0).double(4, 1.0);
+            to.message(5, |to| color(to, rgb));
+        } else {
+            to.message(3, |to| color(to, rgb));
+        }
+    });
 }
 
 /// The robots, each with its name, its emotion and its behavior.
@@ -79,9 +114,8 @@ pub(crate) fn robots(to: &mut Protobuf<'_>, header: &Header, tick: &TickView<'_>
 
         to.message(2, |to| {
             entity(to, time_ns, robot.name.as_str());
-            to.message(8, |to| {
-                cube(to, at.x, at.y, direction_rad, header.body_m, color_of);
-            });
+            let shape = header.static_world.robot_shapes.get(&robot.name).copied();
+            body(to, header, shape, [at.x, at.y], direction_rad, color_of);
             to.message(13, |to| {
                 to.message(1, |to| pose(to, at.x, at.y, header.body_m, 0.0))
                     .integer(2, 1)
@@ -162,9 +196,14 @@ pub(crate) fn log(to: &mut Protobuf<'_>, line: &LogRecord, time_ns: u64) {
         .text(4, &line.source);
 }
 
+/// Fields of a `SceneEntity`.
+const CUBES: u64 = 8;
+const CYLINDERS: u64 = 10;
+const LINE_STRIP: u64 = 0;
 const LINE_LOOP: u64 = 1;
 const FLOAT32: u64 = 7;
 const INFO: u64 = 2;
+const FIXED_COLOR: [f64; 3] = [0.4, 0.4, 0.4];
 /// Told apart by people with any color vision (Okabe and Ito).
 const ROBOT_COLORS: [[f64; 3]; 4] = [
     [0.0, 0.45, 0.7],
@@ -185,13 +224,6 @@ fn entity(to: &mut Protobuf<'_>, time_ns: u64, id: &str) {
     to.message(1, |to| timestamp(to, time_ns))
         .text(2, FIELD)
         .text(3, id);
-}
-
-fn cube(to: &mut Protobuf<'_>, x: f64, y: f64, direction_rad: f64, side_m: f64, rgb: [f64; 3]) {
-    let height_m = side_m * HEIGHT;
-    to.message(1, |to| pose(to, x, y, height_m / 2.0, direction_rad))
-        .message(2, |to| vector(to, side_m, side_m, height_m))
-        .message(3, |to| color(to, rgb));
 }
 
 fn pose(to: &mut Protobuf<'_>, x: f64, y: f64, z: f64, direction_rad: f64) {

@@ -42,6 +42,7 @@ fn header() -> Header {
         sites: Vec::new(),
         layers: Vec::new(),
         obstacles: vec![[1.0, 2.0]],
+        static_world: Default::default(),
         robots: vec![name("Butler"), name("Leguin")],
     }
 }

@@ -268,6 +268,7 @@ impl RunFacts {
             field_m: header.field_m,
             body_m: header.body_m,
             obstacles: header.obstacles.clone(),
+            static_world: header.static_world.clone(),
             part_m,
             times_s: BTreeMap::new(),
         };

@@ -41,7 +41,7 @@ pub(super) fn occupancy(runs: &[&RunFacts]) -> Option<Figure> {
     });
     let mut caption = format!(
         "Where the robots were, from above: the time that the center of a robot spent in each part of the floor. Darkness grows \
-         with the square root of the time. Dark squares are obstacles. n = {}.{sentence}",
+         with the square root of the time. Dark areas are obstacles, dark lines are walls. n = {}.{sentence}",
         counted(runs.len(), "run")
     );
     if others > 0 {

@@ -15,6 +15,7 @@ mod sensing;
 pub mod server;
 pub mod simulation;
 pub mod sites;
+mod static_world;
 mod summarized;
 
 pub use protocol::{Event, Line};

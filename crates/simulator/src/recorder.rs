@@ -16,6 +16,7 @@ use recording::content::Missed;
 use recording::{Frame, Header, PlacedRobot, TickView, WallTimes, WriteError, Writer};
 
 use crate::simulation::{Simulation, TickRecord};
+use crate::static_world::static_world;
 use record::Record;
 use record::folder::DRAFT;
 use record::seal::Seal;
@@ -569,6 +570,7 @@ pub fn header(run: &RunName, simulation: &Simulation) -> Header {
             .iter()
             .map(|obstacle| [obstacle.at.x, obstacle.at.y])
             .collect(),
+        static_world: static_world(scenario),
         sites: crate::sites::Sites::new(scenario).frames(),
         layers: crate::layers::Layers::new(scenario).frames(),
         robots: simulation.names().to_vec(),

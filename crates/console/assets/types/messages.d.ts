@@ -365,6 +365,20 @@ export type Fate = "sent" | "delivered" | "dropped";
  * languages that do not tell them apart give the same run.
  */
 export type Variable = boolean | number | string;
+/**
+ * The shape of a body that is not a square of the run's size. Bodies do not turn.
+ */
+export type BodyShape =
+  | {
+      /**
+       * @minItems 2
+       * @maxItems 2
+       */
+      rectangle: [number, number];
+    }
+  | {
+      disc: number;
+    };
 
 /**
  * What a person can change between two epochs: the set-up screen of the paper ("Overall Architecture"). Everything else
@@ -696,6 +710,11 @@ export interface WorldFrame {
    */
   speed?: number | null;
   /**
+   * What does not change in an epoch: in its first frame, once a second, and in all frames while the clock stands. Without it,
+   * what the frames before had in this epoch still holds.
+   */
+  static_world?: StaticWorld | null;
+  /**
    * The tick.
    */
   tick: number;
@@ -865,4 +884,58 @@ export interface SiteFrame {
   state?: {
     [k: string]: Variable;
   };
+}
+/**
+ * Walls, shapes of bodies, and how robots sense: what does not change in an epoch. Lengths are in steps of 0.1 mm.
+ */
+export interface StaticWorld {
+  /**
+   * Shapes of the fixed obstacles, in their order, `null` for squares of the run's size; empty if all are.
+   */
+  obstacle_shapes?: (BodyShape | null)[];
+  /**
+   * Robots with a shape of their own.
+   */
+  robot_shapes?: {
+    [k: string]: BodyShape;
+  };
+  /**
+   * Where robots look, if they do not look all around, or measure ranges.
+   */
+  sensing?: SensingLimits | null;
+  /**
+   * Walls, each the corners of a line, meters.
+   */
+  walls?: [number, number][][];
+}
+/**
+ * Where robots look.
+ */
+export interface SensingLimits {
+  /**
+   * Angle that a robot overlooks, half of it to each side of its direction, radians; none is all around.
+   */
+  field_of_view_rad?: number | null;
+  /**
+   * Distance within which they sense other bodies, meters.
+   */
+  range_m: number;
+  /**
+   * The fan of rays of robots that ask for ranges.
+   */
+  rays?: Rays | null;
+}
+/**
+ * A fan of rays around a robot. The first points in the direction of motion that the robot reported last, the others follow
+ * counter-clockwise at equal angles.
+ */
+export interface Rays {
+  /**
+   * How many.
+   */
+  count: number;
+  /**
+   * How far they reach, meters.
+   */
+  range_m: number;
 }

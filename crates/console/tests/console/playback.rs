@@ -36,6 +36,7 @@ fn header() -> Header {
         sites: Vec::new(),
         layers: Vec::new(),
         obstacles: vec![[1.0, 2.0]],
+        static_world: Default::default(),
         robots: vec![robot("Butler")],
     }
 }

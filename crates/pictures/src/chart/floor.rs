@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use protocol::messages::{BodyShape, StaticWorld};
+
 use crate::axis::{draw_below, draw_left};
 use crate::chart::{PANEL_PX, begin, end};
 use crate::markup::{Markup, number};
@@ -18,10 +20,12 @@ pub struct Floor {
     pub title: String,
     /// Width and height of the field, meters.
     pub field_m: [f64; 2],
-    /// Side of obstacles, meters.
+    /// Side of obstacles without a shape of their own, meters.
     pub body_m: f64,
     /// Centers of obstacles, meters.
     pub obstacles: Vec<[f64; 2]>,
+    /// Walls, and shapes of obstacles.
+    pub static_world: StaticWorld,
     /// Side of a part, meters.
     pub part_m: f64,
     /// Time in each part, by column and row from the origin, seconds.
@@ -51,6 +55,7 @@ impl Floor {
         svg.upward("muted", 12.0, middle, "middle", "y, m");
         self.draw_times(&mut svg, &x, &y);
         self.draw_obstacles(&mut svg, &x, &y);
+        self.draw_walls(&mut svg, &x, &y);
         svg.rect("frame", (left, top), right - left, bottom - top);
         self.draw_key(&mut svg, left, bottom + 42.0);
         end(svg)
@@ -92,18 +97,48 @@ impl Floor {
         }
     }
 
+    /// The shape of an obstacle, by its index; none is a square of the run's size.
+    pub(crate) fn shape(&self, obstacle: usize) -> Option<BodyShape> {
+        let shape = self.static_world.obstacle_shapes.get(obstacle);
+        shape.copied().flatten()
+    }
+
+    /// Width and height of an obstacle, by its index, meters.
+    pub(crate) fn size_m(&self, obstacle: usize) -> [f64; 2] {
+        let shape = self.shape(obstacle);
+        shape.map_or([self.body_m; 2], BodyShape::size_m)
+    }
+
     fn draw_obstacles(&self, svg: &mut Markup, x: &Scale, y: &Scale) {
-        let half = self.body_m / 2.0;
-        for [center_x, center_y] in &self.obstacles {
-            let left = x.at(center_x - half);
-            let top = y.at(center_y + half);
-            let width = x.at(center_x + half) - left;
-            let height = y.at(center_y - half) - top;
+        for (index, [center_x, center_y]) in self.obstacles.iter().enumerate() {
+            let [width_m, height_m] = self.size_m(index);
+            let left = x.at(center_x - width_m / 2.0);
+            let top = y.at(center_y + height_m / 2.0);
+            let width = x.at(center_x + width_m / 2.0) - left;
+            let height = y.at(center_y - height_m / 2.0) - top;
 
             let title = format!("obstacle at {center_x:.2} m, {center_y:.2} m");
             svg.group("obstacle", &title);
-            svg.rect("obstacle", (left, top), width, height);
+            if matches!(self.shape(index), Some(BodyShape::Disc(_))) {
+                let disc = disc((left, y.at(*center_y)), width);
+                svg.path("obstacle", &disc);
+            } else {
+                svg.rect("obstacle", (left, top), width, height);
+            }
             svg.close("g");
+        }
+    }
+
+    fn draw_walls(&self, svg: &mut Markup, x: &Scale, y: &Scale) {
+        let mut path = String::new();
+        for wall in &self.static_world.walls {
+            for (index, [x_m, y_m]) in wall.iter().enumerate() {
+                let command = if index == 0 { 'M' } else { 'L' };
+                path += &format!("{command}{} {}", number(x.at(*x_m)), number(y.at(*y_m)));
+            }
+        }
+        if !path.is_empty() {
+            svg.path("wall", &path);
         }
     }
 
@@ -119,4 +154,16 @@ impl Floor {
         let text = format!("{:.1} s in a part of {:.2} m", self.most_s(), self.part_m);
         svg.text("muted", end, top + 11.0, "start", &text);
     }
+}
+
+/// The path of a disc from its leftmost point, as two half circles.
+fn disc((left, middle): (f64, f64), diameter: f64) -> String {
+    let radius = number(diameter / 2.0);
+    format!(
+        "M{} {}a{radius} {radius} 0 1 0 {} 0a{radius} {radius} 0 1 0 {} 0z",
+        number(left),
+        number(middle),
+        number(diameter),
+        number(-diameter)
+    )
 }

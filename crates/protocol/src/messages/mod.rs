@@ -13,6 +13,7 @@ mod point;
 mod sensing;
 mod site;
 mod state;
+mod static_world;
 mod step;
 mod target;
 mod variables;
@@ -44,6 +45,7 @@ pub use site::{
     MAX_SITES, SensedSite, SiteAction, SiteFrame, SiteRefusal, SiteResult,
 };
 pub use state::{Answer, PublicState};
+pub use static_world::{BodyShape, SensingLimits, StaticWorld};
 pub use step::{
     Clock, Command, CommandText, Correction, Delivery, End, JoinAnswer, JoinRequest, NEWS_FLAGS,
     Parameters, ParametersAnswer, ParametersOffer, Refusal, Report, SensedBody, SensedKind,

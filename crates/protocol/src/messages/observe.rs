@@ -11,6 +11,7 @@ use super::limits::{counted, few, finite, is_zero, short};
 use super::numbers::{Epoch, Generation, Seq, Tick};
 use super::point::Point;
 use super::site::SiteFrame;
+use super::static_world::StaticWorld;
 use super::variables::StateVariables;
 use crate::codec::{FieldError, Message, as_json};
 use crate::name::{RobotName, RunName};
@@ -61,6 +62,10 @@ pub struct WorldFrame {
     pub guest_moods: BTreeMap<GuestMood, Vec<u32>>,
     /// Centers of the fixed obstacles, meters.
     pub obstacles: Vec<[f64; 2]>,
+    /// What does not change in an epoch: in its first frame, once a second, and in all frames while the clock stands. Without it,
+    /// what the frames before had in this epoch still holds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub static_world: Option<StaticWorld>,
     /// The sites, by name.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sites: Vec<SiteFrame>,

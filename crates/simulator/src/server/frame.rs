@@ -78,6 +78,7 @@ pub(super) fn empty_frame(status: &Status, field_m: [f64; 2], body_m: f64) -> Wo
         guests: Vec::new(),
         guest_moods: BTreeMap::new(),
         obstacles: Vec::new(),
+        static_world: None,
         sites: Vec::new(),
         layers: Vec::new(),
         flights: Vec::new(),

@@ -7,17 +7,20 @@ use bus::{Bus, BusError, Query, WatchedPublisher};
 use protocol::encode;
 use protocol::keys::Keys;
 use protocol::messages::{
-    Awaited, ControlAnswer, Flight, LogKind, LogRecord, MAX_ENTRIES, MAX_FLIGHTS, Status,
-    WorldFrame,
+    Awaited, ControlAnswer, Flight, LogKind, LogRecord, MAX_ENTRIES, MAX_FLIGHTS, Phase,
+    StaticWorld, Status, WorldFrame,
 };
 use protocol::time::seconds;
-use protocol::{Event, Tick};
+use protocol::{Epoch, Event, Tick};
 
 /// Frames are put no more often than this: people look at them.
 pub(super) const FRAME_INTERVAL: Duration = Duration::from_millis(33);
 /// Where the clock has a pace, panels are asked for no more often than this, so that a recording has those of every tick. At full
 /// speed they are asked for with frames only: a tick takes less time than its panels.
 const PANEL_INTERVAL: Duration = Duration::from_millis(5);
+
+/// While the clock goes on, what does not change in an epoch is put no more often than this.
+const STATIC_INTERVAL: Duration = Duration::from_secs(1);
 
 /// Most bytes of texts among the lines of the log that are kept: with escapes and the other fields, all of them fit into one
 /// message.
@@ -47,6 +50,10 @@ pub(super) struct Observers {
     flights: VecDeque<Flight>,
     /// How often a replay has been moved.
     jumps: u32,
+    /// Epoch and tick of the last frame.
+    last_frame: Option<(Epoch, Tick)>,
+    /// The epoch of which the static world was put last, and when.
+    static_world_at: Option<(Epoch, Instant)>,
 }
 
 impl Observers {
@@ -59,6 +66,8 @@ impl Observers {
             past_lines: PastLines::default(),
             flights: VecDeque::new(),
             jumps: 0,
+            last_frame: None,
+            static_world_at: None,
         })
     }
 
@@ -95,8 +104,24 @@ impl Observers {
         self.add_flights(known);
     }
 
-    /// Puts a frame, with the flights since the one before.
-    pub(super) fn put(&mut self, mut frame: WorldFrame) {
+    /// Puts a frame, with the flights since the one before, and where it is due with what does not change in its epoch.
+    pub(super) fn put(
+        &mut self,
+        mut frame: WorldFrame,
+        static_world: impl FnOnce() -> StaticWorld,
+    ) {
+        let at = (frame.epoch, frame.tick);
+        // A console that has just connected asks for a frame, and while the clock stands there is no other one.
+        let is_again = self.last_frame.replace(at) == Some(at);
+        let is_due = is_again
+            || frame.phase != Phase::Running
+            || self
+                .static_world_at
+                .is_none_or(|(epoch, at)| epoch != frame.epoch || at.elapsed() >= STATIC_INTERVAL);
+        if is_due {
+            frame.static_world = Some(static_world());
+            self.static_world_at = Some((frame.epoch, Instant::now()));
+        }
         // Also those of ticks that no frame has shown: what became of a command is seen once.
         frame.flights = std::mem::take(&mut self.flights).into();
         frame.jumps = self.jumps;

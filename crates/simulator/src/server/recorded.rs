@@ -322,7 +322,10 @@ impl RecordedRun {
 
         if frontend.observers.has_subscribers() {
             let frame = self.player.frame(&self.status(frontend));
-            frontend.observers.put(frame);
+            let header = self.player.header();
+            frontend
+                .observers
+                .put(frame, || header.static_world.clone());
         }
     }
 

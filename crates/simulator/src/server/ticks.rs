@@ -18,6 +18,7 @@ use super::live::{LiveRun, WaitsFor};
 use super::observers::TickVisibility;
 use super::source::{Next, TickSource};
 use super::watchdog::Activity;
+use crate::static_world::static_world;
 
 impl LiveRun {
     /// Opens the next tick if it is due, or finds out how long to wait at most before looking again.
@@ -252,9 +253,11 @@ impl LiveRun {
         }
         let status = self.status(frontend);
         let held = self.robots_held_for_a_time();
+        let simulation = &self.epoch.simulation;
+        let frame = frame(simulation, &status, held);
         frontend
             .observers
-            .put(frame(&self.epoch.simulation, &status, held));
+            .put(frame, || static_world(simulation.scenario()));
     }
 
     /// The clock is held: tells people for which robots, and answers a client that waits for a step.
