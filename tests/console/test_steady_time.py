@@ -350,6 +350,34 @@ def test_what_was_not_seen_is_a_gap(launch, open_page):
         assert not any(first <= begin and end <= last for first, last in spans(page)), f"a band covers {begin} s to {end} s"
 
 
+def test_a_gap_is_read_as_soon_as_it_is_recorded(launch, open_page):
+    """While the clock stands a page asks often for what it has not seen, and its bands are whole again at once."""
+    run = launch()
+    page = open_page(run.address, 1440, 1000)
+    until(page, f"{TICK} === 0 && window.carsConsole.history().times_s.length > 0")
+    asked = []
+
+    def answer(route):
+        # What is recorded arrives late.
+        asked.append(route)
+        recorded = route.fetch().json()
+        route.fulfill(json={**recorded, "ticks": 0})
+
+    page.route("**/recording", answer)
+    # What is recorded of tick 0 has been read, and is answered from then on.
+    until(page, "window.carsConsole.history().known_s === 0")
+    run.control("step", "30")
+    until(page, f"{TICK} === 30")
+    asked.clear()
+    page.wait_for_timeout(3000)
+    assert len(asked) >= 7, "each second would be too seldom"
+    assert page.evaluate("window.carsConsole.history().hasGap")
+
+    page.unroute("**/recording")
+    until(page, "!window.carsConsole.history().hasGap")
+    assert [spans(page)[0][0], spans(page)[-1][1]] == [0, 15]
+
+
 def test_what_has_not_been_read_is_a_gap(launch, open_page):
     """A page that comes late reads what is recorded. Until it has, there is nothing between that and what the page sees."""
     run = launch()

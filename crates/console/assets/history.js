@@ -156,6 +156,11 @@ export class History {
     }
   }
 
+  /** Whether there is a time of which nothing is known. */
+  get hasGap() {
+    return this.gaps.includes(1);
+  }
+
   /** A series without a value in the last sample gets a gap there. */
   align() {
     const length = this.times_s.length;

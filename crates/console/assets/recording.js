@@ -21,7 +21,7 @@ import { hasGuessedNames, orderNames } from "./palette.js";
  * An epoch that is recorded; `ticks` is its last tick so far, `number` tells it from a recording that took its place, and
  * `epochs` are all that have one.
  * @typedef {{run: string, epoch: number, seed: number, tick_s: number, duration_s: number, field_m: [number, number],
- *   body_m: number, display_unit: "m" | "ft", obstacles: [number, number][], layers: WorldFrame["layers"], ticks: number, is_finished: boolean, number: number, epochs: number[]}} Recorded
+ *   body_m: number, display_unit: "m" | "ft", obstacles: [number, number][], layers: WorldFrame["layers"], static_world?: WorldFrame["static_world"], ticks: number, is_finished: boolean, number: number, epochs: number[]}} Recorded
  */
 /**
  * @typedef {{tick: number, robots: RobotFrame[], guests_mm: number[], guest_moods: WorldFrame["guest_moods"], cuts: Cut[], faults: HeldProcess[],
@@ -46,6 +46,8 @@ const SAMPLES = 3000;
 const ENOUGH_LINES = 10_000;
 /** How often it is asked what has been recorded since; after a request that takes long, later. */
 const FOLLOW_MS = 1000;
+/** The same while the clock stands and something before its tick has not been seen. */
+const FOLLOW_GAP_MS = 150;
 /** In this time a run that has begun has recorded something. */
 const BEGINNING_MS = 5000;
 /** How fast a run that went as fast as it could is watched again. */
@@ -263,8 +265,22 @@ export class Player {
         this.missing = reasonOf(error);
       }
       const taken_ms = performance.now() - begun_ms;
-      await new Promise((resolve) => setTimeout(resolve, Math.max(FOLLOW_MS, 3 * taken_ms)));
+      await this.rest(3 * taken_ms);
     }
+  }
+
+  /** Waits until it is asked again what has been recorded. @param {number} least_ms */
+  async rest(least_ms) {
+    const begun_ms = performance.now();
+    const pause = (/** @type {number} */ ms) => new Promise((resolve) => setTimeout(resolve, ms));
+    await pause(Math.max(FOLLOW_GAP_MS, least_ms));
+    while (!this.hasGap && performance.now() - begun_ms < FOLLOW_MS) await pause(FOLLOW_GAP_MS);
+  }
+
+  /** Whether the clock stands, and the record will tell something that this page has not seen. */
+  get hasGap() {
+    const { live, liveHistory, phase } = this.store;
+    return phase !== "running" && this.newest !== null && this.newest.epoch === live?.epoch && this.readTo < live.tick && liveHistory.hasGap;
   }
 
   /** Takes in what has been recorded since. */

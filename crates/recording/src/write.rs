@@ -221,8 +221,11 @@ impl WriteQueue {
                 return WriterTask::Finish;
             }
 
-            // Also without a word: a chunk of a slow run becomes due with time.
-            let waited = self.due.wait_timeout(state, CHUNK_INTERVAL);
+            // Also without a word: a chunk of a slow run, or of one that is held, becomes due with time.
+            let first = state.chunks.front();
+            let age = first.map_or(Duration::ZERO, |first| first.begun.elapsed());
+            let rest = CHUNK_INTERVAL.saturating_sub(age);
+            let waited = self.due.wait_timeout(state, rest);
             state = waited.unwrap_or_else(PoisonError::into_inner).0;
         }
     }
