@@ -27,14 +27,17 @@ macro_rules! texts {
 /// All but the launch files that start programs of the project's folder.
 const FILES: &[(&str, &str)] = &texts![
     "configs/any_language.toml",
+    "configs/auction.toml",
     "configs/crowded_hall.toml",
     "configs/deliberate.toml",
     "configs/experiments/affect.toml",
+    "configs/experiments/auction.toml",
     "configs/experiments/crowd.toml",
     "configs/experiments/deadlock.toml",
     "configs/experiments/partition.toml",
     "configs/experiments/recruitment.toml",
     "configs/experiments/signals.toml",
+    "configs/experiments/swarm.toml",
     "configs/experiments/teams.toml",
     "configs/experiments/tune_thresholds.toml",
     "configs/experiments/tune_timer.toml",
@@ -47,11 +50,14 @@ const FILES: &[(&str, &str)] = &texts![
     "configs/robots/butler.toml",
     "configs/robots/leguin.toml",
     "configs/signals.toml",
+    "configs/swarm.toml",
     "configs/three_robots.toml",
     "configs/walled_hall.toml",
+    "launch/auction.toml",
     "launch/hors_doeuvres.toml",
     "launch/museum.toml",
     "launch/partition.toml",
+    "launch/swarm.toml",
     "launch/three_robots.toml",
 ];
 
@@ -188,11 +194,13 @@ mod tests {
         let names: Vec<&str> = names(EXPERIMENTS).collect();
         let experiments = [
             "affect",
+            "auction",
             "crowd",
             "deadlock",
             "partition",
             "recruitment",
             "signals",
+            "swarm",
             "teams",
             "tune_thresholds",
             "tune_timer",

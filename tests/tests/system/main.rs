@@ -62,3 +62,4 @@ mod threads;
 mod timeline;
 mod wall_clock;
 mod wire;
+mod worlds;
