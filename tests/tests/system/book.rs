@@ -217,8 +217,10 @@ fn the_examples_of_files_are_right() {
         }
     }
     files.extend(examples("launch-files.md"));
-    files.extend(examples("first-experiment.md"));
-    assert_eq!(files.len(), 20);
+    for page in ["first-experiment.md", "auction.md", "swarm.md"] {
+        files.extend(examples(page));
+    }
+    assert_eq!(files.len(), 22);
 
     let lab = Lab::new();
     // A drawing that one of them names.
