@@ -225,10 +225,10 @@ def choose(page, robot, is_chosen=True):
 
 
 def saved(page, folder):
-    """The drawing has the walls, the shapes, and for the chosen robot its rays and what it overlooks."""
+    """The drawing has the walls, the shapes, and for the chosen robot its rays and its field of view."""
     download(page, "vector", folder / "plan.svg")
     svg = (folder / "plan.svg").read_text()
-    for words in ("wall", "overlooked by Scout", "rays of Scout"):
+    for words in ("wall", "field of view of Scout", "rays of Scout"):
         assert f">{words}</text>" in svg, words
     # Two walls in one path, and all rays in another.
     assert re.search(r'd="M[^"M]*L[^"M]*L[^"M]*M[^"M]*L[^"M]*"', svg), "walls"

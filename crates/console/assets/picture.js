@@ -244,7 +244,7 @@ function legend(paper, words, theme, frame, { hasTrails, chosen, chosenLayer }, 
     }, "wall");
   }
   const sensing = chosen ? static_world?.sensing : undefined;
-  if (sensing?.field_of_view_rad) row((at) => drawSector({ context: paper, theme }, x - 8, at, 18, 0, 0.9), `overlooked by ${chosen}`);
+  if (sensing?.field_of_view_rad) row((at) => drawSector({ context: paper, theme }, x - 8, at, 18, 0, 0.9), `field of view of ${chosen}`);
   if (sensing?.rays) {
     const ends = [-0.4, 0, 0.4].map((angle) => ({ x: 16 * Math.cos(angle), y: 16 * Math.sin(angle) }));
     row((at) => drawFan({ context: paper, theme }, x - 8, at, ends.map((end) => ({ x: x - 8 + end.x, y: at + end.y, isHit: true }))), `rays of ${chosen}`);

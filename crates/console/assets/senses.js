@@ -22,7 +22,7 @@ export function haveDirections(frame) {
 }
 
 /**
- * What a robot overlooks, and what its rays measure.
+ * The field of view of a robot, and what its rays measure.
  * @param {Pen} pen
  * @param {WorldFrame} frame
  * @param {string} name of the robot

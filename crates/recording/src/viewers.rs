@@ -49,9 +49,17 @@ impl ViewerSchema {
 pub(crate) fn field(to: &mut Protobuf<'_>, header: &Header) {
     to.message(2, |to| {
         entity(to, 0, "field");
+        let mut discs = Vec::new();
         for (index, at) in header.obstacles.iter().enumerate() {
             let shape = header.static_world.obstacle_shapes.get(index);
-            body(to, header, shape.copied().flatten(), *at, 0.0, FIXED_COLOR);
+            match shape.copied().flatten() {
+                Some(BodyShape::Disc(radius_m)) => discs.push((BodyShape::Disc(radius_m), *at)),
+                other => body(to, header, other, *at, 0.0, FIXED_COLOR),
+            }
+        }
+        // Fields are in the order of their numbers.
+        for (shape, at) in discs {
+            body(to, header, Some(shape), at, 0.0, FIXED_COLOR);
         }
         to.message(11, |to| outline(to, header));
         for wall in &header.static_world.walls {

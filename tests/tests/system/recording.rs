@@ -127,6 +127,51 @@ fn what_viewers_draw_has_the_schemas_of_foxglove() {
 }
 
 #[test]
+fn viewers_draw_walls_and_shapes() {
+    let lab = Lab::new();
+    let walls = r#"wall=[{ points = [["1 m", "9 m"], ["3 m", "9 m"], ["3 m", "8 m"]] }]"#;
+    let obstacles =
+        r#"obstacle=[{ at = ["2 ft", "2 ft"] }, { at = ["9 m", "9 m"], radius = "0.5 m" },
+        { at = ["12 m", "9 m"], size = ["2 m", "1 m"] }]"#
+            .replace('\n', " ");
+    let args = [
+        "--duration",
+        "5 s",
+        "--run",
+        "hall",
+        "--set",
+        walls,
+        "--set",
+        &obstacles,
+    ];
+    lab.ok(&[&["run", "configs/hors_doeuvres.toml"][..], &args].concat());
+    let script = root().join("tests/recording/views.py");
+    let Some(output) = python(&script, &lab.file("hall", "run.mcap")) else {
+        return;
+    };
+
+    let found: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let field = &found["last"]["/view/field"]["entities"][0];
+    assert_eq!(field["cubes"].as_array().unwrap().len(), 2);
+    let showcase = &field["cubes"][1];
+    assert_eq!(showcase["pose"]["position"]["x"], 12.0);
+    assert_eq!(
+        (&showcase["size"]["x"], &showcase["size"]["y"]),
+        (&2.0.into(), &1.0.into())
+    );
+    let disc = &field["cylinders"][0];
+    assert_eq!(disc["pose"]["position"]["x"], 9.0);
+    assert_eq!(
+        (&disc["size"]["x"], &disc["topScale"]),
+        (&1.0.into(), &1.0.into())
+    );
+    // The edge of the field, and the wall.
+    let lines = field["lines"].as_array().unwrap();
+    assert_eq!(lines.len(), 2);
+    assert_eq!(lines[1]["points"].as_array().unwrap().len(), 3);
+}
+
+#[test]
 fn the_example_of_the_documentation_works() {
     let lab = Lab::new();
     let args = ["--duration", "10 s", "--run", "hall"];
