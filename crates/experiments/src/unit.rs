@@ -41,7 +41,7 @@ pub struct Played {
 /// What is measured of a run.
 struct Gauge<'a> {
     /// The measures, by name.
-    probes: Vec<(&'a str, Probe<'a>)>,
+    probes: Vec<(&'a str, Probe)>,
     words: Words,
 }
 

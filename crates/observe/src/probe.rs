@@ -21,8 +21,8 @@ use crate::{Observation, RunSetting};
 const OCCURRED: [&str; 4] = ["emotions_s", "behaviors_s", "entered", "sent"];
 
 /// A measure of one run.
-#[derive(Debug)]
-pub struct Probe<'a> {
+#[derive(Debug, Clone)]
+pub struct Probe {
     /// The last tick. A run begins with 0.
     now: Tick,
     tick_s: f64,
@@ -30,7 +30,7 @@ pub struct Probe<'a> {
     planned: Tick,
     /// Whether the run ended before it, because its question was answered.
     has_ended_early: bool,
-    tally: Tally<'a>,
+    tally: Tally,
 }
 
 /// When a run ended.
@@ -45,23 +45,23 @@ struct RunEnding {
     horizon: Tick,
 }
 
-#[derive(Debug)]
-enum Tally<'a> {
-    Summary(&'a str),
-    Count(CountTally<'a>),
+#[derive(Debug, Clone)]
+enum Tally {
+    Summary(String),
+    Count(CountTally),
     Time(TimeTally),
-    Between(BetweenTally<'a>),
-    Share(ShareTally<'a>),
-    Number(Box<NumberTally<'a>>),
-    Stalled(StalledTally<'a>),
-    Ratio(RatioTally<'a>),
-    Expression(&'a Expression),
+    Between(BetweenTally),
+    Share(ShareTally),
+    Number(Box<NumberTally>),
+    Stalled(StalledTally),
+    Ratio(RatioTally),
+    Expression(Expression),
 }
 
-impl<'a> Probe<'a> {
+impl Probe {
     /// A measure of a run that has not begun. The condition of the run begins and ends at these times, simulated seconds.
     #[must_use]
-    pub fn new(measure: &'a Measure, setting: &RunSetting, condition_s: (f64, f64)) -> Self {
+    pub fn new(measure: &Measure, setting: &RunSetting, condition_s: (f64, f64)) -> Self {
         Self {
             now: 0,
             tick_s: 0.0,
@@ -106,12 +106,12 @@ impl<'a> Probe<'a> {
     }
 }
 
-impl<'a> Tally<'a> {
-    fn new(source: &'a MeasureSource, setting: &RunSetting, condition_s: (f64, f64)) -> Self {
+impl Tally {
+    fn new(source: &MeasureSource, setting: &RunSetting, condition_s: (f64, f64)) -> Self {
         match source {
-            MeasureSource::Summary(path) => Self::Summary(path),
+            MeasureSource::Summary(path) => Self::Summary(path.clone()),
             MeasureSource::Count(count) => Self::Count(CountTally {
-                definition: count,
+                definition: count.clone(),
                 condition_s,
                 count: 0,
             }),
@@ -125,24 +125,24 @@ impl<'a> Tally<'a> {
                 reached: None,
             }),
             MeasureSource::Between(between) => Self::Between(BetweenTally {
-                definition: between,
+                definition: between.clone(),
                 open: None,
                 durations: Durations::default(),
             }),
             MeasureSource::Share(quantity) => Self::Share(ShareTally::new(quantity, setting)),
             MeasureSource::Number(number) => Self::Number(Box::new(NumberTally {
-                definition: number,
+                definition: number.clone(),
                 gauge: QuantityGauge::new(&number.quantity, setting),
                 values: None,
                 undefined: None,
             })),
             MeasureSource::Stalled(stalled) => Self::Stalled(StalledTally {
-                definition: stalled,
+                definition: stalled.clone(),
                 values: vec![None; stalled.progress.len()],
                 progress: 0,
             }),
             MeasureSource::Ratio(ratio) => {
-                let tallies = |parts: &'a Parts| {
+                let tallies = |parts: &Parts| {
                     let parts = parts.0.iter();
                     parts
                         .map(|part| Self::new(part, setting, condition_s))
@@ -153,7 +153,7 @@ impl<'a> Tally<'a> {
                     by: tallies(&ratio.by),
                 })
             }
-            MeasureSource::Expression(expression) => Self::Expression(expression),
+            MeasureSource::Expression(expression) => Self::Expression(expression.clone()),
         }
     }
 
@@ -189,7 +189,7 @@ impl<'a> Tally<'a> {
             Self::Number(tally) => tally.measured(end.now, end.tick_s),
             Self::Stalled(tally) => tally.measured(end),
             Self::Ratio(tally) => {
-                let take = |part: &Tally<'_>| part.measured(summary, earlier, end);
+                let take = |part: &Tally| part.measured(summary, earlier, end);
                 ratio(
                     tally.of.iter().map(take).collect(),
                     tally.by.iter().map(take).collect(),
@@ -213,10 +213,10 @@ fn number_of_measure(earlier: &BTreeMap<String, Measured>, name: &str) -> Result
     }
 }
 
-#[derive(Debug)]
-struct RatioTally<'a> {
-    of: Vec<Tally<'a>>,
-    by: Vec<Tally<'a>>,
+#[derive(Debug, Clone)]
+struct RatioTally {
+    of: Vec<Tally>,
+    by: Vec<Tally>,
 }
 
 /// The sum of numbers over the sum of others, where there are all of them.
@@ -286,15 +286,15 @@ fn number_of(observation: &Observation<'_>, robot: &RobotName, variable: &str) -
     number_of_state((observation.state)(robot)?, variable)
 }
 
-#[derive(Debug)]
-struct CountTally<'a> {
-    definition: &'a Count,
+#[derive(Debug, Clone)]
+struct CountTally {
+    definition: Count,
     /// Begin and end of the condition, simulated seconds.
     condition_s: (f64, f64),
     count: u64,
 }
 
-impl CountTally<'_> {
+impl CountTally {
     fn observe(&mut self, observation: &Observation<'_>) {
         let (from_s, until_s) = self.condition_s;
         let is_counting = match self.definition.when {
@@ -314,7 +314,7 @@ impl CountTally<'_> {
     }
 }
 
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct TimeTally {
     after: Option<Evaluation>,
     to: Evaluation,
@@ -364,9 +364,9 @@ impl TimeTally {
     }
 }
 
-#[derive(Debug)]
-struct BetweenTally<'a> {
-    definition: &'a Between,
+#[derive(Debug, Clone)]
+struct BetweenTally {
+    definition: Between,
     /// In which tick the pair that is open began.
     open: Option<Tick>,
     durations: Durations,
@@ -400,7 +400,7 @@ impl Durations {
     }
 }
 
-impl BetweenTally<'_> {
+impl BetweenTally {
     fn observe(&mut self, observation: &Observation<'_>) {
         for event in observation.events {
             if let Some(begun) = self.open
@@ -416,7 +416,7 @@ impl BetweenTally<'_> {
     }
 
     fn measured(&self, now: Tick, tick_s: f64) -> Measured {
-        let definition = self.definition;
+        let definition = &self.definition;
         let mut durations = self.durations;
         let mut is_finished = true;
         if let Some(begun) = self.open
@@ -435,9 +435,9 @@ impl BetweenTally<'_> {
 }
 
 /// Robots in one of some states, by events: one that is lost is in none of them until it takes part again.
-#[derive(Debug)]
-struct ShareTally<'a> {
-    states: &'a StateNames,
+#[derive(Debug, Clone)]
+struct ShareTally {
+    states: StateNames,
     by: By,
     /// The robots, in the order of their names.
     robots: Vec<RobotName>,
@@ -450,8 +450,8 @@ struct ShareTally<'a> {
     sum: f64,
 }
 
-impl<'a> ShareTally<'a> {
-    fn new(quantity: &'a RunQuantity, setting: &RunSetting) -> Self {
+impl ShareTally {
+    fn new(quantity: &RunQuantity, setting: &RunSetting) -> Self {
         let RunQuantity::Each {
             of: OfRobot::State(states),
             by,
@@ -462,7 +462,7 @@ impl<'a> ShareTally<'a> {
         };
         let robots = quantity.robots(setting);
         Self {
-            states,
+            states: states.clone(),
             // Of one robot it is the same whichever way.
             by: by.unwrap_or(By::Mean),
             is_in: vec![false; robots.len()],
@@ -496,7 +496,7 @@ impl<'a> ShareTally<'a> {
     /// Takes an event into account. Returns whether a robot of the team may be in another state.
     fn note(&mut self, event: &Event) -> bool {
         let index = |robot| self.robots.binary_search(robot).ok();
-        match (event, self.states) {
+        match (event, &self.states) {
             (Event::Emotion { robot, to, .. }, StateNames::Emotions(names))
             | (Event::Behavior { robot, to, .. }, StateNames::Behaviors(names)) => {
                 let Some(index) = index(robot) else {
@@ -534,9 +534,9 @@ impl<'a> ShareTally<'a> {
     }
 }
 
-#[derive(Debug)]
-struct NumberTally<'a> {
-    definition: &'a Number,
+#[derive(Debug, Clone)]
+struct NumberTally {
+    definition: Number,
     gauge: QuantityGauge,
     /// `None` before the number has a value.
     values: Option<Values>,
@@ -563,7 +563,7 @@ impl Values {
     }
 }
 
-impl NumberTally<'_> {
+impl NumberTally {
     fn observe(&mut self, observation: &Observation<'_>) {
         let value = match self.gauge.value(observation) {
             Ok(value) => value,
@@ -619,16 +619,16 @@ impl NumberTally<'_> {
     }
 }
 
-#[derive(Debug)]
-struct StalledTally<'a> {
-    definition: &'a Stalled,
+#[derive(Debug, Clone)]
+struct StalledTally {
+    definition: Stalled,
     /// Last values of the variables of progress. A robot that is lost makes no progress.
     values: Vec<Option<f64>>,
     /// The tick of the last progress.
     progress: Tick,
 }
 
-impl StalledTally<'_> {
+impl StalledTally {
     fn observe(&mut self, observation: &Observation<'_>) {
         for (counter, before) in self.definition.progress.iter().zip(&mut self.values) {
             let Some(now) = number_of(observation, &counter.robot, &counter.variable) else {
@@ -755,7 +755,7 @@ mod tests {
     }
 
     fn observe(
-        probe: &mut Probe<'_>,
+        probe: &mut Probe,
         tick_s: f64,
         tick: usize,
         events: &[Event],
