@@ -77,6 +77,7 @@ impl Diagram {
             for span in self.timeline.apply(tick, event) {
                 self.add(span, &mut items);
             }
+            items.push_site(tick, event);
             self.window.has_end |= matches!(event, Event::End { .. });
         }
         let held_up = awaited.iter().cloned();

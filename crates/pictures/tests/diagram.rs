@@ -8,7 +8,7 @@
 use pictures::diagram::{Diagram, DiagramOptions, MAX_ITEMS, TooMuch};
 use pictures::{style, width_px};
 use protocol::event::Cause;
-use protocol::messages::{Awaited, FaultKind, Performative, Point, Reason};
+use protocol::messages::{Awaited, FaultKind, Performative, Point, Reason, SiteRefusal};
 use protocol::{Event, RobotName, Tick};
 use roxmltree::{Document, Node};
 use timeline::Timeline;
@@ -814,4 +814,49 @@ fn a_picture_has_its_style_or_leaves_it_to_the_page() {
     let without = draw_with(&[], 0, 10, options).unwrap();
     assert!(!without.contains("<style") && !without.contains("style="));
     assert!(with.contains(&style()));
+}
+
+#[test]
+fn acts_on_sites_are_marked_and_named() {
+    let changed = |key: &str, to: f64| Event::SiteChanged {
+        robot: name("Leguin"),
+        site: "T1".to_owned(),
+        key: key.to_owned(),
+        from: 0.0.into(),
+        to: to.into(),
+    };
+    let refused = Event::SiteRefused {
+        robot: name("Butler"),
+        site: "U".to_owned(),
+        because: SiteRefusal::Bound,
+    };
+    let events = [
+        (4, changed("stock", 5.0)),
+        (4, refused),
+        (4, changed("done", 1.0)),
+        (30, changed("stock", 4.0)),
+    ];
+    let svg = draw(&events, 0, 60);
+    let document = Document::parse(&svg).unwrap();
+    let marks = of_class(&document, "site");
+    let titles: Vec<&str> = marks.iter().map(|mark| title(*mark)).collect();
+    assert_eq!(
+        titles,
+        [
+            "Leguin in tick 4 (2 s): T1 stock 5; T1 done 1",
+            "Butler in tick 4 (2 s): U refused: bound",
+            "Leguin in tick 30 (15 s): T1 stock 4",
+        ]
+    );
+    assert_eq!(of_class(&document, "refused").len(), 1);
+    for label in ["T1 stock 5, +1", "U refused: bound", "T1 stock 4"] {
+        assert!(svg.contains(&format!(">{label}</text>")), "{label}: {svg}");
+    }
+
+    // Robots that act in every tick do not make the run too much for a diagram.
+    let many: Vec<(Tick, Event)> = (1..=2100)
+        .map(|tick| (tick, changed("stock", 1.0)))
+        .collect();
+    let svg = draw(&many, 0, 2100);
+    assert!(svg.contains(", 100 more acts on sites"), "{}", &svg[..300]);
 }

@@ -72,7 +72,7 @@ pub(crate) fn draw(
     options: &DiagramOptions,
     legend: Option<(&Items, VisibleTicks)>,
 ) -> String {
-    let heading = heading(window, options);
+    let heading = heading(items, window, options);
     let mut picture = begin(timeline, items, window, &heading, options);
 
     draw_lanes(&mut picture);
@@ -151,6 +151,7 @@ fn busy_ticks(items: &Items) -> BTreeSet<Tick> {
     busy.extend(items.joined.iter().map(|joined| joined.tick));
     busy.extend(items.held_up.iter().map(|held| held.tick));
     busy.extend(items.changes.iter().map(|change| change.tick));
+    busy.extend(items.sites.iter().map(|mark| mark.tick));
     busy
 }
 
@@ -171,8 +172,11 @@ fn draw_lanes(picture: &mut Picture) {
 }
 
 /// The text above the lanes.
-fn heading(window: VisibleTicks, options: &DiagramOptions) -> String {
-    let ticks = format!("ticks {} to {}", window.from, window.to);
+fn heading(items: &Items, window: VisibleTicks, options: &DiagramOptions) -> String {
+    let mut ticks = format!("ticks {} to {}", window.from, window.to);
+    if items.sites_left_out > 0 {
+        ticks += &format!(", {} more acts on sites", items.sites_left_out);
+    }
     if options.title.is_empty() {
         return ticks;
     }

@@ -1,7 +1,7 @@
 //! The things that a diagram shows.
 
-use protocol::Tick;
 use protocol::messages::Awaited;
+use protocol::{Event, RobotName, Tick};
 
 use timeline::{
     Absence, ChangeSpan, CommandSpan, CutSpan, FaultSpan, Joined, MissedTicks, Period, QueriesLost,
@@ -14,6 +14,25 @@ pub(crate) struct HeldTick {
     pub(crate) tick: Tick,
     pub(crate) awaited: Awaited,
 }
+
+/// What a robot did to sites in a tick.
+#[derive(Debug, Clone)]
+pub(crate) struct SiteMark {
+    pub(crate) robot: RobotName,
+    pub(crate) tick: Tick,
+    /// What it did, in words. The title names them all, the label the first one.
+    pub(crate) words: Vec<String>,
+}
+
+impl SiteMark {
+    /// Whether all that it did was refused.
+    pub(crate) fn is_refused(&self) -> bool {
+        self.words.iter().all(|words| words.contains(" refused: "))
+    }
+}
+
+/// Most ticks in which robots act on sites that are drawn; of more, their number.
+const MAX_SITE_MARKS: usize = 2000;
 
 /// Everything in a window.
 #[derive(Debug, Clone, Default)]
@@ -28,6 +47,9 @@ pub(crate) struct Items {
     pub(crate) queries: Vec<QueriesLost>,
     pub(crate) held_up: Vec<HeldTick>,
     pub(crate) changes: Vec<ChangeSpan>,
+    pub(crate) sites: Vec<SiteMark>,
+    /// How many marks of sites are left out.
+    pub(crate) sites_left_out: usize,
 }
 
 impl Items {
@@ -36,6 +58,35 @@ impl Items {
         let states = self.bands.len() + self.missed.len() + self.absences.len() + self.joined.len();
         let network = self.commands.len() + self.cuts.len() + self.queries.len();
         states + network + self.faults.len() + self.held_up.len() + self.changes.len()
+    }
+
+    /// Adds what an event of a tick says about sites.
+    pub(crate) fn push_site(&mut self, tick: Tick, event: &Event) {
+        let (robot, words) = match event {
+            Event::SiteChanged {
+                robot,
+                site,
+                key,
+                to,
+                ..
+            } => (robot, format!("{site} {key} {to}")),
+            Event::SiteRefused {
+                robot,
+                site,
+                because,
+            } => (robot, format!("{site} refused: {}", because.name())),
+            _ => return,
+        };
+        let last = self.sites.iter_mut().rev();
+        let mut of_tick = last.take_while(|mark| mark.tick == tick);
+        match of_tick.find(|mark| mark.robot == *robot) {
+            Some(mark) => mark.words.push(words),
+            None => self.sites.push(SiteMark {
+                robot: robot.clone(),
+                tick,
+                words: vec![words],
+            }),
+        }
     }
 
     /// Adds one.
@@ -77,5 +128,10 @@ impl Items {
         self.queries.append(&mut other.queries);
         self.held_up.append(&mut other.held_up);
         self.changes.append(&mut other.changes);
+        let kept = MAX_SITE_MARKS.saturating_sub(self.sites.len());
+        let left_out = other.sites.len().saturating_sub(kept);
+        other.sites.truncate(kept);
+        self.sites.append(&mut other.sites);
+        self.sites_left_out += left_out + other.sites_left_out;
     }
 }

@@ -14,6 +14,8 @@ use crate::shapes::{LABEL_PX, SMALL_PX};
 
 /// Most letters of the name of an emotion or a behavior.
 const NAME_LETTERS: usize = 40;
+/// Most letters of the label of an act on a site.
+const SITE_LETTERS: usize = 32;
 
 /// Draws the bands.
 pub(crate) fn draw_bands(picture: &mut Picture, items: &Items) {
@@ -49,13 +51,14 @@ fn draw_band(picture: &mut Picture, band: &StateSpan) {
     picture.close();
 }
 
-/// Draws faults, absences, returns, ticks that were missed or held up, and changes of the scenario.
+/// Draws faults, absences, returns, ticks that were missed or held up, acts on sites, and changes of the scenario.
 pub(crate) fn draw_processes(picture: &mut Picture, items: &Items) {
     draw_missed(picture, items);
     draw_faults(picture, items);
     draw_absences(picture, items);
     draw_joined(picture, items);
     draw_held_up(picture, items);
+    draw_sites(picture, items);
     draw_changes(picture, items);
 }
 
@@ -161,6 +164,39 @@ fn draw_held_up(picture: &mut Picture, items: &Items) {
         picture.close();
         let text = format!("waited for {robot}");
         mark(picture, robot, x + 4.0, held.tick, &text);
+    }
+}
+
+/// What robots do to sites: a mark on the lower edge of the lane, and below it what it was, where there is room.
+fn draw_sites(picture: &mut Picture, items: &Items) {
+    for mark in &items.sites {
+        let Some(bottom) = picture.lanes.lane(&mark.robot).map(|lane| lane.bottom) else {
+            continue;
+        };
+
+        let title = picture.titles.sites(mark);
+        let x = picture.x(mark.tick);
+        let class = if mark.is_refused() {
+            "site refused"
+        } else {
+            "site"
+        };
+        picture.open(class, mark.tick, &title);
+        picture
+            .svg
+            .triangle("act", (x, bottom - 1.0), (x, bottom + 6.0));
+        picture.close();
+
+        let mut text = shortened(&mark.words[0], SITE_LETTERS);
+        if mark.words.len() > 1 {
+            text += &format!(", +{}", mark.words.len() - 1);
+        }
+        let places = [
+            LabelPosition::After(x + 6.0, bottom + 7.0),
+            LabelPosition::Before(x - 6.0, bottom + 7.0),
+            LabelPosition::After(x + 6.0, bottom + 20.0),
+        ];
+        picture.label("mark", mark.tick, text, &places);
     }
 }
 

@@ -9,7 +9,7 @@ use timeline::{
     StateKind, StateSpan,
 };
 
-use crate::diagram::items::HeldTick;
+use crate::diagram::items::{HeldTick, SiteMark};
 use crate::labels::shortened;
 
 /// Most letters of a text from a robot in a title.
@@ -169,6 +169,11 @@ impl Titles {
 
     pub(crate) fn change(self, change: &ChangeSpan) -> String {
         format!("{}: from now on {}", self.tick(change.tick), change.set)
+    }
+
+    pub(crate) fn sites(self, mark: &SiteMark) -> String {
+        let words = shortened(&mark.words.join("; "), TITLE_LETTERS);
+        format!("{} in {}: {words}", mark.robot, self.tick(mark.tick))
     }
 
     pub(crate) fn held_up(self, held: &HeldTick) -> String {
