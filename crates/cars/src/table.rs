@@ -33,6 +33,9 @@ pub(crate) fn print(summary: &Summary, folder: &Path) -> Result<(), OutputError>
     for line in verdicts(&summary.expectations) {
         text += &format!("\n{line}");
     }
+    for (name, measured) in &summary.measures {
+        text += &format!("\n{name}: {measured}");
+    }
     for line in held_up(summary) {
         text += &format!("\n{line}");
     }

@@ -1,6 +1,7 @@
 // @ts-check
-// A state variable of the robots over simulated time.
+// A state variable of the robots, or a measure of the run, over simulated time.
 
+import { THE_RUN } from "./history.js";
 import { robotColor } from "./palette.js";
 import { rank } from "./roster.js";
 import { onThemeChange, readTheme } from "./theme.js";
@@ -64,6 +65,7 @@ export class Charts {
 
   /** @param {string} robot */
   isShown(robot) {
+    if (robot === THE_RUN) return true;
     return this.chosen ? this.chosen.has(robot) : rank(robot) < FIRST_SHOWN;
   }
 
@@ -172,7 +174,7 @@ export class Charts {
             ${names.map((name) => html`<option value=${name} ?selected=${name === this.variable}>${name} (${robots(name)})</option>`)}
           </select></label>
         ${this.chooser()}
-        <span class="muted" ?hidden=${names.length > 0}>No robot has published a number yet.</span>
+        <span class="muted" ?hidden=${names.length > 0}>There is no number yet.</span>
         <button type="button" data-testid="window-all" title="show the whole run (double click)" .style=${`visibility:${this.shown.isWhole ? "hidden" : "visible"}`}
           @click=${() => this.shown.reset()}>Whole run</button>
         <span class="muted" ?hidden=${history.dropped === 0}>${history.dropped} variables more are not kept.</span>

@@ -16,6 +16,8 @@ const MOST_SPANS = 4000;
 const SEEN_TICKS = 10;
 /** Most variables of all robots: a robot can publish any number of names. */
 const MOST_VARIABLES = 16_384;
+/** Whose the measures of a run are, in the place of a robot: no robot has such a name. */
+export const THE_RUN = "the run";
 /** Most names of emotions that are listed: a robot can have any. */
 const MOST_EMOTIONS = 64;
 
@@ -53,19 +55,21 @@ export class History {
    * @param {number} time_s
    * @param {number} tick_s length of a tick
    * @param {Parameters<History["add"]>[1]} robots
+   * @param {Parameters<History["add"]>[2]} [measures]
    */
-  see(time_s, tick_s, robots) {
+  see(time_s, tick_s, robots, measures) {
     const last_s = Math.max(this.known_s, this.times_s.at(-1) ?? Infinity);
-    this.add(time_s, robots, time_s - last_s > (SEEN_TICKS + 0.5) * tick_s);
+    this.add(time_s, robots, measures, time_s - last_s > (SEEN_TICKS + 0.5) * tick_s);
   }
 
   /**
    * Adds a sample; one that is not later than the last is ignored.
    * @param {number} time_s
    * @param {Pick<RobotFrame, "name" | "location" | "presence" | "emotion_state" | "behavior_state" | "state_variables">[]} robots
+   * @param {Record<string, number>} measures of the run
    * @param {boolean} isBroken whether nothing is known of the time before
    */
-  add(time_s, robots, isBroken = false) {
+  add(time_s, robots, measures = {}, isBroken = false) {
     const last_s = this.times_s.at(-1) ?? -Infinity;
     if (time_s <= last_s) return;
     this.changes += 1;
@@ -86,6 +90,7 @@ export class History {
         if (typeof value === "number") this.series(variable, robot.name)?.push(value);
       }
     }
+    for (const [measure, value] of Object.entries(measures)) this.series(measure, THE_RUN)?.push(value);
 
     this.align();
     const most = Math.min(MOST_SAMPLES, MOST_NUMBERS / (this.variableCount + 2 * this.tracks.size));

@@ -26,7 +26,7 @@ import { hasGuessedNames, orderNames } from "./palette.js";
 /**
  * @typedef {{tick: number, robots: RobotFrame[], guests_mm: number[], guest_moods: WorldFrame["guest_moods"], cuts: Cut[], faults: HeldProcess[],
  *   awaiting: Awaited[], expectations: Standing[], sites: WorldFrame["sites"],
- *   layers: WorldFrame["layers"]}} RecordedTick
+ *   layers: WorldFrame["layers"], measures?: Record<string, number>}} RecordedTick
  */
 /** A panel and its tick. @typedef {{tick: number, robot: string, panel: Panel}} RecordedPanel */
 /** Ticks before `end`; `earlier_flights` are of commands that the first ones show, too. @typedef {{end: number, ticks: RecordedTick[], panels: RecordedPanel[], earlier_flights: Flight[], flights: Flight[],
@@ -318,7 +318,7 @@ export class Player {
       if (this.readTo + 1 !== from || this.store.live?.epoch !== epoch.epoch) return;
       if (range.end <= from) return;
 
-      const times = range.ticks.map(({ tick, robots }) => ({ time_s: tick * epoch.tick_s, robots }));
+      const times = range.ticks.map(({ tick, robots, measures }) => ({ time_s: tick * epoch.tick_s, robots, measures }));
       this.readTo = range.end - 1;
       this.store.refill(from * epoch.tick_s, this.readTo * epoch.tick_s, times, this.readTo);
       this.store.addRecorded(range.log);
@@ -350,7 +350,7 @@ export class Player {
     for (let from = 0; from <= epoch.ticks && isWanted(); ) {
       const range = await samples(epoch, from, history ? undefined : epoch.ticks + 1);
       if (range.end <= from) return;
-      for (const { tick, robots } of range.ticks) history?.add(tick * epoch.tick_s, robots);
+      for (const { tick, robots, measures } of range.ticks) history?.add(tick * epoch.tick_s, robots, measures);
       this.store.addRecorded(range.log);
       this.store.emit("live");
       from = range.end;
@@ -540,6 +540,7 @@ export class Player {
       expectations: record.expectations,
       sites: record.sites,
       layers: header.layers?.map((layer) => record.layers?.find((now) => now.name === layer.name) ?? layer),
+      measures: record.measures,
       robots: record.robots,
     };
   }

@@ -184,7 +184,7 @@ export class Store {
     if (!this.isBack) this.panels = this.livePanels;
     this.liveFlights.push(frame.flights ?? []);
     if (!this.isBack) this.flights = this.liveFlights;
-    this.liveHistory.see(frame.time_s, frame.tick_s, frame.robots);
+    this.liveHistory.see(frame.time_s, frame.tick_s, frame.robots, frame.measures);
     this.memory.add(frame, this.livePanels, this.liveFlights);
     if (!this.isBack) this.emit("panel");
     if (!this.isBack) this.show(frame);
@@ -261,16 +261,16 @@ export class Store {
    * Takes in ticks of the epoch in progress that have been recorded, in place of what was seen of them.
    * @param {number} from_s when they begin
    * @param {number} to_s when they end
-   * @param {{time_s: number, robots: import("./types/messages.js").RobotFrame[]}[]} samples
+   * @param {{time_s: number, robots: import("./types/messages.js").RobotFrame[], measures?: Record<string, number>}[]} samples
    * @param {number} last tick of the samples
    */
   refill(from_s, to_s, samples, last) {
     this.liveHistory.cutFrom(from_s);
-    for (const { time_s, robots } of samples) this.liveHistory.add(time_s, robots);
+    for (const { time_s, robots, measures } of samples) this.liveHistory.add(time_s, robots, measures);
     // What is recorded is known to its last tick, which of a long run need not be a sample.
     this.liveHistory.known_s = to_s;
-    for (const { time_s, tick_s, robots } of this.memory.after(last)) this.liveHistory.see(time_s, tick_s, robots);
-    if (this.live) this.liveHistory.see(this.live.time_s, this.live.tick_s, this.live.robots);
+    for (const { time_s, tick_s, robots, measures } of this.memory.after(last)) this.liveHistory.see(time_s, tick_s, robots, measures);
+    if (this.live) this.liveHistory.see(this.live.time_s, this.live.tick_s, this.live.robots, this.live.measures);
   }
 
   /**

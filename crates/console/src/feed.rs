@@ -489,6 +489,7 @@ mod tests {
             cuts: Vec::new(),
             faults: Vec::new(),
             expectations: Vec::new(),
+            measures: BTreeMap::new(),
         }
     }
 

@@ -327,6 +327,7 @@ fn add_tick(
             "expectations",
             &to_json(&recorded.frame.standings(&recorded.events)),
         ),
+        ("measures", &to_json(&recorded.frame.measures)),
         // Robots for which the clock was held.
         ("awaiting", &to_json(&recorded.wall.awaited)),
     ]);

@@ -22,6 +22,8 @@ use crate::{RunSetting, TickConditionError};
 
 /// Longest name of a measure, bytes.
 const MAX_NAME_BYTES: usize = 100;
+/// Most measures of a scenario.
+pub const MAX_MEASURES: usize = 64;
 /// Most numbers that are added on one side of a ratio.
 const MAX_PARTS: usize = 64;
 
@@ -358,6 +360,20 @@ pub enum MeasureError {
         /// The measures that there are.
         earlier: String,
     },
+    /// A kind that only experiments measure.
+    #[error(
+        "a measure of a scenario has no `{0}`, which is for experiments: `summary.json` has such numbers"
+    )]
+    NotLive(&'static str),
+    /// Two measures have the same name.
+    #[error("a second measure called \"{0}\"")]
+    Twice(String),
+    /// There are too many.
+    #[error("more than {MAX_MEASURES} measures")]
+    TooMany,
+    /// It counts the verdicts about an expectation that there is not.
+    #[error("there is no expectation \"{0}\"")]
+    NoExpectation(String),
     /// A standstill without a duration or variables.
     #[error("`stalled` names the variables of progress, and a time that is more than zero")]
     NoProgress,

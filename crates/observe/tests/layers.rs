@@ -18,6 +18,7 @@ fn setting() -> RunSetting {
         tick_s: 0.5,
         ticks: 20,
         field_m: [4.0, 2.0],
+        radio_range_m: None,
         body_m: 0.5,
         roster: vec![RobotName::new("R1").unwrap()],
         sites: BTreeMap::new(),

@@ -8,8 +8,8 @@
 use std::collections::BTreeMap;
 
 use observe::{
-    Evaluation, Expectation, Measure, Measured, Monitors, Observation, Probe, RunSetting,
-    SiteStates, TickCondition,
+    Evaluation, Expectation, Measure, Measured, Measurements, Monitors, Observation, Probe,
+    RunSetting, ScenarioMeasure, SiteStates, TickCondition,
 };
 use proptest::prelude::*;
 use protocol::messages::{SiteRefusal, StateVariables, Variable};
@@ -537,4 +537,48 @@ proptest! {
         let expected: Vec<u64> = (0..).zip(&counts).filter(|(_, count)| **count >= 2).map(|(tick, _)| tick).collect();
         prop_assert_eq!(holds_in(text, &ticks).0, expected);
     }
+}
+
+#[derive(Debug, Deserialize)]
+struct Measures {
+    measure: Vec<ScenarioMeasure>,
+}
+
+/// While a run goes on, its measures are those of a run that ends with the tick.
+#[test]
+fn measures_of_a_run_that_goes_on_are_those_of_one_that_ends() {
+    let text = "[[measure]]\nname = 'sum'\nvariable = { sites = '*', by = 'sum', name = 'stock', as = 'mean' }\n\
+                [[measure]]\nname = 'done'\ntime = { to = { sites = 'T*', by = 'all', variable = 'done' } }\n\
+                [[measure]]\nname = 'acts'\ncount = { event = 'site_changed', site = 'T*' }\n\
+                [[measure]]\nname = 'share'\nexpression = 'acts / (sum + 1)'\n";
+    let measures: Measures = toml::from_str(text).unwrap();
+    observe::check_measures(&measures.measure, &[], &setting()).unwrap();
+    let mut live = Vec::new();
+    let mut measurements = Measurements::new(&measures.measure, &setting());
+    show(&work(), |seen| {
+        measurements.observe(seen);
+        live.push(measurements.measured());
+    });
+
+    for ticks in 1..=work().len() {
+        let mut probes = Vec::new();
+        for measure in &measures.measure {
+            let probe = Probe::new(measure, &setting(), (0.0, f64::INFINITY));
+            probes.push((measure.name.clone(), probe));
+        }
+        show(&work()[..ticks], |seen| {
+            for (_, probe) in &mut probes {
+                probe.observe(seen);
+            }
+        });
+        let mut measured = BTreeMap::new();
+        for (name, probe) in probes {
+            let value = probe.measured(&Value::Null, &measured);
+            measured.insert(name, value);
+        }
+        assert_eq!(live[ticks - 1], measured, "after {ticks} ticks");
+    }
+    let names: Vec<String> = measurements.numbers().into_keys().collect();
+    assert_eq!(names, ["acts", "done", "share", "sum"]);
+    assert!(!live[1].contains_key("none") && live[1]["done"].value().is_none());
 }

@@ -5,6 +5,7 @@ mod network;
 use std::collections::BTreeMap;
 use std::time::Instant;
 
+use observe::Measured;
 use protocol::event::WaitedFor;
 use protocol::messages::{End, StateVariables, Verdict};
 use protocol::time::time_s;
@@ -50,6 +51,9 @@ pub struct Summary {
     /// The verdicts on what the scenario expects of the run, by the names of the expectations.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub expectations: BTreeMap<String, ExpectationVerdict>,
+    /// The measures of the scenario, by name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub measures: BTreeMap<String, Measured>,
     /// Wall-clock times; they differ from run to run.
     pub wall: WallSummary,
     #[serde(skip)]
@@ -123,7 +127,7 @@ pub struct HeldUp {
 }
 
 /// Paths of the numbers of a summary; `*` is any name or word.
-const NUMBERS: [&str; 26] = [
+const NUMBERS: [&str; 30] = [
     "seed",
     "ticks",
     "time_s",
@@ -146,6 +150,10 @@ const NUMBERS: [&str; 26] = [
     "network.links.*.unreachable_ticks",
     "network.links.*.longest_stale_s",
     "expectations.*.tick",
+    "measures.*.value",
+    "measures.*.time_s",
+    "measures.*.waited_s",
+    "measures.*.at_least",
     "wall.elapsed_s",
     "wall.held_up_by.*.ticks",
     "wall.held_up_by.*.waited_s",
@@ -206,6 +214,7 @@ impl Summary {
             robots: robots.collect(),
             network: NetworkSummary::default(),
             expectations: BTreeMap::new(),
+            measures: BTreeMap::new(),
             wall: WallSummary::default(),
             begun: None,
             timeline: Timeline::default(),

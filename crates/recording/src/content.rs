@@ -302,6 +302,9 @@ pub struct Frame {
     /// last tick has events about them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub expectations: Vec<Standing>,
+    /// The numbers that the measures of the scenario have up to the tick, by name. One that has none yet is left out.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub measures: BTreeMap<String, f64>,
 }
 
 impl Frame {

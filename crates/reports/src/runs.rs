@@ -94,6 +94,7 @@ pub fn of_runs(folders: &[RunFolder]) -> Result<Page, LabError> {
     }
     write_disturbances(&mut page, &runs);
     write_expectations(&mut page, &runs);
+    write_measures(&mut page, &runs);
     write_reproduction(&mut page, &runs);
     Ok(page)
 }
@@ -482,6 +483,31 @@ fn write_expectations(page: &mut Page, runs: &[ReportedRun]) {
     let caption = "Verdicts about what the scenario expects. Undecided: the run ended before it was certain. \
                    Not asked: what it is expected after did not happen.";
     write_first_rows(page, caption, table);
+}
+
+/// What the scenarios measure of the runs. Nothing is written if they measure nothing, or no run has a summary.
+fn write_measures(page: &mut Page, runs: &[ReportedRun]) {
+    let mut table = Table::new("Run | measure | number");
+    for run in runs {
+        let measures = run.summary.iter().flat_map(|summary| &summary.measures);
+        for (name, measured) in measures {
+            table.row([
+                run.name.as_str().into(),
+                name.as_str().into(),
+                measured.to_string().into(),
+            ]);
+        }
+    }
+    if table.rows.is_empty() {
+        return;
+    }
+
+    page.section("Measures");
+    write_first_rows(
+        page,
+        "The measures of the scenario at the end of the run.",
+        table,
+    );
 }
 
 /// Writes the first rows of a table that can be long.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use observe::{Expectation, RunSetting, TickCondition};
+use observe::{Expectation, RunSetting, ScenarioMeasure, TickCondition};
 use protocol::messages::{DisplayUnit, Parameters, Point};
 use protocol::{RobotName, Tick};
 use serde::{Deserialize, Serialize};
@@ -78,6 +78,8 @@ pub struct Scenario {
     pub changes: Vec<Change>,
     /// What the run is expected to do.
     pub expectations: Vec<Expectation>,
+    /// What is measured of the run while it goes on.
+    pub measures: Vec<ScenarioMeasure>,
     /// The run ends after the first tick in which this holds; without it, after its last tick only.
     pub end_when: Option<TickCondition>,
     /// Contents of the record.

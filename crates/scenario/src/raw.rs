@@ -26,7 +26,7 @@ use config::bulk::member;
 use config::overrides::merge;
 use config::units::{Length, Speed, Time, quantity};
 use config::{FileError, FixedList, Source, seed, shipped};
-use observe::{Expectation, RunSetting, TickCondition};
+use observe::{Expectation, RunSetting, ScenarioMeasure, TickCondition};
 use protocol::messages::{DisplayUnit, OnLate, Parameters};
 use protocol::{RobotName, Tick};
 use serde::{Deserialize, Serialize};
@@ -91,6 +91,8 @@ pub(super) struct ScenarioFile {
     changes: Vec<Spanned<ChangeTable>>,
     #[serde(default, rename = "expect", skip_serializing_if = "Vec::is_empty")]
     expectations: Vec<Spanned<Expectation>>,
+    #[serde(default, rename = "measure", skip_serializing_if = "Vec::is_empty")]
+    measures: Vec<Spanned<ScenarioMeasure>>,
     end_when: Option<Spanned<TickCondition>>,
     parent: Option<ParentTable>,
     #[serde(default, rename = "obstacle", skip_serializing_if = "Vec::is_empty")]
@@ -268,6 +270,7 @@ impl ScenarioFile {
             layers: layers.keys().cloned().collect(),
         };
         let expectations = expect::check(self.expectations, &setting, source)?;
+        let measures = expect::check_measures(self.measures, &expectations, &setting, source)?;
         let end_when = expect::check_end(self.end_when, &setting, source)?;
         let mut scenario = checked::Scenario {
             seed,
@@ -294,6 +297,7 @@ impl ScenarioFile {
             faults,
             changes: Vec::new(),
             expectations,
+            measures,
             end_when,
             record,
             parent: self.parent.map(Parent::from),
@@ -633,6 +637,7 @@ impl From<&checked::Scenario> for ScenarioFile {
             faults: faults.collect(),
             changes: changes.collect(),
             expectations: expectations.collect(),
+            measures: scenario.measures.iter().cloned().map(unplaced).collect(),
             end_when: scenario.end_when.clone().map(unplaced),
             parent: scenario.parent.as_ref().map(ParentTable::from),
             obstacles: obstacles.collect(),

@@ -234,3 +234,49 @@ fn conditions_of_sites_are_checked_where_they_are_written() {
         assert!(error.contains("hall.toml:8:1"), "{error}");
     }
 }
+
+#[test]
+fn measures_of_a_scenario_are_checked_and_kept() {
+    let measures = "[[measure]]\nname = \"left\"\nvariable = { sites = \"T*\", by = \"sum\", name = \"stock\", as = \"end\" }\n\
+                    [[measure]]\nname = \"twice\"\nexpression = \"2 * left\"\n";
+    let scenario = parse(&format!("{BULK}{measures}")).unwrap();
+    assert_eq!(scenario.measures.len(), 2);
+    let again = parse(&scenario.to_toml().unwrap()).unwrap();
+    assert_eq!(again.measures, scenario.measures);
+
+    for (kind, reason) in [
+        ("summary = \"ticks\"", "has no `summary`"),
+        (
+            "count = { event = \"say\" }\nwhen = \"after\"",
+            "has no `when`",
+        ),
+        ("expression = \"left + 1\"", "no measure is before it"),
+        (
+            "variable = { site = \"X\", name = \"stock\", as = \"end\" }",
+            "no site of this scenario is called X",
+        ),
+        (
+            "count = { event = \"say\", robot = \"A\" }",
+            "no robot of this scenario is called A",
+        ),
+        (
+            "count = { event = \"judged\", expectation = \"it\" }",
+            "there is no expectation \"it\"",
+        ),
+        ("", "exactly one of"),
+    ] {
+        let text = format!("{BULK}[[measure]]\nname = \"x\"\n{kind}\n");
+        let error = shown(&parse(&text).unwrap_err());
+        assert!(error.contains(reason), "{kind}: {error}");
+        assert!(error.contains("hall.toml:8:1"), "{error}");
+    }
+    let twice = format!("{BULK}{measures}{measures}");
+    let error = shown(&parse(&twice).unwrap_err());
+    assert!(
+        error.contains("a second measure called \"left\""),
+        "{error}"
+    );
+    let change = format!("[[change]]\nat = \"1 s\"\nset = ['measure=[]']\n{BULK}{measures}");
+    let error = shown(&parse(&change).unwrap_err());
+    assert!(error.contains("can change while a run goes on"), "{error}");
+}

@@ -615,4 +615,5 @@ fn set_frame(frame: &mut Frame, simulation: &Simulation, record: &TickRecord) {
     frame.cuts = simulation.cuts();
     frame.unreachable.clone_from(simulation.unreachable());
     frame.expectations = simulation.standings();
+    frame.measures = simulation.measurements().numbers();
 }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use lockstep::{Bulletin, Exchange, IncarnationNotice, Membership, Sent, TickOutcome};
-use observe::{Evaluation, Monitors, Observation, RobotState};
+use observe::{Evaluation, Measurements, Monitors, Observation, RobotState};
 use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::event::{Blocker, Cause, WaitedFor};
 use protocol::messages::{
@@ -133,6 +133,8 @@ pub struct Simulation {
     digest: Digest,
     /// What the scenario expects of the run.
     watches: Monitors,
+    /// What is measured of the run.
+    measurements: Measurements,
     /// What ends the run before its last tick, if the scenario says so.
     end_when: Option<Evaluation>,
     /// What of it holds in the last complete tick, in words.
@@ -192,6 +194,7 @@ impl Simulation {
             planned: None,
             digest: Digest::default(),
             watches: Monitors::new(&scenario.expectations, &setting),
+            measurements: Measurements::new(&scenario.measures, &setting),
             end_when: scenario
                 .end_when
                 .as_ref()
@@ -457,10 +460,29 @@ impl Simulation {
             digest: self.digest.to_string(),
             seal: None,
         });
+        let events = std::mem::take(&mut self.events);
+        self.measure(&events);
         TickRecord {
             tick: self.tick,
-            events: Arc::new(std::mem::take(&mut self.events)),
+            events: Arc::new(events),
         }
+    }
+
+    /// Takes the measures of a tick, or of the end of the run.
+    fn measure(&mut self, events: &[Event]) {
+        if self.measurements.is_empty() {
+            return;
+        }
+
+        let mut measurements = std::mem::take(&mut self.measurements);
+        measurements.observe(&Observation {
+            tick: self.tick,
+            tick_s: self.scenario.tick_s,
+            events,
+            state: &|name| self.robot_state(name),
+            site: &|name| self.site_state(name),
+        });
+        self.measurements = measurements;
     }
 
     /// Judges the expectations that are decided in the tick. The digest of the run does not depend on them.
@@ -1073,10 +1095,17 @@ impl Simulation {
             digest: self.digest.to_string(),
             seal: None,
         });
+        self.measure(&events);
         TickRecord {
             tick: self.tick,
             events: Arc::new(events),
         }
+    }
+
+    /// The measures of the scenario up to the last complete tick, or at the end of the run.
+    #[must_use]
+    pub fn measurements(&self) -> &Measurements {
+        &self.measurements
     }
 
     /// How the expectations of the scenario stand.

@@ -23,5 +23,6 @@ impl Simulation {
         summary.finish(self.tick(), tick_s, self.digest(), |robot| {
             self.state_variables(robot).cloned()
         });
+        summary.measures = self.measurements().measured();
     }
 }

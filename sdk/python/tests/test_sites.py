@@ -37,6 +37,9 @@ name = "U"
 at = ["4 m", "4 m"]
 on_conflict = "refuse"
 state = { stock = 9, open = true, last = "" }
+[[measure]]
+name = "left"
+variable = { sites = "T*", by = "sum", name = "stock", as = "end" }
 [[expect]]
 name = "a site is emptied"
 eventually = { event = "site_changed", key = "stock", to = 0 }
@@ -71,6 +74,9 @@ def test_the_same_run_in_one_process_and_as_programs_of_two_languages(lab: Lab, 
     assert own.summary["digest"] in launched[-1]
 
     assert cars.run(scenario, robots=both, out=lab.folder, name="judged").verdict == "pass"
+
+    of_tasks = [event for event in lab.of_kind("own", "site_changed") if event["site"].startswith("T") and event["key"] == "stock"]
+    assert own.summary["measures"]["left"] == {"state": "value", "value": 48.0 - len(of_tasks)}
 
     changed = lab.of_kind("own", "site_changed")
     refused = lab.of_kind("own", "site_refused")

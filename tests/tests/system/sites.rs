@@ -25,6 +25,16 @@ at = ["2 m", "5 m"]
 name = "B"
 at = ["2 m", "3 m"]
 
+[[measure]]
+name = "left"
+variable = { sites = "T*", by = "sum", name = "stock", as = "end" }
+[[measure]]
+name = "acts of A"
+count = { event = "site_changed", robot = "A*", site = "T{1..2}", key = "stock" }
+[[measure]]
+name = "closed"
+time = { to = { site = "T1", variable = "open", is = false } }
+
 [[expect]]
 name = "one is half empty"
 eventually = { sites = "T{1..2}", by = "any", variable = "stock", at_most = 3 }
@@ -76,6 +86,24 @@ fn a_run_ends_by_its_sites_and_is_judged_by_them() {
     let verdicts: Vec<&serde_json::Value> = verdicts.values().map(|one| &one["verdict"]).collect();
     assert_eq!(verdicts, [&json!("pass"), &json!("pass"), &json!("pass")]);
 
+    let measures = &summary["measures"];
+    assert_eq!(measures["left"], json!({ "state": "value", "value": 0.0 }));
+    assert_eq!(
+        measures["acts of A"],
+        json!({ "state": "value", "value": 6.0 })
+    );
+    assert_eq!(
+        measures["closed"],
+        json!({ "state": "not_reached", "waited_s": 60.0 })
+    );
+    // They are recorded in every tick, for the charts of the console.
+    let mut left = Vec::new();
+    for tick in lab.recorded("tasks") {
+        assert!(!tick.frame.measures.contains_key("closed"));
+        left.push(tick.frame.measures["left"]);
+    }
+    assert_eq!(left, [8.0, 4.0, 0.0]);
+
     let said = lab.ok(&["verify", "tasks"]);
     assert!(said.contains("to the end"), "{said}");
     // The states of sites follow from the events alone.
@@ -90,8 +118,9 @@ fn a_run_ends_by_its_sites_and_is_judged_by_them() {
 #[test]
 fn a_fork_is_judged_and_ends_by_the_sites_of_its_parent() {
     let lab = Lab::new();
-    let text =
-        std::fs::read_to_string(system_tests::root().join("configs/hors_doeuvres.toml")).unwrap();
+    let configs = system_tests::root().join("configs");
+    let text = std::fs::read_to_string(configs.join("hors_doeuvres.toml")).unwrap();
+    let text = text.replace("\"robots/", &format!("\"{}/robots/", configs.display()));
     let site = "[[site]]\nname = \"T\"\ncount = 2\nat = \"random\"\nstate = { done = false }\n";
     let expect = "[[expect]]\nname = \"nothing is done\"\nnever = { sites = \"T*\", by = \"any\", variable = \"done\" }\n";
     let hall = lab.write("hall.toml", &format!("{text}\n{site}{expect}"));

@@ -684,6 +684,12 @@ export interface WorldFrame {
    */
   layers?: LayerFrame[];
   /**
+   * The numbers that the measures of the scenario have up to the tick, by name. One that has none yet is left out.
+   */
+  measures?: {
+    [k: string]: number;
+  };
+  /**
    * Centers of the fixed obstacles, meters.
    */
   obstacles: [number, number][];

@@ -1,8 +1,8 @@
-//! The table `[[expect]]` and the key `end_when` as written in the file.
+//! The tables `[[expect]]` and `[[measure]]` and the key `end_when` as written in the file.
 
 use config::{FileError, Source};
 use observe::expect::check_all;
-use observe::{Expectation, RunSetting, TickCondition};
+use observe::{Expectation, RunSetting, ScenarioMeasure, TickCondition};
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -24,6 +24,27 @@ pub(super) fn check(
         FileError::at(source, span, &error.error.to_string())
     })?;
     Ok(expectations)
+}
+
+/// Checks the measures of a scenario with these expectations.
+pub(super) fn check_measures(
+    raw: Vec<Spanned<ScenarioMeasure>>,
+    expectations: &[Expectation],
+    setting: &RunSetting,
+    source: &Source,
+) -> Result<Vec<ScenarioMeasure>, FileError> {
+    let mut measures = Vec::new();
+    let mut spans = Vec::new();
+    for entry in raw {
+        spans.push(entry.span());
+        measures.push(entry.into_inner());
+    }
+
+    observe::check_measures(&measures, expectations, setting).map_err(|wrong| {
+        let span = spans.get(wrong.index).cloned();
+        FileError::at(source, span, &wrong.to_string())
+    })?;
+    Ok(measures)
 }
 
 /// Checks when the run of a scenario ends.

@@ -51,6 +51,7 @@ pub(super) fn frame(
         cuts: simulation.cuts(),
         faults: simulation.held_processes(&late),
         expectations: simulation.standings(),
+        measures: simulation.measurements().numbers(),
         display_unit: scenario.display_unit,
         ..empty_frame(status, scenario.field_m, scenario.body_m)
     }
@@ -85,6 +86,7 @@ pub(super) fn empty_frame(status: &Status, field_m: [f64; 2], body_m: f64) -> Wo
         cuts: Vec::new(),
         faults: Vec::new(),
         expectations: Vec::new(),
+        measures: BTreeMap::new(),
     }
 }
 

@@ -174,6 +174,7 @@ impl Player {
             layers: header.layers_of(frame),
             cuts: frame.cuts.clone(),
             expectations: frame.standings(self.events()),
+            measures: frame.measures.clone(),
             display_unit: header.display_unit,
             ..empty_frame(status, header.field_m, header.body_m)
         }
