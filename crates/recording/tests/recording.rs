@@ -113,6 +113,7 @@ fn tick(tick: Tick) -> RecordedTick {
                 .map(|i| (i * 7919 + tick as i64 * 31) % 29_989)
                 .collect(),
             guest_moods: [(GuestMood::Waiting, vec![3, 7])].into(),
+            measures: [("left".to_owned(), tick as f64 / 3.0)].into(),
             expectations: Vec::new(),
             sites: BTreeMap::new(),
             layers: Vec::new(),
