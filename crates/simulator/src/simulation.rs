@@ -481,6 +481,7 @@ impl Simulation {
             events,
             state: &|name| self.robot_state(name),
             site: &|name| self.site_state(name),
+            layer: &|name| self.layers.cells(name),
         });
         self.measurements = measurements;
     }
