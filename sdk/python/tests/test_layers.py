@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 
@@ -35,8 +36,8 @@ name = "something is swept"
 eventually = { event = "layer_changed", layer = "dust" }
 within = "15 s"
 [[expect]]
-name = "much is swept"
-eventually = { layer = { name = "dust", by = "sum" }, below = 100 }
+name = "there is dust for a while"
+eventually = { layer = { name = "dust", by = "sum" }, above = 1, for = "5 s" }
 within = "15 s"
 [[expect]]
 name = "the trail fades"
@@ -77,9 +78,14 @@ def test_the_same_run_in_one_process_and_as_programs_of_two_languages(lab: Lab, 
     assert cars.run(scenario, robots=both, out=lab.folder, name="judged").verdict == "pass"
 
     # To judge the record, layers are computed again from what robots reported: to the last bit, as the reasons say.
-    judged = " ".join(lab.cars("expect", "judged", "--out", str(lab.folder)).split())
-    for event in lab.of_kind("judged", "judged"):
-        assert event["because"] in judged
+    reasons = " ".join(event["because"] for event in lab.of_kind("judged", "judged"))
+    found = re.search(r"layer dust \(sum\) is (\d+\.\d+)", reasons)
+    assert found
+    exact = lab.folder / "exact.toml"
+    exact.write_text(
+        f'[[expect]]\nname = "exact"\nwithin = "15 s"\neventually = {{ layer = {{ name = "dust", by = "sum" }}, is = {found[1]} }}\n'
+    )
+    assert "pass" in lab.cars("expect", "judged", "--expectations", str(exact), "--out", str(lab.folder))
 
     changed = lab.of_kind("own", "layer_changed")
     assert {event["layer"] for event in changed} == {"dust", "trail"}
