@@ -34,7 +34,7 @@ pub struct ValueBounds {
 #[serde(deny_unknown_fields, default)]
 pub(crate) struct TestTable {
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) is: Option<Values>,
+    pub(crate) is: Option<ValueList>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) at_least: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -51,7 +51,7 @@ pub(crate) struct TestTable {
     untagged,
     expecting = "a number, a text, true or false, or a list of such values"
 )]
-pub(crate) enum Values {
+pub(crate) enum ValueList {
     One(Variable),
     Several(Vec<Variable>),
 }
@@ -92,8 +92,8 @@ impl TestTable {
         let is_plain = bounds == ValueBounds::default();
         match self.is {
             Some(_) if !is_plain => Err(TestError::Both),
-            Some(Values::One(value)) => checked_values(vec![value]).map(Some),
-            Some(Values::Several(values)) => checked_values(values).map(Some),
+            Some(ValueList::One(value)) => checked_values(vec![value]).map(Some),
+            Some(ValueList::Several(values)) => checked_values(values).map(Some),
             None if is_plain => Ok(None),
             None if bounds.are_contradictory() => Err(TestError::NoNumber),
             None => Ok(Some(ValueTest::Within(bounds))),
@@ -113,8 +113,8 @@ impl TestTable {
             },
             Some(ValueTest::Is(values)) => Self {
                 is: Some(match &values[..] {
-                    [value] => Values::One(value.clone()),
-                    values => Values::Several(values.to_vec()),
+                    [value] => ValueList::One(value.clone()),
+                    values => ValueList::Several(values.to_vec()),
                 }),
                 ..Self::default()
             },

@@ -8,11 +8,12 @@ use protocol::{Event, RobotName, RobotPattern, Tick};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::comparison::{TestError, TestTable, ValueTest, Values};
+use crate::combine::By;
+use crate::comparison::{TestError, TestTable, ValueList, ValueTest};
 use crate::pattern::{Pattern, PatternError};
 use crate::quantity::{
-    By, OfRobot, PlaceKind, PlaceTable, QuantityError, QuantityGauge, RunQuantity, StateNames,
-    Team, WhoseVariable, number,
+    OfRobot, PlaceKind, PlaceTable, QuantityError, QuantityGauge, RunQuantity, StateNames, Team,
+    WhoseVariable, number,
 };
 use crate::words::{self, Word};
 use crate::{Observation, RobotState, RunSetting};
@@ -184,7 +185,7 @@ struct ConditionTable {
     #[serde(skip_serializing_if = "Option::is_none")]
     each: Option<TestTable>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    is: Option<Values>,
+    is: Option<ValueList>,
     #[serde(skip_serializing_if = "Option::is_none")]
     at_least: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -1,10 +1,10 @@
 //! What is asked of a run, tick by tick, while it is played or when it is read again. Pure: no simulator, no file, no clock.
 
+mod combine;
 mod comparison;
 mod condition;
 pub mod expect;
 mod expression;
-mod layers;
 mod live;
 pub mod measure;
 mod pattern;
@@ -20,6 +20,7 @@ use std::collections::BTreeMap;
 use protocol::messages::{Point, StateVariables};
 use protocol::{Event, RobotName, Tick};
 
+pub use combine::By;
 pub use comparison::{TestError, ValueBounds, ValueTest};
 pub use condition::{Evaluation, TickCondition, TickConditionError};
 pub use expect::{Expectation, Judgment, Monitor, Monitors};
@@ -29,7 +30,7 @@ pub use measure::{Measure, MeasureError, MeasureSource, Measured};
 pub use pattern::{Pattern, PatternError};
 pub use places::FieldRegion;
 pub use probe::Probe;
-pub use quantity::{By, Goal, OfRobot, OfValues, QuantityError, RunQuantity, StateNames, Team};
+pub use quantity::{Goal, OfRobot, OfValues, QuantityError, RunQuantity, StateNames, Team};
 pub use sites::SiteStates;
 pub use words::Words;
 

@@ -9,12 +9,13 @@ use serde::de::{MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 use toml::Spanned;
 
+use crate::combine::By;
 use crate::comparison::{TestError, TestTable};
 use crate::condition::TickCondition;
 use crate::expression::Expression;
 use crate::pattern::{Pattern, PatternError};
 use crate::quantity::{
-    By, OfRobot, OfValues, PlaceKind, PlaceTable, QuantityError, RunQuantity, StateNames, Team,
+    OfRobot, OfValues, PlaceKind, PlaceTable, QuantityError, RunQuantity, StateNames, Team,
     WhoseVariable,
 };
 use crate::words::{self, Word};

@@ -6,14 +6,14 @@ use protocol::time::time_s;
 use protocol::{Event, RobotName, Tick};
 use serde_json::Value;
 
+use crate::combine::By;
 use crate::condition::Evaluation;
 use crate::expression::Expression;
 use crate::measure::{
     Between, Count, Measure, MeasureSource, Measured, Number, OfDurations, Parts, Stalled, When,
 };
 use crate::quantity::{
-    By, OfRobot, OfValues, QuantityGauge, RunQuantity, StateNames, Undefined,
-    number as number_of_state,
+    OfRobot, OfValues, QuantityGauge, RunQuantity, StateNames, Undefined, number as number_of_state,
 };
 use crate::{Observation, RunSetting};
 

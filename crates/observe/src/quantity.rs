@@ -11,8 +11,8 @@ use protocol::pattern::matches;
 use protocol::{Event, RobotName, RobotPattern};
 use serde::{Deserialize, Serialize};
 
+use crate::combine::{self, By};
 use crate::comparison::{TestError, TestTable, ValueTest, in_words, number_of, type_in_words};
-use crate::layers;
 use crate::places::{CoveredArea, FieldRegion, components, least_distance_m};
 use crate::words::{Word, WordKind};
 use crate::{Observation, RobotState, RunSetting};
@@ -133,30 +133,6 @@ pub enum Team {
     One(RobotPattern),
     /// Those that match one of these.
     Several(Vec<RobotPattern>),
-}
-
-/// How the numbers of several robots become one.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum By {
-    /// Their sum, in the order of the robots' names.
-    Sum,
-    /// Their mean.
-    Mean,
-    /// The largest.
-    Max,
-    /// The least.
-    Min,
-    /// The largest less the least.
-    Spread,
-    /// Jain's index of fairness: (Σx)² / (n Σx²) (Jain, Chiu and Hawe 1984).
-    Jain,
-    /// 1 if none of them is 0, otherwise 0.
-    All,
-    /// 1 if one of them is not 0, otherwise 0.
-    Any,
-    /// How many of them are not 0.
-    Count,
 }
 
 /// The number that is taken of the values that a quantity has during a run.
@@ -492,7 +468,7 @@ impl PlaceTable {
             Some(table) => Some(table.check()?.ok_or(TestError::Nothing)?),
             None => None,
         };
-        let by = layers::check(self.by, test.is_some()).map_err(QuantityError::ByCells)?;
+        let by = combine::check_cells(self.by, test.is_some()).map_err(QuantityError::ByCells)?;
         let name = self.name;
         let name = name.ok_or(QuantityError::Lacks(key, "the `name` of a layer"))?;
         Ok(RunQuantity::Layer { name, by, test })
@@ -1050,22 +1026,6 @@ impl fmt::Display for RunQuantity {
     }
 }
 
-impl fmt::Display for By {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Sum => "sum",
-            Self::Mean => "mean",
-            Self::Max => "max",
-            Self::Min => "min",
-            Self::Spread => "spread",
-            Self::Jain => "jain",
-            Self::All => "all",
-            Self::Any => "any",
-            Self::Count => "count",
-        })
-    }
-}
-
 /// A quantity while a run is observed.
 #[derive(Debug, Clone)]
 pub(crate) struct QuantityGauge {
@@ -1180,7 +1140,8 @@ impl QuantityGauge {
             }
             RunQuantity::Layer { name, by, test } => {
                 let cells = (seen.layer)(name);
-                let value = cells.and_then(|cells| layers::combine(cells, *by, test.as_ref()));
+                let value =
+                    cells.and_then(|cells| combine::combine_cells(cells, *by, test.as_ref()));
                 value.ok_or_else(|| Undefined::NoLayer(name.clone()))
             }
         }

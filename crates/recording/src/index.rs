@@ -8,6 +8,7 @@ use std::path::Path;
 
 use crate::damage::{Name, RecordingError};
 use crate::format::{Fields, MAGIC, op};
+use crate::topic::Topic;
 
 /// Bytes of a record before its body: operation code and length.
 const RECORD_HEAD: u64 = 9;
@@ -48,6 +49,8 @@ pub(crate) struct ChunkLocation {
 #[derive(Debug, Default)]
 pub(crate) struct Index {
     pub(crate) chunks: Vec<ChunkLocation>,
+    /// The channels that the index names, by number; `None` for one that only viewers read.
+    pub(crate) topics: Vec<(u16, Option<Topic>)>,
     /// Offset of the attached scenario.
     pub(crate) scenario: Option<u64>,
     /// Offsets of the records of metadata.
@@ -214,6 +217,7 @@ impl Bytes {
             let mut fields = Fields(body);
             match op {
                 op::CHUNK_INDEX => index.chunks.push(indexed_chunk(&mut fields)?),
+                op::CHANNEL => index.topics.push(indexed_topic(&mut fields)?),
                 op::ATTACHMENT_INDEX => index.scenario = Some(fields.u64()?),
                 op::METADATA_INDEX => index.metadata.push(fields.u64()?),
                 _ => {}
@@ -396,6 +400,13 @@ impl Bytes {
         let data = attached(covered).ok_or_else(damaged)?;
         Ok(data.to_vec())
     }
+}
+
+/// The number and the topic of a channel.
+pub(crate) fn indexed_topic(fields: &mut Fields<'_>) -> Option<(u16, Option<Topic>)> {
+    let id = fields.u16()?;
+    let _schema = fields.u16()?;
+    Some((id, Topic::parse(fields.text()?)))
 }
 
 /// A chunk as the index has it.

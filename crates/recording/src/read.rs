@@ -12,7 +12,7 @@ use crate::METADATA;
 use crate::content::{Frame, Header, Json, RawTick, RecordedTick, TickEvents, WallTimes};
 use crate::damage::{Name, RecordingError};
 use crate::format::{Fields, op};
-use crate::index::{Bytes, ChunkLocation};
+use crate::index::{Bytes, ChunkLocation, indexed_topic};
 use crate::topic::Topic;
 
 /// Ticks that are read from the file in one go.
@@ -23,7 +23,7 @@ pub(crate) const AT_ONCE: Tick = 64;
 pub struct Recording {
     bytes: Bytes,
     header: Header,
-    topics: BTreeMap<u16, Topic>,
+    topics: BTreeMap<u16, Option<Topic>>,
     /// The chunks with ticks, in their order.
     chunks: Vec<TickChunk>,
     scenario: Option<u64>,
@@ -71,7 +71,9 @@ impl Recording {
 
         let mut chunks = index.chunks;
         let first = chunks.first().ok_or_else(|| bytes.name.headless())?;
-        let preamble = read_preamble(&bytes, first)?;
+        // Of a file that another program has written anew, the index has channels that the first chunk does not have.
+        let topics = index.topics.into_iter().collect();
+        let preamble = read_preamble(&bytes, first, topics)?;
         // The writer puts the channels into a chunk of their own, which has no tick.
         if !preamble.has_ticks {
             chunks.remove(0);
@@ -317,7 +319,15 @@ impl Recording {
             if !(from..to).contains(&tick) {
                 continue;
             }
-            if let Some(topic) = self.topics.get(&message.channel)
+            // Without its topic a message would be missing, and nobody would know.
+            let topic = self.topics.get(&message.channel).ok_or_else(|| {
+                let channel = message.channel;
+                self.damaged(
+                    chunk,
+                    &format!("a message on channel {channel}, which is not declared"),
+                )
+            })?;
+            if let Some(topic) = topic
                 && is_wanted(topic)
             {
                 let partial = ticks.entry(tick).or_default();
@@ -414,37 +424,39 @@ impl Partial {
 /// What the first chunk has.
 struct Preamble {
     header: Header,
-    topics: BTreeMap<u16, Topic>,
+    topics: BTreeMap<u16, Option<Topic>>,
     /// Whether the first ticks are in it, too: where another program has written the file anew.
     has_ticks: bool,
 }
 
-/// Reads the header and the channels, which are in the first chunk.
-fn read_preamble(bytes: &Bytes, chunk: &ChunkLocation) -> Result<Preamble, RecordingError> {
+/// Reads the header, and adds the channels that are in the first chunk to those of the index.
+fn read_preamble(
+    bytes: &Bytes,
+    chunk: &ChunkLocation,
+    mut topics: BTreeMap<u16, Option<Topic>>,
+) -> Result<Preamble, RecordingError> {
     let damaged = |reason: &dyn Display| bytes.name.damaged(chunk.offset, reason);
 
     let content = bytes.chunk(chunk)?;
-    let mut topics = BTreeMap::new();
     for (_, body) in records(&content)
         .ok_or_else(|| damaged(&"a length is wrong"))?
         .into_iter()
         .filter(|(op, _)| *op == op::CHANNEL)
     {
-        let (id, topic) = channel(body).ok_or_else(|| damaged(&"a channel cannot be read"))?;
-        if let Some(topic) = Topic::parse(topic) {
-            topics.insert(id, topic);
-        }
+        let channel = indexed_topic(&mut Fields(body));
+        let (id, topic) = channel.ok_or_else(|| damaged(&"a channel cannot be read"))?;
+        topics.insert(id, topic);
     }
 
     let mut header: Option<Header> = None;
     let mut has_ticks = false;
     for message in messages(&content).unwrap_or_default() {
         match topics.get(&message.channel) {
-            Some(Topic::Header) => {
+            Some(Some(Topic::Header)) => {
                 header = Some(parse(message.json).map_err(|error| damaged(&error))?);
             }
-            Some(_) => has_ticks = true,
-            None => {}
+            Some(Some(_)) => has_ticks = true,
+            Some(None) | None => {}
         }
     }
 
@@ -457,14 +469,6 @@ fn read_preamble(bytes: &Bytes, chunk: &ChunkLocation) -> Result<Preamble, Recor
         topics,
         has_ticks,
     })
-}
-
-/// Number and topic in the body of a channel.
-fn channel(body: &[u8]) -> Option<(u16, &str)> {
-    let mut fields = Fields(body);
-    let id = fields.u16()?;
-    let _schema = fields.u16()?;
-    Some((id, fields.text()?))
 }
 
 /// The records of a chunk, each with its operation code; `None` if a length is wrong.

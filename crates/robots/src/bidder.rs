@@ -25,7 +25,7 @@ const FORWARD_M: f64 = 0.3;
 /// The parameters of a bidder, as in the scenario.
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-struct Parameters {
+struct BidderParameters {
     /// Speed, m/s.
     speed: f64,
     /// Time that a task takes, seconds.
@@ -36,7 +36,7 @@ struct Parameters {
     period: f64,
 }
 
-impl Default for Parameters {
+impl Default for BidderParameters {
     fn default() -> Self {
         Self {
             speed: 1.0,
@@ -61,7 +61,7 @@ enum Sends {
 
 /// What a robot knows of a task.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-struct Entry {
+struct TaskEntry {
     /// Highest bid, 0 for none.
     bid: f64,
     /// The robot that has made it.
@@ -73,10 +73,10 @@ struct Entry {
 /// A robot that shares tasks.
 #[derive(Debug, Default)]
 pub struct Bidder {
-    parameters: Parameters,
+    parameters: BidderParameters,
     tasks: Vec<KnownSite>,
     /// What is known of each task.
-    table: Vec<Entry>,
+    table: Vec<TaskEntry>,
     /// The task that it does, by its index.
     task: Option<usize>,
     /// Time that it has worked on the task, seconds.
@@ -97,7 +97,7 @@ impl Robot for Bidder {
         tasks.retain(|site| site.kind == TASK);
         *self = Self {
             parameters: cars.parameters()?,
-            table: vec![Entry::default(); tasks.len()],
+            table: vec![TaskEntry::default(); tasks.len()],
             tasks,
             ..Self::default()
         };
@@ -129,7 +129,7 @@ impl Bidder {
                 continue;
             };
             // An operator may send anything.
-            let Ok(received) = payload.read::<Vec<Entry>>() else {
+            let Ok(received) = payload.read::<Vec<TaskEntry>>() else {
                 continue;
             };
             for (own, received) in self.table.iter_mut().zip(received) {
@@ -246,7 +246,7 @@ impl Bidder {
     }
 }
 
-impl Entry {
+impl TaskEntry {
     /// Takes over what is news in another robot's entry for the same task: of two bids the higher one, of equal ones that of the
     /// robot that comes first by name. Returns whether there was any.
     fn merge(&mut self, received: Self) -> bool {
@@ -265,8 +265,8 @@ impl Entry {
 mod tests {
     use super::*;
 
-    fn entry(bid: f64, by: &str, done: bool) -> Entry {
-        Entry {
+    fn entry(bid: f64, by: &str, done: bool) -> TaskEntry {
+        TaskEntry {
             bid,
             by: by.to_owned(),
             done,
@@ -302,7 +302,7 @@ mod tests {
             [2, 0, 1],
             [2, 1, 0],
         ] {
-            let mut own = Entry::default();
+            let mut own = TaskEntry::default();
             for index in order {
                 own.merge(tables[index].clone());
             }

@@ -8,7 +8,7 @@
 use std::collections::BTreeMap;
 
 use robot::{Action, BadParameters, Cars, Payload, Point, Robot, RobotName};
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 
 /// Name of the commands with places.
 const PLACE: &str = "place";
@@ -24,7 +24,7 @@ const LEAST_DISTANCE_M: f64 = 1e-6;
 /// The parameters of a scout, as in the scenario.
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-struct Parameters {
+struct ScoutParameters {
     /// Highest speed, m/s.
     speed: f64,
     /// Radius of the disc that it covers, meters.
@@ -39,7 +39,7 @@ struct Parameters {
     forgets_after: f64,
 }
 
-impl Default for Parameters {
+impl Default for ScoutParameters {
     fn default() -> Self {
         Self {
             speed: 0.5,
@@ -52,17 +52,10 @@ impl Default for Parameters {
     }
 }
 
-/// The place that a scout sends.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
-struct Place {
-    x: f64,
-    y: f64,
-}
-
 /// A robot that covers a field.
 #[derive(Debug, Default)]
 pub struct Scout {
-    parameters: Parameters,
+    parameters: ScoutParameters,
     /// Where others were when they were heard last, with that time, seconds.
     heard: BTreeMap<RobotName, (f64, Point)>,
     /// When it sends next, seconds.
@@ -113,11 +106,10 @@ impl Scout {
                 continue;
             };
             // An operator may send anything.
-            let Ok(Place { x, y }) = payload.read() else {
+            let Ok(place) = payload.read() else {
                 continue;
             };
-            self.heard
-                .insert(command.from.clone(), (now_s, Point::new(x, y)));
+            self.heard.insert(command.from.clone(), (now_s, place));
         }
         let oldest_s = now_s - self.parameters.forgets_after;
         self.heard.retain(|_, (heard_s, _)| *heard_s >= oldest_s);
@@ -129,14 +121,13 @@ impl Scout {
             return;
         }
         self.sends_s = cars.time_s() + self.parameters.period;
-        let Point { x, y } = cars.location();
-        // Numbers always are JSON.
-        let place = Payload::of(&Place { x, y }).unwrap_or_default();
+        // A place always is JSON.
+        let place = Payload::of(&cars.location()).unwrap_or_default();
         cars.broadcast(PLACE, place);
     }
 }
 
-impl Parameters {
+impl ScoutParameters {
     /// The force on a robot, of which 1 stands for its highest speed. `neighbors` are sorted, the nearest one first.
     fn force(&self, here: Point, neighbors: &[Point], field_m: [f64; 2]) -> Point {
         let mut force = Point::default();
@@ -179,12 +170,12 @@ impl Parameters {
 mod tests {
     use super::*;
 
-    fn parameters(keeps: usize) -> Parameters {
-        Parameters {
+    fn parameters(keeps: usize) -> ScoutParameters {
+        ScoutParameters {
             covers: 2.0,
             radio: 10.0,
             keeps,
-            ..Parameters::default()
+            ..ScoutParameters::default()
         }
     }
 

@@ -250,7 +250,7 @@ impl ScenarioFile {
         )?;
         let (layers, layer_spans) = layer::check(
             &self.layers,
-            layer::Setting {
+            layer::LayerSetting {
                 field_m: size.0.map(|length| length.0),
                 tick_s,
                 source,

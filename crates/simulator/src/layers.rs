@@ -51,7 +51,7 @@ struct Layer {
 
 /// What an action changes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Change {
+struct LayerEffect {
     cells: u32,
     sum: f64,
 }
@@ -99,7 +99,7 @@ impl Layers {
         for action in actions {
             let done = self.act(at, action);
             match done {
-                Ok(Change { cells: 0, .. }) => {}
+                Ok(LayerEffect { cells: 0, .. }) => {}
                 Ok(change) => events.push(Event::LayerChanged {
                     robot: robot.clone(),
                     layer: action.layer.clone(),
@@ -124,7 +124,7 @@ impl Layers {
         events
     }
 
-    fn act(&mut self, at: Point, action: &LayerAction) -> Result<Change, LayerRefusal> {
+    fn act(&mut self, at: Point, action: &LayerAction) -> Result<LayerEffect, LayerRefusal> {
         let layer = self.layers.get_mut(&action.layer);
         let layer = layer.ok_or(LayerRefusal::UnknownLayer)?;
         let range_m = layer.spec.range_m.ok_or(LayerRefusal::OutOfRange)?;
@@ -252,8 +252,8 @@ impl Layer {
     }
 
     /// Carries out an action that is not refused.
-    fn change(&mut self, action: &LayerAction) -> Change {
-        let mut change = Change { cells: 0, sum: 0.0 };
+    fn change(&mut self, action: &LayerAction) -> LayerEffect {
+        let mut change = LayerEffect { cells: 0, sum: 0.0 };
         let own = self.cell_of(action.at);
         for row in self.rows_around(action.at.y, action.radius_m) {
             let own_column = own.and_then(|(column, own_row)| (own_row == row).then_some(column));

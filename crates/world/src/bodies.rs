@@ -10,7 +10,7 @@ use crate::point::Point;
 use crate::shape::{Shape, Wall};
 use crate::shapes::Shapes;
 use crate::solids::{SolidBlocker, Solids};
-use crate::way::Way;
+use crate::sweep::Sweep;
 
 /// A body, identified by its kind and its index among bodies of that kind.
 ///
@@ -159,7 +159,7 @@ impl Bodies {
             return Some(Blocker::Body(self.body(id)));
         }
         let footprint = footprint.unwrap_or(Shape::square(self.field.body_m).into());
-        self.first_blocker(&Way::straight(footprint, center, center), usize::MAX)
+        self.first_blocker(&Sweep::straight(footprint, center, center), usize::MAX)
     }
 
     /// The largest x, in meters, of the centers that a new square at this center would overlap. Anything but a square counts as
@@ -219,7 +219,7 @@ impl Bodies {
         turn_rad: f64,
     ) -> Result<(), Blocker> {
         let id = self.robots_from + index;
-        let way = Way {
+        let way = Sweep {
             from: self.centers[id],
             to,
             footprint,
@@ -267,11 +267,11 @@ impl Bodies {
     #[cold]
     #[inline(never)]
     fn advance_shaped(&mut self, id: usize, to: Point) -> Result<(), Blocker> {
-        let way = Way::straight(self.footprint_of(id), self.centers[id], to);
+        let way = Sweep::straight(self.footprint_of(id), self.centers[id], to);
         self.advance_along(id, &way)
     }
 
-    fn advance_along(&mut self, id: usize, way: &Way) -> Result<(), Blocker> {
+    fn advance_along(&mut self, id: usize, way: &Sweep) -> Result<(), Blocker> {
         if !way.footprint.is_inside(way.to, self.field.size_m) {
             return Err(Blocker::Edge);
         }
@@ -286,8 +286,8 @@ impl Bodies {
     }
 
     /// What is in the way of a body other than `except`.
-    fn first_blocker(&self, way: &Way, except: usize) -> Option<Blocker> {
-        let &Way { to, footprint, .. } = way;
+    fn first_blocker(&self, way: &Sweep, except: usize) -> Option<Blocker> {
+        let &Sweep { to, footprint, .. } = way;
         let default = Footprint::from(Shape::square(self.field.body_m));
         let mut first = usize::MAX;
         let mut reach_m = 0.0;

@@ -77,8 +77,8 @@ mod shape;
 mod shapes;
 mod sight;
 mod solids;
+mod sweep;
 mod triangular;
-mod way;
 mod wheels;
 
 pub use bodies::{Blocker, Body, Near};

@@ -10,7 +10,7 @@ use crate::placing::place;
 use crate::point::Point;
 use crate::reactions::{Reaction, directions};
 use crate::shape::{Shape, Wall};
-use crate::wheels::{Drive, Pose, Velocity, Wheels};
+use crate::wheels::{DriveStep, Pose, Velocity, Wheels};
 use rand::Rng;
 use std::collections::BTreeMap;
 
@@ -155,7 +155,7 @@ impl<R: Rng> World<R> {
     }
 
     /// Where the robots with wheels drive in the tick.
-    fn drives(&self) -> BTreeMap<usize, Drive> {
+    fn drives(&self) -> BTreeMap<usize, DriveStep> {
         let drive = |driven: &Driven| {
             driven
                 .pose
@@ -168,7 +168,11 @@ impl<R: Rng> World<R> {
     }
 
     /// The displacement that each robot means; none where it proposes no place.
-    fn headings(&self, proposals: &[Option<Point>], drives: &BTreeMap<usize, Drive>) -> Vec<Point> {
+    fn headings(
+        &self,
+        proposals: &[Option<Point>],
+        drives: &BTreeMap<usize, DriveStep>,
+    ) -> Vec<Point> {
         let mut headings = Vec::with_capacity(proposals.len());
         for (index, (&at, &proposal)) in self.robots().iter().zip(proposals).enumerate() {
             let to = drives
@@ -180,7 +184,7 @@ impl<R: Rng> World<R> {
         headings
     }
 
-    fn drive_robot(&mut self, index: usize, drive: &Drive) -> MoveOutcome {
+    fn drive_robot(&mut self, index: usize, drive: &DriveStep) -> MoveOutcome {
         let Some(driven) = self.driven.get_mut(&index) else {
             return MoveOutcome::Stayed;
         };

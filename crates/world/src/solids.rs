@@ -9,7 +9,7 @@ use crate::hall::Field;
 use crate::point::Point;
 use crate::shape::{Shape, Wall};
 use crate::shapes::Shapes;
-use crate::way::Way;
+use crate::sweep::Sweep;
 
 /// Cells along each side of the index of what stands still.
 const CELLS: usize = 64;
@@ -110,7 +110,7 @@ impl Solids {
     }
 
     /// The first wall, or else the first obstacle of a shape of its own, that a body meets on its way.
-    pub(crate) fn blocker(&self, way: &Way) -> Option<SolidBlocker> {
+    pub(crate) fn blocker(&self, way: &Sweep) -> Option<SolidBlocker> {
         let mut first = usize::MAX;
         way.visit_parts(|footprint, from, to| {
             let (half_x_m, half_y_m) = footprint.half_m();

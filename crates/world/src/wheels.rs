@@ -48,7 +48,7 @@ pub struct Pose {
 
 /// Where a robot with wheels drives in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Drive {
+pub(crate) struct DriveStep {
     /// The pose at the end of the tick if nothing is in the way.
     pub(crate) pose: Pose,
     /// How far it turns, rad; more than a full turn if it turns fast.
@@ -88,7 +88,7 @@ impl Pose {
     }
 
     /// Where the robot drives in a tick if it wants this velocity. What is not finite counts as 0.
-    pub(crate) fn drive(self, wheels: &Wheels, wanted: Velocity, tick_s: f64) -> Drive {
+    pub(crate) fn drive(self, wheels: &Wheels, wanted: Velocity, tick_s: f64) -> DriveStep {
         let (linear_mps, mean_mps) = ramp(
             self.velocity.linear_mps,
             limited(wanted.linear_mps, wheels.max_speed_mps),
@@ -113,7 +113,7 @@ impl Pose {
                 angular_radps,
             },
         };
-        Drive { pose, turn_rad }
+        DriveStep { pose, turn_rad }
     }
 }
 

@@ -100,7 +100,7 @@ class Looker(Robot):
 
 
 def test_a_robot_sees_sites_and_what_became_of_its_actions(scenario: Path, tmp_path: Path) -> None:
-    text = SCENARIO.replace("misses = 0.1\nnoise = \"0.05 m\"\n", "").replace("count = 12", "count = 0")
+    text = SCENARIO.replace("misses = 0.1\nnoise = \"0.05 m\"\n", "").replace("count = 12", "count = 0").replace('sites = "T*"', 'sites = "U"')
     scenario.write_text(text)
     Looker.seen.clear()
     cars.run(scenario, robots={"A": Looker, "B": Looker}, out=tmp_path, duration="1 s")

@@ -50,6 +50,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "scenario",
             "config",
             "lockstep",
+            "observe",
             "protocol",
             "recording",
             "timeline",

@@ -8,9 +8,9 @@ use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{
     Answer, Clock, Command, Control, ControlAnswer, FaultOrder, JoinAnswer, JoinRequest, LogRecord,
-    MAX_ENTRIES, MAX_LAYER_ACTIONS, MAX_LINE_BYTES, MAX_PAYLOAD_BYTES, MAX_PAYLOAD_DEPTH,
-    MAX_SITE_ACTIONS, MAX_SITE_VARIABLES, MAX_TEXT_BYTES, MAX_WIDGETS, Panel, PublicState, Report,
-    TickUpdate, Waiting, WorldFrame,
+    MAX_ENTRIES, MAX_KNOWN_SITES, MAX_LAYER_ACTIONS, MAX_LINE_BYTES, MAX_PAYLOAD_BYTES,
+    MAX_PAYLOAD_DEPTH, MAX_SITE_ACTIONS, MAX_SITE_VARIABLES, MAX_TEXT_BYTES, MAX_WIDGETS, Panel,
+    PublicState, Report, TickUpdate, Waiting, WorldFrame,
 };
 use protocol::name::MAX_NAME_LEN;
 use protocol::random::{MAX_SEED, stream, unit};
@@ -228,6 +228,7 @@ fn limits_times_and_version_are_those_of_the_code() {
         format!(
             "{MAX_SITE_ACTIONS}, each with {MAX_SITE_VARIABLES} variables to set, to add to and to compare"
         ),
+        MAX_KNOWN_SITES.to_string(),
         format!("{MAX_NAME_LEN} bytes"),
         MAX_LAYER_ACTIONS.to_string(),
         format!("{MAX_NAME_LEN} bytes"),

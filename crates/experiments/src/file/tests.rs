@@ -645,8 +645,15 @@ fn every_example_of_the_page_is_good() {
         for condition in experiment.list_conditions().unwrap() {
             for arm in &experiment.arms {
                 let settings = [condition.set.clone(), arm.set.clone()].concat();
+                let mut set: Vec<config::Override> =
+                    settings.into_iter().map(|setting| setting.change).collect();
+                // Examples of sites are about a scenario that has some.
+                if block.contains("sites = ") {
+                    let sites = r#"site=[{ name = "T{1..9}", at = "random", state = { stock = 1, done = false } }]"#;
+                    set.push(sites.parse().unwrap());
+                }
                 let changes = config::Changes {
-                    set: settings.into_iter().map(|setting| setting.change).collect(),
+                    set,
                     ..config::Changes::default()
                 };
                 // Examples with robots in bulk are about a scenario that has some.

@@ -545,7 +545,8 @@ mod tests {
         };
         assert_eq!(
             line(&busy),
-            "{\"type\":\"tick\",\"tick\":6,\"location\":{\"x\":1.0,\"y\":2.0},\"blocked\":true,\"commands\":[{\"from\":\"B\",\
+            "{\"type\":\"tick\",\"tick\":6,\"location\":{\"x\":1.0,\"y\":2.0},\"pose\":{\"location\":\
+             {\"x\":1.0,\"y\":2.0},\"heading_rad\":1.5,\"velocity\":{\"linear_mps\":0.25,\"angular_radps\":-1.0}},\"blocked\":true,\"commands\":[{\"from\":\"B\",\
              \"performative\":\"achieve\",\"command\":\"say \\\"x\\\":\\n\",\"payload\":{\"bid\":0.1}}],\"sensed\":[{\"name\":\"B\",\"location\":\
              {\"x\":1.0,\"y\":2.0}}]}\n"
         );

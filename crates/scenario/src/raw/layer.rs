@@ -53,7 +53,7 @@ struct PeakTable {
 
 /// What the checks of layers depend on.
 #[derive(Clone, Copy)]
-pub(super) struct Setting<'a> {
+pub(super) struct LayerSetting<'a> {
     pub(super) field_m: [f64; 2],
     pub(super) tick_s: f64,
     pub(super) source: &'a Source,
@@ -65,7 +65,7 @@ pub(super) type LayerSpans = BTreeMap<String, Span<usize>>;
 /// The layers of a scenario, and where they are in the file.
 pub(super) fn check(
     raw: &[Spanned<LayerTable>],
-    setting: Setting<'_>,
+    setting: LayerSetting<'_>,
 ) -> Result<(BTreeMap<String, LayerSpec>, LayerSpans), FileError> {
     let mut layers: BTreeMap<String, LayerSpec> = BTreeMap::new();
     let mut spans = LayerSpans::new();
@@ -109,8 +109,8 @@ pub(super) fn check(
 }
 
 impl LayerTable {
-    fn check(&self, setting: Setting<'_>) -> Result<LayerSpec, FileError> {
-        let Setting {
+    fn check(&self, setting: LayerSetting<'_>) -> Result<LayerSpec, FileError> {
+        let LayerSetting {
             field_m,
             tick_s,
             source,
@@ -157,7 +157,7 @@ impl LayerTable {
         })
     }
 
-    fn check_peaks(&self, setting: Setting<'_>) -> Result<Vec<Peak>, FileError> {
+    fn check_peaks(&self, setting: LayerSetting<'_>) -> Result<Vec<Peak>, FileError> {
         let mut peaks = Vec::new();
         for entry in &self.peaks {
             let table = entry.get_ref();
@@ -218,7 +218,7 @@ impl LayerTable {
     }
 }
 
-impl Setting<'_> {
+impl LayerSetting<'_> {
     fn refuse(&self, span: Span<usize>, reason: &str) -> FileError {
         FileError::at(self.source, Some(span), reason)
     }

@@ -1,18 +1,61 @@
-//! One number of the cells of a layer.
+//! How several numbers become one: those of robots, of sites, of the cells of a layer.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
 
 use crate::comparison::ValueTest;
-use crate::quantity::By;
+
+/// How the numbers of several robots become one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum By {
+    /// Their sum, in the order of the robots' names.
+    Sum,
+    /// Their mean.
+    Mean,
+    /// The largest.
+    Max,
+    /// The least.
+    Min,
+    /// The largest less the least.
+    Spread,
+    /// Jain's index of fairness: (Σx)² / (n Σx²) (Jain, Chiu and Hawe 1984).
+    Jain,
+    /// 1 if none of them is 0, otherwise 0.
+    All,
+    /// 1 if one of them is not 0, otherwise 0.
+    Any,
+    /// How many of them are not 0.
+    Count,
+}
 
 /// How the cells of a layer become one number, in words.
 const WAYS: &str = "\"sum\", \"mean\", \"max\" or \"min\"";
 /// The same if each cell passes a test or not.
 const WAYS_OF_TESTED: &str = "\"mean\", \"count\", \"all\" or \"any\"";
 
+impl fmt::Display for By {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Sum => "sum",
+            Self::Mean => "mean",
+            Self::Max => "max",
+            Self::Min => "min",
+            Self::Spread => "spread",
+            Self::Jain => "jain",
+            Self::All => "all",
+            Self::Any => "any",
+            Self::Count => "count",
+        })
+    }
+}
+
 /// Checks how the cells become one number; `is_tested`: whether each passes a test or not.
 ///
 /// # Errors
 /// The ways that there are, in words.
-pub(crate) fn check(by: Option<By>, is_tested: bool) -> Result<By, &'static str> {
+pub(crate) fn check_cells(by: Option<By>, is_tested: bool) -> Result<By, &'static str> {
     match (by, is_tested) {
         (Some(by @ (By::Sum | By::Mean | By::Max | By::Min)), false)
         | (Some(by @ (By::Mean | By::Count | By::All | By::Any)), true) => Ok(by),
@@ -23,7 +66,7 @@ pub(crate) fn check(by: Option<By>, is_tested: bool) -> Result<By, &'static str>
 
 /// The number of the cells of a layer, in their order; `None` without a cell. With a test, the number of each is 1 if it passes, and
 /// otherwise 0.
-pub(crate) fn combine(cells: &[f64], by: By, test: Option<&ValueTest>) -> Option<f64> {
+pub(crate) fn combine_cells(cells: &[f64], by: By, test: Option<&ValueTest>) -> Option<f64> {
     let first = cells.first()?;
     let number = |cell: &f64| match test {
         Some(test) => f64::from(u8::from(test.hold_number(*cell))),

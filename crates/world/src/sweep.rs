@@ -12,7 +12,7 @@ const PART_RAD: f64 = 1.0 / 64.0;
 
 /// A straight way on which a body turns evenly.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Way {
+pub(crate) struct Sweep {
     /// Its beginning.
     pub(crate) from: Point,
     /// Its end.
@@ -23,7 +23,7 @@ pub(crate) struct Way {
     pub(crate) turn_rad: f64,
 }
 
-impl Way {
+impl Sweep {
     /// The way of a body that keeps its heading.
     pub(crate) fn straight(footprint: Footprint, from: Point, to: Point) -> Self {
         Self {
