@@ -211,7 +211,12 @@ fn the_examples_of_files_are_right() {
             let rest = part.replace(CONTINUE, "");
             files.push(complete.replace(WAIT, CONTINUE) + "\n" + &rest);
         } else if let Some(rest) = part.strip_prefix(DURATION) {
-            files.push(complete.replace(DURATION, &format!("{DURATION}{rest}\n")));
+            let (keys, tables) = match rest.split_once("\n[") {
+                Some((keys, tables)) => (keys, format!("[{tables}")),
+                None => (rest, String::new()),
+            };
+            let begin = complete.replace(DURATION, &format!("{DURATION}{keys}\n"));
+            files.push(format!("{begin}\n{tables}"));
         } else {
             files.push(format!("{complete}\n{part}"));
         }
