@@ -13,7 +13,7 @@ use crate::transcript::{PlayedTick, Transcript};
 /// In a round of ticks: the robot senses another one, and it cannot query any other.
 const SENSES: Tick = 12;
 const CUT_OFF: Tick = 14;
-const OUT_OF_RANGE: Tick = 6;
+const OUT_OF_RANGE: Tick = 8;
 
 /// A command that arrives at the robot.
 #[derive(Debug, Clone)]
