@@ -55,21 +55,21 @@ export class History {
    * @param {number} time_s
    * @param {number} tick_s length of a tick
    * @param {Parameters<History["add"]>[1]} robots
-   * @param {Parameters<History["add"]>[2]} [measures]
+   * @param {Parameters<History["add"]>[3]} [measures]
    */
   see(time_s, tick_s, robots, measures) {
     const last_s = Math.max(this.known_s, this.times_s.at(-1) ?? Infinity);
-    this.add(time_s, robots, measures, time_s - last_s > (SEEN_TICKS + 0.5) * tick_s);
+    this.add(time_s, robots, time_s - last_s > (SEEN_TICKS + 0.5) * tick_s, measures);
   }
 
   /**
    * Adds a sample; one that is not later than the last is ignored.
    * @param {number} time_s
    * @param {Pick<RobotFrame, "name" | "location" | "presence" | "emotion_state" | "behavior_state" | "state_variables">[]} robots
-   * @param {Record<string, number>} measures of the run
    * @param {boolean} isBroken whether nothing is known of the time before
+   * @param {Record<string, number>} measures of the run
    */
-  add(time_s, robots, measures = {}, isBroken = false) {
+  add(time_s, robots, isBroken = false, measures = {}) {
     const last_s = this.times_s.at(-1) ?? -Infinity;
     if (time_s <= last_s) return;
     this.changes += 1;

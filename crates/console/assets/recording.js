@@ -350,7 +350,7 @@ export class Player {
     for (let from = 0; from <= epoch.ticks && isWanted(); ) {
       const range = await samples(epoch, from, history ? undefined : epoch.ticks + 1);
       if (range.end <= from) return;
-      for (const { tick, robots, measures } of range.ticks) history?.add(tick * epoch.tick_s, robots, measures);
+      for (const { tick, robots, measures } of range.ticks) history?.add(tick * epoch.tick_s, robots, false, measures);
       this.store.addRecorded(range.log);
       this.store.emit("live");
       from = range.end;

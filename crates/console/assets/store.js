@@ -266,7 +266,7 @@ export class Store {
    */
   refill(from_s, to_s, samples, last) {
     this.liveHistory.cutFrom(from_s);
-    for (const { time_s, robots, measures } of samples) this.liveHistory.add(time_s, robots, measures);
+    for (const { time_s, robots, measures } of samples) this.liveHistory.add(time_s, robots, false, measures);
     // What is recorded is known to its last tick, which of a long run need not be a sample.
     this.liveHistory.known_s = to_s;
     for (const { time_s, tick_s, robots, measures } of this.memory.after(last)) this.liveHistory.see(time_s, tick_s, robots, measures);
