@@ -84,6 +84,13 @@ macro_rules! quantity_type {
         #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
         pub struct $type(pub f64);
 
+        impl From<$type> for f64 {
+            /// The number in SI units.
+            fn from(value: $type) -> Self {
+                value.0
+            }
+        }
+
         impl std::str::FromStr for $type {
             type Err = String;
             fn from_str(text: &str) -> Result<Self, String> {

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use toml::Spanned;
 use world::Wheels;
 
-use super::numbers::{CheckedNumber, positive};
+use super::numbers::positive;
 use super::unplaced::unplaced;
 
 /// The table. A limit that is left out is infinite, and the heading that of +x.
@@ -43,7 +43,7 @@ pub(super) fn check(
 }
 
 /// A limit in SI units, infinite if there is none.
-fn limit<T: CheckedNumber>(
+fn limit<T: Copy + Into<f64>>(
     raw: Option<&Spanned<T>>,
     source: &Source,
     key: &str,
@@ -51,7 +51,7 @@ fn limit<T: CheckedNumber>(
     let Some(written) = raw else {
         return Ok(f64::INFINITY);
     };
-    Ok(positive(source, raw, *written.get_ref(), key)?.number())
+    Ok(positive(source, raw, *written.get_ref(), key)?.into())
 }
 
 impl DriveTable {

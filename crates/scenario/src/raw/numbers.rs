@@ -1,6 +1,5 @@
 //! Numbers as written in the file: triangular distributions, and what must be positive.
 
-use config::units::{Acceleration, Length, Speed, Time, TurnAcceleration, TurnRate};
 use config::{FileError, Source};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
@@ -16,67 +15,19 @@ pub(super) struct Range<Q> {
 }
 
 /// A distribution in SI units, or its default.
-pub(super) fn triangular<Q: CheckedNumber>(
+pub(super) fn triangular<Q: Copy + Into<f64>>(
     source: &Source,
     raw: Option<&Spanned<Range<Q>>>,
     default: Range<Q>,
 ) -> Result<Triangular, FileError> {
     let span = raw.map(Spanned::span);
     let Range { min, mode, max } = raw.map_or(default, |range| *range.get_ref());
-    Triangular::new(min.number(), mode.number(), max.number())
+    Triangular::new(min.into(), mode.into(), max.into())
         .map_err(|error| FileError::at(source, span, &error.to_string()))
 }
 
-/// A value with a number that can be checked.
-pub(super) trait CheckedNumber: Copy {
-    /// The number in SI units.
-    fn number(self) -> f64;
-}
-
-impl CheckedNumber for Time {
-    fn number(self) -> f64 {
-        self.0
-    }
-}
-
-impl CheckedNumber for Speed {
-    fn number(self) -> f64 {
-        self.0
-    }
-}
-
-impl CheckedNumber for Length {
-    fn number(self) -> f64 {
-        self.0
-    }
-}
-
-impl CheckedNumber for TurnRate {
-    fn number(self) -> f64 {
-        self.0
-    }
-}
-
-impl CheckedNumber for Acceleration {
-    fn number(self) -> f64 {
-        self.0
-    }
-}
-
-impl CheckedNumber for TurnAcceleration {
-    fn number(self) -> f64 {
-        self.0
-    }
-}
-
-impl CheckedNumber for u32 {
-    fn number(self) -> f64 {
-        f64::from(self)
-    }
-}
-
 /// A value that must be positive and finite, or its default.
-pub(super) fn positive<T: CheckedNumber>(
+pub(super) fn positive<T: Copy + Into<f64>>(
     source: &Source,
     value: Option<&Spanned<T>>,
     default: T,
@@ -87,7 +38,7 @@ pub(super) fn positive<T: CheckedNumber>(
     };
 
     let value = *spanned.get_ref();
-    let number = value.number();
+    let number: f64 = value.into();
     if number > 0.0 && number.is_finite() {
         return Ok(value);
     }
