@@ -67,25 +67,45 @@ pub(crate) fn check_cells(by: Option<By>, is_tested: bool) -> Result<By, &'stati
 /// The number of the cells of a layer, in their order; `None` without a cell. With a test, the number of each is 1 if it passes, and
 /// otherwise 0.
 pub(crate) fn combine_cells(cells: &[f64], by: By, test: Option<&ValueTest>) -> Option<f64> {
-    let first = cells.first()?;
-    let number = |cell: &f64| match test {
-        Some(test) => f64::from(u8::from(test.hold_number(*cell))),
+    by.combine(cells.iter().map(|cell| match test {
+        Some(test) => truth(test.hold_number(*cell)),
         None => *cell,
-    };
+    }))
+}
 
-    let mut sum = 0.0;
-    let mut max = number(first);
-    let mut min = max;
-    for cell in cells {
-        let number = number(cell);
-        sum += number;
-        max = max.max(number);
-        min = min.min(number);
+/// 1 for what holds, otherwise 0.
+pub(crate) fn truth(holds: bool) -> f64 {
+    f64::from(u8::from(holds))
+}
+
+impl By {
+    /// The number of some numbers, in their order; `None` without one.
+    pub(crate) fn combine(self, numbers: impl IntoIterator<Item = f64>) -> Option<f64> {
+        let mut numbers = numbers.into_iter();
+        let first = numbers.next()?;
+        let (mut sum, mut squares) = (first, first * first);
+        let (mut max, mut min) = (first, first);
+        let mut count = 1.0;
+        let mut not_zero = truth(first != 0.0);
+        for number in numbers {
+            sum += number;
+            squares += number * number;
+            max = max.max(number);
+            min = min.min(number);
+            count += 1.0;
+            not_zero += truth(number != 0.0);
+        }
+
+        Some(match self {
+            Self::Sum => sum,
+            Self::Mean => sum / count,
+            Self::Max => max,
+            Self::Min => min,
+            Self::Spread => max - min,
+            Self::Jain => sum * sum / (count * squares),
+            Self::All => truth(not_zero == count),
+            Self::Any => truth(not_zero > 0.0),
+            Self::Count => not_zero,
+        })
     }
-    Some(match by {
-        By::Mean => sum / cells.len() as f64,
-        By::Max | By::Any => max,
-        By::Min | By::All => min,
-        _ => sum,
-    })
 }

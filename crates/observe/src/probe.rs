@@ -6,7 +6,7 @@ use protocol::time::time_s;
 use protocol::{Event, RobotName, Tick};
 use serde_json::Value;
 
-use crate::combine::By;
+use crate::combine::{By, truth};
 use crate::condition::Evaluation;
 use crate::expression::Expression;
 use crate::measure::{
@@ -486,11 +486,9 @@ impl ShareTally {
         self.sum = self.sum_at(observation.tick);
         self.since = observation.tick;
         let states = self.is_in.iter().zip(&self.is_lost);
-        let values: Vec<f64> = states
-            .map(|(is_in, is_lost)| f64::from(u8::from(*is_in && !is_lost)))
-            .collect();
+        let values = states.map(|(is_in, is_lost)| truth(*is_in && !is_lost));
         // A team without a robot is refused before the run.
-        self.value = self.by.combine(&values, &self.robots).unwrap_or(0.0);
+        self.value = self.by.combine(values).unwrap_or(0.0);
     }
 
     /// Takes an event into account. Returns whether a robot of the team may be in another state.

@@ -11,7 +11,7 @@ use protocol::pattern::matches;
 use protocol::{Event, RobotName, RobotPattern};
 use serde::{Deserialize, Serialize};
 
-use crate::combine::{self, By};
+use crate::combine::{self, By, truth};
 use crate::comparison::{TestError, TestTable, ValueTest, in_words, number_of, type_in_words};
 use crate::places::{CoveredArea, FieldRegion, components, least_distance_m};
 use crate::words::{Word, WordKind};
@@ -1083,7 +1083,7 @@ impl QuantityGauge {
                     values.push(of.value(robot, walk, seen)?);
                 }
                 match by {
-                    Some(by) => by.combine(&values, &self.robots),
+                    Some(by) => combined(*by, &values, &self.robots),
                     None => values.first().copied().ok_or(Undefined::NoRobot),
                 }
             }
@@ -1132,7 +1132,7 @@ impl QuantityGauge {
                     values.push(value_of_site(site, variable, test.as_ref(), seen)?);
                 }
                 let value = match by {
-                    Some(by) => by.combine(&values, &self.sites)?,
+                    Some(by) => combined(*by, &values, &self.sites)?,
                     None => values.first().copied().ok_or(Undefined::NoRobot)?,
                 };
                 self.of_sites = Some(value);
@@ -1234,57 +1234,21 @@ impl OfRobot {
     }
 }
 
-fn truth(holds: bool) -> f64 {
-    f64::from(u8::from(holds))
-}
-
 /// A state variable as a number; a flag is 1 or 0.
 pub(crate) fn number(state: RobotState<'_>, variable: &str) -> Option<f64> {
     number_of(state.state_variables.get(variable)?)
 }
 
-impl By {
-    /// The number of the numbers of robots or sites, which are in the order of their names.
-    pub(crate) fn combine(
-        self,
-        values: &[f64],
-        names: &[impl fmt::Display],
-    ) -> Result<f64, Undefined> {
-        let Some(first) = values.first() else {
-            return Err(Undefined::NoRobot);
-        };
-
-        let sum: f64 = values.iter().sum();
-        let max = values.iter().fold(*first, |one, other| one.max(*other));
-        let min = values.iter().fold(*first, |one, other| one.min(*other));
-        let count = values.iter().filter(|value| **value != 0.0).count();
-        Ok(match self {
-            Self::Sum => sum,
-            Self::Mean => sum / values.len() as f64,
-            Self::Max => max,
-            Self::Min => min,
-            Self::Spread => max - min,
-            Self::All => truth(count == values.len()),
-            Self::Any => truth(count > 0),
-            Self::Count => count as f64,
-            Self::Jain => return jain(values, names),
-        })
-    }
-}
-
-fn jain(values: &[f64], names: &[impl fmt::Display]) -> Result<f64, Undefined> {
-    let mut sum = 0.0;
-    let mut squares = 0.0;
-    for (value, name) in values.iter().zip(names) {
-        if *value < 0.0 {
+/// The number of the numbers of robots or sites, which are in the order of their names.
+fn combined(by: By, values: &[f64], names: &[impl fmt::Display]) -> Result<f64, Undefined> {
+    if by == By::Jain {
+        let mut named = values.iter().zip(names);
+        if let Some((value, name)) = named.find(|(value, _)| **value < 0.0) {
             return Err(Undefined::Negative(name.to_string(), *value));
         }
-        sum += value;
-        squares += value * value;
+        if !values.is_empty() && values.iter().all(|value| value * value == 0.0) {
+            return Err(Undefined::NothingToSpread);
+        }
     }
-
-    if squares == 0.0 {
-        return Err(Undefined::NothingToSpread);
-    }
-    Ok(sum * sum / (values.len() as f64 * squares))
+    by.combine(values.iter().copied()).ok_or(Undefined::NoRobot)
 }
