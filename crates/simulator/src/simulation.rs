@@ -468,6 +468,18 @@ impl Simulation {
         }
     }
 
+    /// Shows the last tick with these events, which are its own or those of the end of the run.
+    fn observed<T>(&self, events: &[Event], see: impl FnOnce(&Observation<'_>) -> T) -> T {
+        see(&Observation {
+            tick: self.tick,
+            tick_s: self.scenario.tick_s,
+            events,
+            state: &|name| self.robot_state(name),
+            site: &|name| self.site_state(name),
+            layer: &|name| self.layers.cells(name),
+        })
+    }
+
     /// Takes the measures of a tick, or of the end of the run.
     fn measure(&mut self, events: &[Event]) {
         if self.measurements.is_empty() {
@@ -475,14 +487,7 @@ impl Simulation {
         }
 
         let mut measurements = std::mem::take(&mut self.measurements);
-        measurements.observe(&Observation {
-            tick: self.tick,
-            tick_s: self.scenario.tick_s,
-            events,
-            state: &|name| self.robot_state(name),
-            site: &|name| self.site_state(name),
-            layer: &|name| self.layers.cells(name),
-        });
+        self.observed(events, |seen| measurements.observe(seen));
         self.measurements = measurements;
     }
 
@@ -493,14 +498,7 @@ impl Simulation {
         }
 
         let mut watches = std::mem::take(&mut self.watches);
-        let judged = watches.observe(&Observation {
-            tick: self.tick,
-            tick_s: self.scenario.tick_s,
-            events: &self.events,
-            state: &|name| self.robot_state(name),
-            site: &|name| self.site_state(name),
-            layer: &|name| self.layers.cells(name),
-        });
+        let judged = self.observed(&self.events, |seen| watches.observe(seen));
         self.watches = watches;
         self.events.extend(judged);
     }
@@ -510,14 +508,7 @@ impl Simulation {
         let Some(mut end_when) = self.end_when.take() else {
             return;
         };
-        self.goal = end_when.holds(&Observation {
-            tick: self.tick,
-            tick_s: self.scenario.tick_s,
-            events: &self.events,
-            state: &|name| self.robot_state(name),
-            site: &|name| self.site_state(name),
-            layer: &|name| self.layers.cells(name),
-        });
+        self.goal = self.observed(&self.events, |seen| end_when.holds(seen));
         self.end_when = Some(end_when);
     }
 
