@@ -5,13 +5,13 @@
     reason = "a test that cannot set up its subject fails"
 )]
 
+mod written;
+
 use std::collections::BTreeMap;
 
-use observe::{
-    Evaluation, Expectation, Measure, Measured, Observation, Probe, RunSetting, TickCondition,
-};
+use observe::{Expectation, Measured, Observation, RunSetting, TickCondition};
 use protocol::RobotName;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 
 fn setting() -> RunSetting {
     RunSetting {
@@ -47,39 +47,16 @@ fn show(mut see: impl FnMut(&Observation<'_>)) {
     }
 }
 
-#[derive(Debug, Serialize, Deserialize)]
-struct File {
-    c: TickCondition,
-}
-
 fn condition(text: &str) -> Result<TickCondition, String> {
-    let file: Result<File, _> = toml::from_str(&format!("c = {text}"));
-    let condition = file.map_err(|error| error.message().to_owned())?.c;
-    condition
-        .check(&setting())
-        .map_err(|error| error.to_string())?;
-    Ok(condition)
+    written::condition(text, &setting())
 }
 
-/// The ticks in which a condition holds.
 fn holds_in(text: &str) -> Vec<u64> {
-    let condition = condition(text).unwrap();
-    let mut evaluation = Evaluation::new(&condition, &setting());
-    let mut ticks = Vec::new();
-    show(|seen| {
-        if evaluation.holds(seen).is_some() && !ticks.contains(&seen.tick) {
-            ticks.push(seen.tick);
-        }
-    });
-    ticks
+    written::holds_in(text, &setting(), |see| show(see)).0
 }
 
 fn measured(text: &str) -> Measured {
-    let measure: Measure = toml::from_str(&format!("name = 'x'\n{text}")).unwrap();
-    measure.check(&setting()).unwrap();
-    let mut probe = Probe::new(&measure, &setting(), (0.0, 1.0));
-    show(|seen| probe.observe(seen));
-    probe.measured(&serde_json::Value::Null, &BTreeMap::new())
+    written::measured(text, &setting(), |see| show(see))
 }
 
 #[test]
@@ -128,12 +105,6 @@ fn a_condition_compares_one_number_of_the_cells() {
         ),
     ] {
         assert_eq!(holds_in(text), ticks, "{text}");
-        let written = toml::to_string(&File {
-            c: condition(text).unwrap(),
-        })
-        .unwrap();
-        let again: File = toml::from_str(&written).unwrap();
-        assert_eq!(again.c, condition(text).unwrap(), "{written}");
     }
 }
 

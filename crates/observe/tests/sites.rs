@@ -5,16 +5,18 @@
     reason = "a test that cannot set up its subject fails"
 )]
 
+mod written;
+
 use std::collections::BTreeMap;
 
 use observe::{
-    Evaluation, Expectation, Measure, Measured, Measurements, Monitors, Observation, Probe,
-    RunSetting, ScenarioMeasure, SiteStates, TickCondition,
+    Expectation, Measure, Measured, Measurements, Monitors, Observation, Probe, RunSetting,
+    ScenarioMeasure, SiteStates, TickCondition,
 };
 use proptest::prelude::*;
 use protocol::messages::{SiteRefusal, StateVariables, Variable};
 use protocol::{Event, RobotName};
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use serde_json::Value;
 
 /// Sites T1 to T3 and U. Each task has a stock, and whether it is done; U has a label as well.
@@ -67,59 +69,20 @@ fn show(ticks: &[Vec<Event>], mut see: impl FnMut(&Observation<'_>)) {
     }
 }
 
-#[derive(Debug, Serialize, Deserialize)]
-struct File {
-    c: TickCondition,
-}
-
 fn condition(text: &str) -> Result<TickCondition, String> {
-    let file: Result<File, _> = toml::from_str(&format!("c = {text}"));
-    let condition = file.map_err(|error| error.message().to_owned())?.c;
-    condition
-        .check(&setting())
-        .map_err(|error| error.to_string())?;
-    Ok(condition)
+    written::condition(text, &setting())
 }
 
-/// The ticks in which a condition holds, and why it holds in the first of them.
 fn holds_in(text: &str, ticks: &[Vec<Event>]) -> (Vec<u64>, String) {
-    let condition = condition(text).unwrap();
-    let written = toml::to_string(&File {
-        c: condition.clone(),
-    });
-    let read: File = toml::from_str(&written.unwrap()).unwrap();
-    assert_eq!(read.c, condition, "{text}");
-
-    let mut evaluation = Evaluation::new(&condition, &setting());
-    let mut held = Vec::new();
-    let mut because = String::new();
-    show(ticks, |seen| {
-        if let Some(reason) = evaluation.holds(seen)
-            && held.last() != Some(&seen.tick)
-        {
-            if held.is_empty() {
-                because = reason;
-            }
-            held.push(seen.tick);
-        }
-    });
-    (held, because)
+    written::holds_in(text, &setting(), |see| show(ticks, see))
 }
 
 fn measure(text: &str) -> Result<Measure, String> {
-    let measure: Result<Measure, _> = toml::from_str(&format!("name = 'x'\n{text}"));
-    let measure = measure.map_err(|error| error.message().to_owned())?;
-    measure
-        .check(&setting())
-        .map_err(|error| error.to_string())?;
-    Ok(measure)
+    written::measure(text, &setting())
 }
 
 fn take(text: &str, ticks: &[Vec<Event>]) -> Measured {
-    let measure = measure(text).unwrap();
-    let mut probe = Probe::new(&measure, &setting(), (0.0, 1.0));
-    show(ticks, |seen| probe.observe(seen));
-    probe.measured(&Value::Null, &BTreeMap::new())
+    written::measured(text, &setting(), |see| show(ticks, see))
 }
 
 /// T1 is done in tick 1, all tasks in tick 3; the stock of U goes from 5 to 0, and its label from A to B.
