@@ -2,19 +2,16 @@
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
+mod actors;
 mod common;
 
-use std::collections::BTreeMap;
-use std::convert::Infallible;
 use std::path::Path;
-use std::sync::Arc;
 
+use actors::Actors;
 use base64::Engine;
-use lockstep::{Bulletin, Exchange, IncarnationNotice, TickOutcome};
 use proptest::prelude::*;
 use protocol::messages::{
-    CommandText, LayerAction, LayerFrame, LayerRefusal, LayerResult, MAX_SENSED_CELLS, Point,
-    Report, TickUpdate,
+    LayerAction, LayerFrame, LayerRefusal, LayerResult, MAX_SENSED_CELLS, Point, Report,
 };
 use protocol::{RobotName, RunName};
 use scenario::Scenario;
@@ -260,40 +257,8 @@ fn a_robot_senses_the_cells_whose_centers_are_within_range() {
     assert_eq!(cells, 1);
 }
 
-/// Robots that act on layers in ticks of their choice, and the news they got. Reports are given in the order of `names`.
-struct Actors {
-    names: Vec<RobotName>,
-    places: BTreeMap<RobotName, Point>,
-    actions: BTreeMap<(u64, RobotName), Vec<LayerAction>>,
-    news: Vec<BTreeMap<RobotName, TickUpdate>>,
-}
-
-impl Exchange<TickUpdate, Arc<Report>, CommandText> for Actors {
-    type Error = Infallible;
-
-    fn exchange(
-        &mut self,
-        tick: u64,
-        bulletin: &dyn Bulletin<TickUpdate>,
-    ) -> Result<TickOutcome<Arc<Report>, CommandText>, Infallible> {
-        let mut outcome = TickOutcome::default();
-        let mut news = BTreeMap::new();
-        for name in bulletin.robots() {
-            let update = bulletin.compose(&name, IncarnationNotice::default());
-            news.insert(name, update);
-        }
-        self.news.push(news);
-        for name in &self.names {
-            let actions = self.actions.get(&(tick, name.clone()));
-            let report = Report {
-                layer_actions: actions.cloned().unwrap_or_default(),
-                ..common::report(tick, self.places[name])
-            };
-            let answer = (Arc::new(report), Vec::new());
-            outcome.reports.insert(name.clone(), answer);
-        }
-        Ok(outcome)
-    }
+fn act_on_layers(report: &mut Report, actions: Vec<LayerAction>) {
+    report.layer_actions = actions;
 }
 
 /// A run in which robots do this, tick by tick.
@@ -301,16 +266,9 @@ fn run(
     text: &str,
     actions: &[(u64, &str, LayerAction)],
     ticks: u64,
-) -> (Simulation, Actors, Vec<String>) {
+) -> (Simulation, Actors<LayerAction>, Vec<String>) {
     let mut simulation = Simulation::new(scenario(text), 1).unwrap();
-    let names = simulation.names().to_vec();
-    let place = |name: &RobotName| (name.clone(), simulation.location(name).unwrap());
-    let mut actors = Actors {
-        places: names.iter().map(place).collect(),
-        names,
-        actions: BTreeMap::new(),
-        news: Vec::new(),
-    };
+    let mut actors = Actors::of(&simulation, act_on_layers);
     for (tick, robot, action) in actions {
         let of_tick = actors.actions.entry((*tick, name(robot))).or_default();
         of_tick.push(action.clone());
@@ -438,14 +396,8 @@ fn a_recorded_tick_has_the_layers_after_it() {
     let header = recorder::header(&RunName::new("r").unwrap(), &simulation);
     assert_eq!(header.layers, simulation.layers().frames());
 
-    let names = simulation.names().to_vec();
-    let place = |name: &RobotName| (name.clone(), simulation.location(name).unwrap());
-    let mut actors = Actors {
-        places: names.iter().map(place).collect(),
-        names,
-        actions: [((2, name("A")), vec![take])].into(),
-        news: Vec::new(),
-    };
+    let mut actors = Actors::of(&simulation, act_on_layers);
+    actors.actions.insert((2, name("A")), vec![take]);
     simulation.init(&mut actors).unwrap();
     for tick in 1..4 {
         let record = simulation.step(&mut actors).unwrap();

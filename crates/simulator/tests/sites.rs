@@ -2,18 +2,18 @@
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
+mod actors;
 mod common;
 
 use std::collections::BTreeMap;
-use std::convert::Infallible;
 use std::path::Path;
-use std::sync::Arc;
 
-use lockstep::{Bulletin, Exchange, IncarnationNotice, TickOutcome};
+use actors::Actors;
+use lockstep::IncarnationNotice;
 use proptest::prelude::*;
 use protocol::messages::{
-    CommandText, KnownSite, MAX_SITE_TEXT_BYTES, Point, Report, SiteAction, SiteRefusal,
-    StateVariables, TickUpdate, Variable,
+    KnownSite, MAX_SITE_TEXT_BYTES, Point, Report, SiteAction, SiteRefusal, StateVariables,
+    Variable,
 };
 use protocol::{RobotName, RunName};
 use scenario::Scenario;
@@ -227,57 +227,17 @@ fn the_first_by_name_gets_what_two_want_or_neither() {
     );
 }
 
-/// Robots that act on sites in ticks of their choice, and the news they got.
-struct Actors {
-    names: Vec<RobotName>,
-    places: BTreeMap<RobotName, Point>,
-    actions: BTreeMap<(u64, RobotName), Vec<SiteAction>>,
-    news: Vec<BTreeMap<RobotName, TickUpdate>>,
-}
-
-impl Exchange<TickUpdate, Arc<Report>, CommandText> for Actors {
-    type Error = Infallible;
-
-    fn exchange(
-        &mut self,
-        tick: u64,
-        bulletin: &dyn Bulletin<TickUpdate>,
-    ) -> Result<TickOutcome<Arc<Report>, CommandText>, Infallible> {
-        let mut outcome = TickOutcome::default();
-        let mut news = BTreeMap::new();
-        for name in bulletin.robots() {
-            let update = bulletin.compose(&name, IncarnationNotice::default());
-            news.insert(name, update);
-        }
-        self.news.push(news);
-        for name in &self.names {
-            let actions = self.actions.get(&(tick, name.clone()));
-            let report = Report {
-                site_actions: actions.cloned().unwrap_or_default(),
-                ..common::report(tick, self.places[name])
-            };
-            let answer = (Arc::new(report), Vec::new());
-            outcome.reports.insert(name.clone(), answer);
-        }
-        Ok(outcome)
-    }
-}
-
 #[test]
 fn a_robot_senses_sites_in_range_and_learns_what_became_of_its_actions() {
     let mut simulation = Simulation::new(scenario(FILE), 1).unwrap();
-    let names = simulation.names().to_vec();
-    let place = |name: &RobotName| (name.clone(), simulation.location(name).unwrap());
     let done = SiteAction::set("T", "done", true);
-    let mut actors = Actors {
-        places: names.iter().map(place).collect(),
-        names,
-        actions: BTreeMap::from([
-            ((1, name("B")), vec![done.clone()]),
-            ((1, name("C")), vec![done.clone(), done]),
-        ]),
-        news: Vec::new(),
-    };
+    let mut actors = Actors::of(&simulation, |report: &mut Report, actions| {
+        report.site_actions = actions;
+    });
+    actors.actions = BTreeMap::from([
+        ((1, name("B")), vec![done.clone()]),
+        ((1, name("C")), vec![done.clone(), done]),
+    ]);
     simulation.init(&mut actors).unwrap();
     let first = simulation.step(&mut actors).unwrap();
     simulation.step(&mut actors).unwrap();
