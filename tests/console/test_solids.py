@@ -72,7 +72,8 @@ for line in sys.stdin:
         ranges = json.loads(sys.stdin.readline())["value"]["ranges"]
     here = message["location"]
     walks = name == "Scout" and tick % 4 == 0
-    done = {"type": "done", "proposal": {"x": here["x"] + (0.2 if walks else 0), "y": here["y"]}, "emotion_state": "CALM",
+    drives = {"velocity": {"linear_mps": -0.3, "angular_radps": 0.2}} if "pose" in message else {}
+    done = {"type": "done", **drives, "proposal": {"x": here["x"] + (0.2 if walks else 0), "y": here["y"]}, "emotion_state": "CALM",
         "direction_rad": tick // 4 * 0.9, "speed_mps": 0.4 if walks else 0,
         "state_variables": {f"r{index}": length for index, length in enumerate(ranges)}}
     print(json.dumps(done), flush=True)
@@ -120,13 +121,39 @@ EMPTY = {
 }
 
 
+# A cart drives backward and turns, beside a post that stands: the cart looks the other way than it moves.
+GARAGE = f"""
+tick = "0.5 s"
+duration = "60 s"
+[field]
+size = ["8 m", "6 m"]
+[sensing]
+range = "3 m"
+field_of_view = "{FIELD_OF_VIEW} deg"
+rays = {{ count = {RAYS}, range = "4 m" }}
+[[obstacle]]
+at = ["6.5 m", "3.4 m"]
+[[robot]]
+name = "Cart"
+at = ["4 m", "3 m"]
+size = ["2 m", "0.8 m"]
+drive = {{ heading = "20 deg" }}
+[[robot]]
+name = "Post"
+at = ["4.2 m", "1 m"]
+radius = "0.2 m"
+"""
+
+
 class Hall(Launch):
+    scenario, robots = SCENARIO, ("Cart", "Drum", "Scout")
+
     def __init__(self, folder, **options):
         (folder / "plan.svg").write_text(PLAN)
-        (folder / "hall.toml").write_text(SCENARIO)
+        (folder / "hall.toml").write_text(self.scenario)
         self.program = folder / "robot.py"
         self.program.write_text(ROBOT)
-        super().__init__(folder, folder / "hall.toml", ("Cart", "Drum", "Scout"), **options)
+        super().__init__(folder, folder / "hall.toml", self.robots, **options)
 
     def start_robots(self, names):
         return {name: self.start("cars", "exec", "--name", name, "--", sys.executable, self.program) for name in names}
@@ -134,6 +161,10 @@ class Hall(Launch):
     def step(self, tick):
         self.control("step", str(tick))
         eventually("the step", lambda: (self.settled() or {}).get("tick") == tick)
+
+
+class Garage(Hall):
+    scenario, robots = GARAGE, ("Cart", "Post")
 
 
 def shown(page, tick):
@@ -159,7 +190,7 @@ def reported(page, robot):
 
 
 def measures(page, robot, tick, go):
-    """The rays that are shown are those that the robot was told in the tick. It has not turned in it."""
+    """The rays that are shown are those that the robot was told in the tick. One that does not drive has not turned in it."""
     assert tick % 4 != 0
     go(page, tick)
     # Guests are shown in whole millimeters, which is more along a ray that grazes one.
@@ -209,6 +240,8 @@ def test_the_plan_has_what_the_world_has(launch, open_page, processes, screensho
         scrub(page, tick)
         shown(page, tick)
 
+    # A console that shows a recording has what is written when it starts: the page has read as much.
+    back(page, 9)
     recorded = open_page(start_console(processes, "--recording", run.run_folder), scheme=scheme, reduced_motion="reduce")
     for one in (page, recorded):
         back(one, 5)
@@ -235,6 +268,30 @@ def saved(page, folder):
     assert any(path.count("M") == path.count("L") == RAYS for path in re.findall(r'd="([^"]*)"', svg)), "rays"
     download(page, "picture", folder / "plan.png")
     assert (folder / "plan.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_robot_that_drives_looks_along_its_heading(launch, open_page, screenshots):
+    """Its rays and its rectangle turn with it, also while it drives backward and reports the opposite direction."""
+    run = launch(Garage)
+    page = open_page(run.address, reduced_motion="reduce")
+    shown(page, 0)
+
+    def step(page, tick):
+        if page.evaluate("window.carsConsole.frame().tick") < tick:
+            run.control("step", "1")
+        shown(page, tick)
+
+    turned = []
+    for tick in range(1, 7):
+        step(page, tick)
+        for robot in ("Cart", "Post") if tick != 4 else ():
+            choose(page, robot)
+            measures(page, robot, tick, step)
+        cart = page.evaluate("window.carsConsole.frame().robots[0]")
+        turned.append(abs(cart["heading_rad"] - cart["direction_rad"]))
+    assert max(turned) > 0.5, "it looks where it moves, which proves nothing"
+    choose(page, "Cart")
+    page.screenshot(path=screenshots / "driving.png")
 
 
 def test_a_page_that_comes_later_has_walls_at_once(launch, open_page):

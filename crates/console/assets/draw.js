@@ -14,7 +14,14 @@ import { arrow, barrier, cross, disk, envelope, line, nose, notch, ring, text } 
 /** @typedef {{context: Paper, camera: Camera, theme: Theme}} Pen */
 /** How a robot looks, wherever it is and goes.
  * @typedef {{letters: string, radius: number, presence: RobotFrame["presence"], emotion: string, hatching: number, isLate: boolean, isChosen: boolean}} Look */
-/** What is drawn of a robot beside its body. @typedef {Pick<RobotFrame, "presence" | "blocked" | "direction_rad" | "speed_mps">} Drawn */
+/** What is drawn of a robot beside its body. @typedef {Pick<RobotFrame, "presence" | "blocked" | "direction_rad" | "heading_rad" | "speed_mps">} Drawn */
+
+/** Where a robot looks, radians: along its heading, or where it moves if it does not drive.
+ * @param {Pick<RobotFrame, "direction_rad" | "heading_rad">} robot */
+export function viewOf({ heading_rad, direction_rad }) {
+  return heading_rad ?? direction_rad;
+}
+
 
 const FULL_TURN = 2 * Math.PI;
 /** Smallest radius at which the letters in a robot can be read. */
@@ -299,10 +306,11 @@ export function body({ context, theme }, { letters, radius, presence, emotion, h
  * @param {number} y
  * @param {boolean} looksAhead
  */
-export function course({ context, theme }, { presence, blocked, direction_rad, speed_mps }, { radius }, x, y, looksAhead) {
+export function course({ context, theme }, robot, { radius }, x, y, looksAhead) {
+  const { presence, blocked, direction_rad, speed_mps } = robot;
   if (presence !== "here") return;
   if (speed_mps > 0) nose(context, x, y, radius + RING_PX, direction_rad, theme.robot);
-  else if (looksAhead) notch(context, x, y, radius + RING_PX, direction_rad, theme.robot);
+  else if (looksAhead) notch(context, x, y, radius + RING_PX, viewOf(robot), theme.robot);
   if (blocked) barrier(context, x, y, radius + RING_PX, direction_rad, theme.warning);
 }
 

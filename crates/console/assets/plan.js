@@ -212,7 +212,7 @@ export class Plan {
       const shape = shapeOf(frame, robot.name);
       const look = draw.lookOf(robot, pen.camera, Math.min(...sizeOf(shape, frame.body_m)), marks);
       const place = motion.robotsNow.get(robot.name) ?? robot.location;
-      footprint(pen, shape, pen.camera.x(place.x), pen.camera.y(place.y));
+      footprint(pen, shape, pen.camera.x(place.x), pen.camera.y(place.y), robot.heading_rad ?? 0);
       const side = 2 * look.radius;
       taken.robots.push({ x: pen.camera.x(place.x), y: pen.camera.y(place.y), width: side, height: side });
       drawRobot(pen, robot, look, place);
@@ -265,7 +265,7 @@ export class Plan {
       const marks = { isLate: this.editor.faulty(name), isChosen: name === this.chosen };
       const shape = shapeOf(this.motion.to, name);
       const look = draw.lookOf(robot, this.camera, Math.min(...sizeOf(shape, body_m)), marks);
-      footprint(this.pen, shape, this.camera.x(place.x), this.camera.y(place.y));
+      footprint(this.pen, shape, this.camera.x(place.x), this.camera.y(place.y), 0);
       this.drawRobot(this.pen, robot, look, place);
     }
 

@@ -3,6 +3,7 @@
 // frame and no record. Rays neither miss nor err, so they follow from the places of all bodies, by the rules of the simulator
 // (`world/src/sight.rs`). A robot that turns in the tick that is shown has measured in its direction before.
 
+import { viewOf } from "./draw.js";
 import { shapeOf, sizeOf } from "./solids.js";
 
 /** @typedef {import("./draw.js").Pen} Pen */
@@ -10,7 +11,7 @@ import { shapeOf, sizeOf } from "./solids.js";
 /** @typedef {import("./types/messages.js").BodyShape} BodyShape */
 /** @typedef {{x: number, y: number}} Place */
 /** Where all that moves is seen. @typedef {{robotsNow: Map<string, Place>, now_m: Float64Array}} Moving */
-/** @typedef {{at: Place, shape: BodyShape | null, half_m: [number, number]}} Body */
+/** @typedef {{at: Place, shape: BodyShape | null, half_m: [number, number], turn_rad: number}} Body */
 
 const FULL_TURN = 2 * Math.PI;
 /** Size of the end of a ray that meets something. */
@@ -38,10 +39,10 @@ export function drawSenses(pen, frame, name, moving) {
   const x = pen.camera.x(place.x);
   const y = pen.camera.y(place.y);
   const { field_of_view_rad, range_m, rays } = sensing;
-  if (field_of_view_rad) drawSector(pen, x, y, range_m * scale, robot.direction_rad, field_of_view_rad);
+  if (field_of_view_rad) drawSector(pen, x, y, range_m * scale, viewOf(robot), field_of_view_rad);
   if (!rays) return;
   const ends = raysOf(frame, name, moving).map((length_m, i) => {
-    const angle = robot.direction_rad + (FULL_TURN * i) / rays.count;
+    const angle = viewOf(robot) + (FULL_TURN * i) / rays.count;
     return { x: x + Math.cos(angle) * length_m * scale, y: y - Math.sin(angle) * length_m * scale, isHit: length_m < rays.range_m };
   });
   drawFan(pen, x, y, ends);
@@ -111,7 +112,7 @@ export function raysOf(frame, name, moving) {
   const field = { at: { x: width_m / 2, y: height_m / 2 }, half_m: /** @type {[number, number]} */ ([width_m / 2, height_m / 2]) };
 
   return Array.from({ length: rays.count }, (_, i) => {
-    const angle = robot.direction_rad + (FULL_TURN * i) / rays.count;
+    const angle = viewOf(robot) + (FULL_TURN * i) / rays.count;
     const step = { x: Math.cos(angle) * rays.range_m, y: Math.sin(angle) * rays.range_m };
     let nearest = Math.min(1, Math.max(0, inRectangle(from, step, field)[1]));
     for (const body of bodies) nearest = Math.min(nearest, entered(from, step, body));
@@ -125,15 +126,16 @@ function bodiesNear(frame, name, { robotsNow, now_m }, from, range_m) {
   const { body_m, static_world } = frame;
   /** @type {Body[]} */
   const bodies = [];
-  const add = (/** @type {Place} */ at, /** @type {BodyShape | null | undefined} */ shape) => {
+  const add = (/** @type {Place} */ at, /** @type {BodyShape | null | undefined} */ shape, turn_rad = 0) => {
     const [width_m, height_m] = sizeOf(shape, body_m);
-    const isNear = Math.abs(at.x - from.x) <= range_m + width_m && Math.abs(at.y - from.y) <= range_m + height_m;
-    if (isNear) bodies.push({ at, shape: shape ?? null, half_m: [width_m / 2, height_m / 2] });
+    const most_m = Math.max(width_m, height_m);
+    const isNear = Math.abs(at.x - from.x) <= range_m + most_m && Math.abs(at.y - from.y) <= range_m + most_m;
+    if (isNear) bodies.push({ at, shape: shape ?? null, half_m: [width_m / 2, height_m / 2], turn_rad });
   };
 
   frame.obstacles.forEach(([x, y], i) => add({ x, y }, static_world?.obstacle_shapes?.[i]));
-  for (const { name: other, location } of frame.robots) {
-    if (other !== name) add(robotsNow.get(other) ?? location, shapeOf(frame, other));
+  for (const { name: other, location, heading_rad } of frame.robots) {
+    if (other !== name) add(robotsNow.get(other) ?? location, shapeOf(frame, other), heading_rad ?? 0);
   }
   for (let i = 0; i < now_m.length; i += 2) add({ x: now_m[i], y: now_m[i + 1] }, null);
   return bodies;
@@ -157,9 +159,16 @@ function wallsNear(walls, from, range_m) {
 /** The share of a way after which it enters a body; infinite if it does not. @type {(from: Place, step: Place, body: Body) => number} */
 function entered(from, step, body) {
   const isDisc = body.shape !== null && "disc" in body.shape;
-  const [enter, leave] = isDisc ? inDisc(from, step, body) : inRectangle(from, step, body);
+  const [enter, leave] = isDisc ? inDisc(from, step, body) : inTurned(from, step, body);
   const share = Math.max(0, enter);
   return share < Math.min(1, leave) ? share : Infinity;
+}
+
+/** The same of a rectangle that is turned. @type {(from: Place, step: Place, body: Body) => [number, number]} */
+function inTurned(from, step, { at, half_m, turn_rad }) {
+  const [cos, sin] = [Math.cos(turn_rad), Math.sin(turn_rad)];
+  const turnBack = (/** @type {number} */ x, /** @type {number} */ y) => ({ x: x * cos + y * sin, y: y * cos - x * sin });
+  return inRectangle(turnBack(from.x - at.x, from.y - at.y), turnBack(step.x, step.y), { at: { x: 0, y: 0 }, half_m });
 }
 
 /** The shares of a way between which it is in a rectangle. @type {(from: Place, step: Place, body: Pick<Body, "at" | "half_m">) => [number, number]} */

@@ -64,12 +64,20 @@ function drawWalls({ context, camera, theme }, walls) {
   context.stroke();
 }
 
-/** The path around a shape. @type {(context: draw.Pen["context"], shape: BodyShape, scale: number, x: number, y: number) => void} */
-function outline(context, shape, scale, x, y) {
+/** The path around a shape. @type {(context: draw.Pen["context"], shape: BodyShape, scale: number, x: number, y: number, turn_rad?: number) => void} */
+function outline(context, shape, scale, x, y, turn_rad = 0) {
   context.beginPath();
   if ("disc" in shape) return context.arc(x, y, shape.disc * scale, 0, 2 * Math.PI);
-  const [width, height] = shape.rectangle.map((side_m) => side_m * scale);
-  context.rect(x - width / 2, y - height / 2, width, height);
+  const [half_width, half_height] = shape.rectangle.map((side_m) => (side_m * scale) / 2);
+  if (turn_rad === 0) return context.rect(x - half_width, y - half_height, 2 * half_width, 2 * half_height);
+  // On the screen y points down.
+  const [cos, sin] = [Math.cos(turn_rad), -Math.sin(turn_rad)];
+  for (const [i, [right, down]] of [[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]].entries()) {
+    const [dx, dy] = [right * half_width, down * half_height];
+    const corner = /** @type {const} */ ([x + dx * cos - dy * sin, y + dx * sin + dy * cos]);
+    if (i === 0) context.moveTo(...corner);
+    else context.lineTo(...corner);
+  }
 }
 
 /** The shape of a robot, if it has one of its own. @type {(frame: Pick<WorldFrame, "static_world"> | null, robot: string) => BodyShape | undefined} */
@@ -84,12 +92,13 @@ export function sizeOf(shape, body_m) {
 }
 
 /**
- * The ground that a rectangular robot covers. Its body, a circle, is as wide as the rectangle is narrow.
- * @type {(pen: draw.Pen, shape: BodyShape | undefined, x: number, y: number) => void}
+ * The ground that a rectangular robot covers, which turns with a robot that drives. Its body, a circle, is as wide as the rectangle is
+ * narrow.
+ * @type {(pen: draw.Pen, shape: BodyShape | undefined, x: number, y: number, turn_rad: number) => void}
  */
-export function footprint({ context, camera, theme }, shape, x, y) {
+export function footprint({ context, camera, theme }, shape, x, y, turn_rad) {
   if (!shape || "disc" in shape) return;
-  outline(context, shape, camera.scale, x, y);
+  outline(context, shape, camera.scale, x, y, turn_rad);
   context.fillStyle = theme.robot;
   context.globalAlpha = 0.22;
   context.fill();

@@ -84,8 +84,7 @@ fn line(to: &mut Protobuf<'_>, header: &Header, kind: u64, corners: &[[f64; 2]],
     to.message(6, |to| color(to, rgb));
 }
 
-/// A body, as a part of an entity. A square of the run's size is shown in the direction of a robot, a shape as it stands: it does
-/// not turn.
+/// A body, as a part of an entity, turned by an angle.
 fn body(
     to: &mut Protobuf<'_>,
     header: &Header,
@@ -95,10 +94,9 @@ fn body(
     rgb: [f64; 3],
 ) {
     let height_m = header.body_m * HEIGHT;
-    let (field, direction_rad) = match shape {
-        None => (CUBES, direction_rad),
-        Some(BodyShape::Rectangle(_)) => (CUBES, 0.0),
-        Some(BodyShape::Disc(_)) => (CYLINDERS, 0.0),
+    let field = match shape {
+        None | Some(BodyShape::Rectangle(_)) => CUBES,
+        Some(BodyShape::Disc(_)) => CYLINDERS,
     };
     let [width_m, length_m] = shape.map_or([header.body_m; 2], BodyShape::size_m);
     to.message(field, |to| {
@@ -123,7 +121,9 @@ pub(crate) fn robots(to: &mut Protobuf<'_>, header: &Header, tick: &TickView<'_>
         to.message(2, |to| {
             entity(to, time_ns, robot.name.as_str());
             let shape = header.static_world.robot_shapes.get(&robot.name).copied();
-            body(to, header, shape, [at.x, at.y], direction_rad, color_of);
+            // A shape of its own turns with a robot that drives.
+            let turn_rad = shape.map_or(direction_rad, |_| robot.heading_rad.unwrap_or(0.0));
+            body(to, header, shape, [at.x, at.y], turn_rad, color_of);
             to.message(13, |to| {
                 to.message(1, |to| pose(to, at.x, at.y, header.body_m, 0.0))
                     .integer(2, 1)
