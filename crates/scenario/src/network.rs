@@ -134,10 +134,9 @@ impl Network {
     #[must_use]
     pub fn has_bursts(&self) -> bool {
         let links = self.links.iter();
-        let own = links
-            .flat_map(|link| [link.commands, link.queries])
-            .flatten();
-        let mut all = own.chain([self.commands, self.queries]);
+        let own = links.flat_map(|link| [&link.commands, &link.queries]);
+        let own = own.flatten();
+        let mut all = own.chain([&self.commands, &self.queries]);
         all.any(|channel| channel.burst.is_some())
     }
 

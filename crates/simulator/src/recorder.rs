@@ -334,7 +334,7 @@ impl Recorder {
         let mut reports = Vec::new();
         if self.recording.is_some() && !record.is_end() {
             set_frame(&mut self.frame, simulation, record);
-            reports = simulation.reports_of(record.tick);
+            reports = simulation.reports_of(record.tick, |_| true);
         }
 
         self.noted = Some(PendingTick {

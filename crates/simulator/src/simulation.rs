@@ -100,7 +100,7 @@ pub struct Simulation {
     /// The robots that the radio of each reaches in this tick; `None` where distance does not matter.
     in_range: Option<BTreeMap<RobotName, Vec<RobotName>>>,
     /// News of the tick in progress; robots without any have no entry.
-    news: BTreeMap<RobotName, TickUpdate>,
+    news: BTreeMap<RobotName, Box<TickUpdate>>,
     /// Events of the tick in progress.
     events: Vec<Event>,
     /// The last report of each robot.
@@ -445,9 +445,11 @@ impl Simulation {
             }
         }
         self.note_reports(outcome.reports, &mut digest);
-        let reports = self.reports_of(self.now);
-        self.act_on_sites(&reports, &mut digest);
-        self.act_on_layers(&reports, &mut digest);
+        let acting = self.reports_of(self.now, |report| {
+            !report.site_actions.is_empty() || !report.layer_actions.is_empty()
+        });
+        self.act_on_sites(&acting, &mut digest);
+        self.act_on_layers(&acting, &mut digest);
         self.note_guests();
 
         self.tick = self.now;
@@ -622,11 +624,14 @@ impl Simulation {
     /// part from this tick on always contain its location.
     #[must_use]
     pub fn news(&self, name: &RobotName, notice: IncarnationNotice) -> TickUpdate {
-        let mut news = self.news.get(name).cloned().unwrap_or(TickUpdate {
-            epoch: self.epoch,
-            tick: self.now,
-            ..TickUpdate::default()
-        });
+        let mut news = match self.news.get(name) {
+            Some(news) => TickUpdate::clone(news),
+            None => TickUpdate {
+                epoch: self.epoch,
+                tick: self.now,
+                ..TickUpdate::default()
+            },
+        };
 
         news.joined = notice.joined;
         news.rejoin = notice.rejoin;
@@ -818,7 +823,7 @@ impl Simulation {
             };
             // A robot without news gets none: silence says that all is as it expects.
             if !news.is_empty() {
-                all.insert(name.clone(), news);
+                all.insert(name.clone(), Box::new(news));
             }
         }
 
@@ -1392,11 +1397,15 @@ impl Simulation {
         self.reports.get(name).map(Arc::as_ref)
     }
 
-    /// The reports for a tick, of the robots that have not missed it.
-    pub(crate) fn reports_of(&self, tick: Tick) -> Vec<NamedReport> {
+    /// The reports for a tick that are wanted, of the robots that have not missed it.
+    pub(crate) fn reports_of(
+        &self,
+        tick: Tick,
+        wants: impl Fn(&Report) -> bool,
+    ) -> Vec<NamedReport> {
         let mut reports = Vec::new();
         for (name, report) in &self.reports {
-            if report.tick == tick {
+            if report.tick == tick && wants(report) {
                 reports.push((name.clone(), report.clone()));
             }
         }
