@@ -3,6 +3,7 @@
 use affect::akr::{FacialExpression, Valence};
 use affect::{AffectFrame, Episode, EpisodeCause};
 use robot::{Face, Tone, Widget};
+use smol_str::{SmolStr, format_smolstr};
 
 use crate::emotion::NEUTRAL;
 
@@ -65,14 +66,22 @@ fn emotion(name: &str, tone: Tone) -> Widget {
 }
 
 /// A table of names and values.
-pub(crate) fn table<const N: usize>(rows: [(&str, String); N]) -> Widget {
-    let rows = rows.map(|(name, value)| vec![name.to_owned(), value]);
+pub(crate) fn table<const N: usize>(rows: [(&'static str, SmolStr); N]) -> Widget {
+    let rows = rows.map(|(name, value)| vec![SmolStr::new_static(name), value]);
     Widget::Table { rows: rows.into() }
 }
 
-/// A duration, as text.
-pub(crate) fn seconds(value_s: f64) -> String {
-    format!("{value_s:.1} s")
+/// A number with so many decimals and its unit, as text.
+pub(crate) fn number(value: f64, decimals: u8, unit: &str) -> SmolStr {
+    let width = usize::from(decimals);
+    let scale = 10_u64.pow(decimals.into());
+    // Panels are made in every tick, and the standard library takes its slow way for numbers such as 0.5.
+    let scaled = (value * scale as f64).round();
+    if !(0.0..1e9).contains(&scaled) {
+        return format_smolstr!("{value:.width$}{unit}");
+    }
+    let scaled = scaled as u64;
+    format_smolstr!("{}.{:0width$}{unit}", scaled / scale, scaled % scale)
 }
 
 /// A flag, as text.

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use smol_str::SmolStr;
 
 use super::control::{Awaited, FaultKind, Phase, Presence};
 use super::layer::LayerFrame;
@@ -377,7 +378,8 @@ pub enum Widget {
     /// Rows of text.
     Table {
         /// The rows.
-        rows: Vec<Vec<String>>,
+        #[schemars(with = "Vec<Vec<String>>")]
+        rows: Vec<Vec<SmolStr>>,
     },
     /// A picture; shown as an image, so that nothing in it runs.
     Svg {

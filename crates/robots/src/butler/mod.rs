@@ -19,6 +19,7 @@ use robot::{
     Robot, RobotName, SensedRobot, StateVariables, Widget, control_cycle, read_parameters,
 };
 use serde::{Deserialize, Serialize};
+use smol_str::format_smolstr;
 
 pub use deliberation::Deliberation;
 pub use parameters::{Approach, ButlerParameters, Rate};
@@ -789,18 +790,24 @@ impl Butler {
         let hurried = panel::yes(state.hurried);
 
         panel::table([
-            ("time to empty", panel::seconds(measures.time_to_empty_s)),
-            ("time to refill", panel::seconds(measures.time_to_refill_s)),
-            ("need ratio", format!("{:.2}", measures.need_ratio)),
-            ("refiller", state.refiller.name().to_owned()),
-            ("called, hurried", format!("{called}, {hurried}")),
+            (
+                "time to empty",
+                panel::number(measures.time_to_empty_s, 1, " s"),
+            ),
+            (
+                "time to refill",
+                panel::number(measures.time_to_refill_s, 1, " s"),
+            ),
+            ("need ratio", panel::number(measures.need_ratio, 2, "")),
+            ("refiller", state.refiller.name().into()),
+            ("called, hurried", format_smolstr!("{called}, {hurried}")),
             (
                 "served, missed",
-                format!("{}, {}", state.served, state.missed),
+                format_smolstr!("{}, {}", state.served, state.missed),
             ),
             (
                 "exchanges, given up",
-                format!("{}, {}", state.exchanges, state.gave_up),
+                format_smolstr!("{}, {}", state.exchanges, state.gave_up),
             ),
         ])
     }

@@ -16,6 +16,7 @@ use robot::{
     RobotName, StateVariables, Widget, control_cycle, read_parameters,
 };
 use serde::{Deserialize, Serialize};
+use smol_str::{SmolStr, format_smolstr};
 
 pub use parameters::LeguinParameters;
 pub use tables::{
@@ -587,19 +588,19 @@ impl Leguin {
     fn progress_table(&self) -> Widget {
         let state = &self.state;
         let distance = match self.goal() {
-            Some(goal) => format!("{:.1} m", state.at.distance_m(goal)),
-            None => "-".to_owned(),
+            Some(goal) => panel::number(state.at.distance_m(goal), 1, " m"),
+            None => SmolStr::new_static("-"),
         };
 
         panel::table([
-            ("waiter", self.parameters.waiter.clone()),
+            ("waiter", self.parameters.waiter.as_str().into()),
             ("way to go", distance),
-            ("hurried", panel::yes(state.hurried).to_owned()),
-            ("blocked for", panel::seconds(state.way.stalled_s())),
-            ("kept waiting for", panel::seconds(state.waiting_s)),
+            ("hurried", panel::yes(state.hurried).into()),
+            ("blocked for", panel::number(state.way.stalled_s(), 1, " s")),
+            ("kept waiting for", panel::number(state.waiting_s, 1, " s")),
             (
                 "trips, given up",
-                format!("{}, {}", state.trips, state.given_up),
+                format_smolstr!("{}, {}", state.trips, state.given_up),
             ),
         ])
     }
