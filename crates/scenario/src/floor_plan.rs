@@ -53,6 +53,9 @@ pub(crate) fn read(source: &Source, placement: Placement) -> Result<FloorPlan, F
         FileError::at(source, Some(range), &reason)
     };
     let page = Drawing::of(root, placement).map_err(refuse)?;
+    root.descendants()
+        .try_for_each(check_sheet)
+        .map_err(refuse)?;
 
     let mut plan = FloorPlan::default();
     let mut open = vec![(root, DrawnSolids::default())];
@@ -137,6 +140,29 @@ fn tags(text: &str) -> impl Iterator<Item = (usize, &str)> {
             return Some((at + name.len() - local.len(), local));
         }
     })
+}
+
+/// Properties that decide what a drawing means as a floor plan.
+const PROPERTIES: [&str; 4] = ["display", "fill", "transform", "visibility"];
+
+/// Refuses a style sheet that would change what a drawing means: it is not applied.
+fn check_sheet(node: Node<'_, '_>) -> Result<(), RefusedElement> {
+    if node.tag_name().name() != "style" {
+        return Ok(());
+    }
+
+    let texts: String = node.children().filter_map(|child| child.text()).collect();
+    let is_end = |c: char| !c.is_ascii_alphanumeric() && c != '-';
+    let mut words = texts.split(is_end);
+    match words.find(|word| PROPERTIES.contains(word)) {
+        None => Ok(()),
+        Some(word) => {
+            let reason = format!(
+                "a style sheet with {word} cannot be read: write {word} as an attribute of each element"
+            );
+            Err(RefusedElement::at(node, reason))
+        }
+    }
 }
 
 /// The drawing's coordinates.
@@ -230,7 +256,8 @@ impl DrawnSolids {
             node.tag_name().name(),
             "title" | "desc" | "metadata" | "defs" | "style" | "text"
         );
-        let is_hidden = property(node, "display") == Some("none");
+        let is_hidden = property(node, "display") == Some("none")
+            || matches!(property(node, "visibility"), Some("hidden" | "collapse"));
         if !is_svg || is_left_out || is_hidden {
             return Ok(None);
         }
@@ -245,6 +272,15 @@ impl DrawnSolids {
         };
         if let Some(fill) = property(node, "fill") {
             drawn.is_filled = fill != "none";
+        }
+        for name in ["transform", "transform-origin"] {
+            let of_attribute = node.attribute(name).filter(|_| name == "transform");
+            if property(node, name) != of_attribute.map(str::trim) {
+                let reason = format!(
+                    "{name} is read as the attribute transform only, with the corner of the drawing as its origin"
+                );
+                return Err(RefusedElement::at(node, reason));
+            }
         }
         if let Some(text) = node.attribute("transform") {
             drawn
@@ -293,6 +329,13 @@ impl FloorPlan {
     ) -> Result<(), RefusedElement> {
         let name = node.tag_name().name();
         let number = |name: &str| attribute(node, name);
+        let size = |name: &str| match attribute(node, name)? {
+            size if size >= 0.0 => Ok(size),
+            size => {
+                let reason = format!("{name} is {size}, less than zero");
+                Err(RefusedElement::at(node, reason))
+            }
+        };
         match name {
             "g" => {}
             "rect" => {
@@ -301,11 +344,16 @@ impl FloorPlan {
                     return Err(RefusedElement::at(node, reason.to_owned()));
                 }
                 let (left, top) = (number("x")?, number("y")?);
-                let (right, bottom) = (left + number("width")?, top + number("height")?);
+                let (right, bottom) = (left + size("width")?, top + size("height")?);
                 let corners = [(left, top), (right, top), (right, bottom), (left, bottom)];
                 let corners = corners.map(|(x, y)| page.place(drawn, x, y));
                 if drawn.is_filled {
-                    self.add_rectangle(corners[0], corners[2]);
+                    let (one, other) = (corners[0], corners[2]);
+                    let shape = Shape::Rectangle {
+                        width_m: (other.x - one.x).abs(),
+                        height_m: (other.y - one.y).abs(),
+                    };
+                    self.add_obstacle(node, (one + other) * 0.5, shape)?;
                 } else {
                     self.add_line(&corners, true);
                 }
@@ -317,8 +365,8 @@ impl FloorPlan {
                     return Err(RefusedElement::at(node, reason.to_owned()));
                 }
                 let at = page.place(drawn, number("cx")?, number("cy")?);
-                let radius_m = number("r")? * drawn.scale.0.abs() * page.unit_m;
-                self.obstacles.push((at, Shape::Disc { radius_m }));
+                let radius_m = size("r")? * drawn.scale.0.abs() * page.unit_m;
+                self.add_obstacle(node, at, Shape::Disc { radius_m })?;
             }
             "line" => {
                 let from = page.place(drawn, number("x1")?, number("y1")?);
@@ -355,13 +403,23 @@ impl FloorPlan {
         Ok(())
     }
 
-    fn add_rectangle(&mut self, one: Point, other: Point) {
-        let at = (one + other) * 0.5;
-        let shape = Shape::Rectangle {
-            width_m: (other.x - one.x).abs(),
-            height_m: (other.y - one.y).abs(),
-        };
-        self.obstacles.push((at, shape));
+    /// Adds a body, which is refused here if it is too small: nothing later knows the line of the drawing.
+    fn add_obstacle(
+        &mut self,
+        node: Node<'_, '_>,
+        at: Point,
+        shape: Shape,
+    ) -> Result<(), RefusedElement> {
+        let (half_x_m, half_y_m) = shape.half_m();
+        let least_m = 2.0 * half_x_m.min(half_y_m);
+        if least_m >= BODY_MIN_M {
+            self.obstacles.push((at, shape));
+            return Ok(());
+        }
+        let reason = format!(
+            "a body of {least_m} m, less than {BODY_MIN_M} m: draw a line, or leave it out"
+        );
+        Err(RefusedElement::at(node, reason))
     }
 
     /// Adds walls from point to point. Points closer to the one before than 1 mm are none.
@@ -372,7 +430,9 @@ impl FloorPlan {
             return;
         };
         for &to in points {
-            if from.distance_m(to) >= BODY_MIN_M {
+            // One that is no number is kept, and refused as off the field.
+            let is_same = from.distance_m(to) < BODY_MIN_M;
+            if !is_same {
                 self.walls.push(Wall { from, to });
                 from = to;
             }
@@ -577,6 +637,22 @@ mod tests {
     }
 
     #[test]
+    fn what_is_not_drawn_is_left_out() {
+        let drawing = "<style>text { font-size: 2px }</style>\
+                       <rect width='1' height='1' visibility='hidden'/>\
+                       <g style='display:none'><rect width='1' height='1'/></g>\
+                       <g style='visibility: hidden'><line x2='1'/></g>\
+                       <defs><circle r='1'/></defs><text>fill</text>";
+        assert_eq!(plan(drawing).unwrap(), FloorPlan::default());
+    }
+
+    #[test]
+    fn a_point_that_is_no_number_is_not_lost() {
+        let plan = plan("<g transform='scale(1e300)'><line x1='1e300' x2='-1e300'/></g>").unwrap();
+        assert_eq!(plan.walls.len(), 1);
+    }
+
+    #[test]
     fn a_unit_is_what_the_file_says_then_what_the_drawing_says_then_a_meter() {
         let line = "<line x1='100' y1='50' x2='0' y2='50'/></svg>";
         for (size, scale_m, length_m) in [
@@ -615,6 +691,37 @@ mod tests {
             ("<rect width='5%' height='1'/>", "width is \"5%\""),
             ("<circle r='1' fill='none'/>", "only filled, round circles"),
             ("<polygon points='1 2 3'/>", "points are not pairs"),
+            (
+                "<rect width='-1' height='1'/>",
+                "width is -1, less than zero",
+            ),
+            (
+                "<rect width='1' height='-1' fill='none'/>",
+                "height is -1, less than zero",
+            ),
+            ("<circle cx='1' cy='1' r='-1'/>", "r is -1, less than zero"),
+            ("<rect width='0' height='1'/>", "a body of 0 m"),
+            ("<rect height='1'/>", "a body of 0 m"),
+            (
+                "<g transform='scale(1e-4)'><circle r='1'/></g>",
+                "a body of 0.0002 m",
+            ),
+            (
+                "<defs><style>.room { fill: none }</style></defs><rect class='room' width='1' height='1'/>",
+                "a style sheet with fill cannot be read",
+            ),
+            (
+                "<style><![CDATA[rect{display:none}]]></style>",
+                "a style sheet with display",
+            ),
+            (
+                "<g style='transform: scale(2)'/>",
+                "transform is read as the attribute transform only",
+            ),
+            (
+                "<g transform-origin='5 5' transform='scale(2)'/>",
+                "transform-origin is read",
+            ),
             ("<g>", "not an SVG drawing"),
             ("<!DOCTYPE a [<!ENTITY b 'c'>]>", "not an SVG drawing"),
         ] {
