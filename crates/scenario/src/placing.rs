@@ -169,18 +169,26 @@ fn free_places(
     let mut places = Vec::new();
     for (name, region) in drawn {
         let refuse = |reason: String| (name.clone(), reason);
-        // What is placed in a copy leaves no trace.
-        let mut placer = placer.clone().map_err(|error| refuse(error.to_string()))?;
+        let placer = placer.as_ref();
+        let placer = placer.map_err(|error| refuse(error.to_string()))?;
         let mut stream = protocol::random::stream(scenario.seed, &format!("at/{name}"));
-        let at = placer.place(None, region, &mut stream).ok_or_else(|| {
-            refuse(format!(
-                "there is no free place for {what} {name} in {} draws: the field is too full",
-                Placer::TRIES
-            ))
-        })?;
+        let at = placer.find(None, region, &mut stream);
+        let at = at.ok_or_else(|| refuse(no_free_place(&format!("{what} {name}"), region)))?;
         places.push((name, to_wire(at)));
     }
     Ok(places)
+}
+
+/// Why something has no place in a region, in words.
+fn no_free_place(whose: &str, region: Region) -> String {
+    let why = match region {
+        Region::Field => "the field is too full",
+        Region::Rectangle(..) | Region::Disc { .. } => {
+            "the region of its place is too small, too full, or off the field"
+        }
+    };
+    let tries = Placer::TRIES;
+    format!("there is no free place for {whose} in {tries} draws: {why}")
 }
 
 impl PlacingError {
@@ -291,7 +299,8 @@ impl std::fmt::Display for PlacingError {
                 Some(robot),
                 _,
             ) => {
-                write!(f, "robot {robot} at {at} m overlaps obstacle {obstacle}")
+                let number = obstacle + 1;
+                write!(f, "robot {robot} at {at} m overlaps obstacle {number}")
             }
             (PlacingReason::Hall(HallError::RobotOffField { at, .. }), Some(robot), _) => {
                 write!(
@@ -300,7 +309,7 @@ impl std::fmt::Display for PlacingError {
                 )
             }
             (PlacingReason::Hall(HallError::RobotOnWall { at, wall, .. }), Some(robot), _) => {
-                write!(f, "robot {robot} at {at} m stands on wall {wall}")
+                write!(f, "robot {robot} at {at} m stands on wall {}", wall + 1)
             }
             (PlacingReason::Hall(HallError::RobotSize { value_m, .. }), Some(robot), _) => {
                 write!(
@@ -311,17 +320,9 @@ impl std::fmt::Display for PlacingError {
             (PlacingReason::NoFreePlace(region), ..) => {
                 let whose = match (&self.robot, self.obstacle) {
                     (Some(robot), _) => format!("robot {robot}"),
-                    (None, obstacle) => format!("obstacle {}", obstacle.unwrap_or(0)),
+                    (None, index) => format!("obstacle {}", index.unwrap_or(0) + 1),
                 };
-                let tries = Placer::TRIES;
-                let why = match region {
-                    Region::Field => "the field is too full",
-                    _ => "the region of its place is too small, too full, or off the field",
-                };
-                write!(
-                    f,
-                    "there is no free place for {whose} in {tries} draws: {why}"
-                )
+                f.write_str(&no_free_place(&whose, *region))
             }
             (PlacingReason::Hall(error), ..) => error.fmt(f),
         }

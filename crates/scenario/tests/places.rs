@@ -277,22 +277,22 @@ fn what_cannot_be_placed_is_refused_with_line_and_reason() {
         (
             format!("{robot}[[obstacle]]\ncount = 2\nat = {CLUSTER}\nsize = \"9 m\"\n"),
             "at = {",
-            "no free place for obstacle 0",
+            "no free place for obstacle 1",
         ),
         (
             format!("{robot}[[obstacle]]\nat = [\"1 m\", \"1 m\"]\nradius = \"3 m\"\n"),
             "at = [\"1 m\", \"1 m\"]",
-            "obstacle 0 at (1, 1) m is not entirely inside the field",
+            "obstacle 1 at (1, 1) m is not entirely inside the field",
         ),
         (
             format!("{robot}[[wall]]\npoints = [[\"5 m\", \"1 m\"], [\"5 m\", \"9 m\"]]\n"),
             "[[robot]]",
-            "robot A at (5, 5) m stands on wall 0",
+            "robot A at (5, 5) m stands on wall 1",
         ),
         (
             format!("{robot}[[wall]]\npoints = [[\"1 m\", \"1 m\"], [\"5 m\", \"99 m\"]]\n"),
             "points = ",
-            "wall 0 has an end at (5, 99) m, which is not on the field",
+            "wall 1 has an end at (5, 99) m, which is not on the field",
         ),
         (
             format!("{robot}[[wall]]\npoints = [[\"1 m\", \"1 m\"]]\n"),
@@ -401,5 +401,127 @@ fn drives_are_read_and_written() {
         let error = shown(&file(drive));
         assert!(error.contains(reason), "no {reason:?} in\n{error}");
         assert!(error.contains("drive = {"), "no place in\n{error}");
+    }
+}
+
+#[test]
+fn more_bodies_than_there_is_room_for_are_refused_before_anything_starts() {
+    let hall = |more: &str| {
+        format!(
+            "[field]\nsize = [\"100 m\", \"100 m\"]\nbody = \"1 m\"\n{more}[[robot]]\nname = \"A\"\nat = [\"0.5 m\", \"0.5 m\"]\n"
+        )
+    };
+    // The field has room for 10,000 squares.
+    assert!(parse(&hall("[guests]\ncount = 9999\n")).is_ok());
+    let error = shown(&hall("[guests]\ncount = 10000\n"));
+    assert!(
+        error.contains("10000 guests do not fit: obstacles and robots leave room for 9999"),
+        "{error}"
+    );
+
+    // Obstacles may overlap one another where their places are given, and not where they are drawn.
+    let full = |count: usize, size: &str| {
+        let random = format!("[[obstacle]]\ncount = {count}\nat = \"random\"\nsize = \"{size}\"\n");
+        hall(&random)
+    };
+    let error = shown(&full(4096, "2 m"));
+    assert!(error.contains("the field is too full"), "{error}");
+    assert!(parse(&full(4096, "0.5 m")).is_ok());
+    let error = shown(&full(2, "99.5 m"));
+    assert!(error.contains("no free place for obstacle"), "{error}");
+    let error = shown(&full(1, "200 m"));
+    assert!(error.contains("obstacle 1"), "{error}");
+
+    // Bodies much larger than a square of the field, which is what their neighbors are looked for by.
+    let large = "[field]\nsize = [\"10 m\", \"10 m\"]\nbody = \"0.1 cm\"\n[[robot]]\nname = \"S\"\ncount = 64\nat = \"random\"\nradius = \"1 m\"\n";
+    let error = shown(large);
+    assert!(error.contains("no free place for robot S"), "{error}");
+
+    // As many sites as there may be, on a field of a million squares.
+    let sites = "[field]\nsize = [\"1000 m\", \"1000 m\"]\nbody = \"1 m\"\n[[site]]\nname = \"T\"\ncount = 1024\nat = \"random\"\n";
+    assert_eq!(parse(sites).unwrap().sites.len(), 1024);
+    let region = "{ random = { from = [\"-5 m\", \"0 m\"], to = [\"-4 m\", \"9 m\"] } }";
+    let error = shown(&sites.replace("\"random\"", region));
+    assert!(
+        error.contains("no free place for site T1 in 1000 draws: the region of its place"),
+        "{error}"
+    );
+}
+
+#[test]
+fn regions_without_an_area_and_jitter_over_the_edge_have_places() {
+    // A point and a line.
+    let spot = REGION.replace("9 m", "4 m").replace("8 m", "4 m");
+    assert_eq!(
+        places(&parse(&bulk(&spot, 1)).unwrap()),
+        points(&[(4.0, 4.0)])
+    );
+    let error = shown(&bulk(&spot, 2));
+    assert!(error.contains("no free place for robot S2"), "{error}");
+    let line = REGION.replace("8 m", "4 m");
+    let on_line = places(&parse(&bulk(&line, 4)).unwrap());
+    assert!(
+        on_line
+            .iter()
+            .all(|at| at.y == 4.0 && (4.0..=9.0).contains(&at.x))
+    );
+    let dot = CLUSTER.replace("3 m", "0 m");
+    assert_eq!(
+        places(&parse(&bulk(&dot, 1)).unwrap()),
+        points(&[(5.0, 5.0)])
+    );
+    // Corners in any order.
+    let corners = REGION
+        .replace("from", "x")
+        .replace("to", "from")
+        .replace("x", "to");
+    assert_eq!(
+        places(&parse(&bulk(&corners, 3)).unwrap()).len(),
+        places(&parse(&bulk(REGION, 3)).unwrap()).len()
+    );
+
+    // Most of where the jitter would lead is off the field.
+    let corner = "{ place = [\"0.2 m\", \"0.2 m\"], jitter = \"1 m\" }";
+    for seed in 1..50 {
+        let scenario = parse(&format!("seed = {seed}\n{}", bulk(corner, 1))).unwrap();
+        let at = places(&scenario)[0];
+        assert!(
+            (0.3048..=1.2).contains(&at.x) && (0.3048..=1.2).contains(&at.y),
+            "{at:?}"
+        );
+    }
+    let off = corner.replace("1 m", "0.05 m");
+    let error = shown(&bulk(&off, 1));
+    assert!(
+        error.contains("too small, too full, or off the field"),
+        "{error}"
+    );
+}
+
+#[test]
+fn what_else_is_in_a_scenario_changes_no_draw() {
+    let text = |more: &str| {
+        format!(
+            "{}[[site]]\nname = \"T\"\ncount = 4\nat = \"random\"\n[[obstacle]]\nat = \"random\"\nradius = \"0.2 m\"\n\
+             [[layer]]\nname = \"dust\"\ncell = \"1 m\"\npeaks = [{{ at = \"random\", radius = \"1 m\", height = 1 }}]\n{more}",
+            bulk("\"random\"", 5)
+        )
+    };
+    let plain = parse(&text("")).unwrap();
+    for more in [
+        "[[site]]\nname = \"U\"\nat = \"random\"\n",
+        "[[layer]]\nname = \"mist\"\ncell = \"1 m\"\npeaks = [{ at = \"random\", radius = \"1 m\", height = 1 }]\n",
+        "[guests]\ncount = 40\n",
+        "[network]\ncommands = { loss = 0.5 }\n",
+        "[[robot]]\nname = \"Z12\"\nat = \"random\"\n",
+        "[sensing]\nmisses = 0.5\nrange = \"2 m\"\n",
+    ] {
+        let scenario = parse(&text(more)).unwrap();
+        assert_eq!(places(&scenario)[..5], places(&plain)[..], "{more}");
+        assert_eq!(scenario.obstacles, plain.obstacles, "{more}");
+        assert_eq!(scenario.layers["dust"], plain.layers["dust"], "{more}");
+        for (name, site) in &plain.sites {
+            assert_eq!(scenario.sites[name].at, site.at, "{more}");
+        }
     }
 }

@@ -438,7 +438,7 @@ fn errors_show_line_place_and_reason() {
         (
             "[[obstacle]]\nat = [\"9 m\", \"1 m\"]\n[[obstacle]]\nat = [\"99 m\", \"1 m\"]\n",
             "4 │ at",
-            "obstacle 1",
+            "obstacle 2",
         ),
         (
             "[[robot]]\nname = \"A\"\nat = [\"1 m\", \"1 m\"]\n[[robot]]\nname = \"B\"\nat = [\"99 m\", \"1 m\"]\n",

@@ -32,7 +32,7 @@ impl std::error::Error for TriangularError {}
 
 /// Why a [`World`](crate::World) cannot be built from a [`Hall`](crate::Hall).
 ///
-/// Indices count from 0 in the hall's lists. Positions are centers in meters, as given in the hall.
+/// Indices count from 0 in the hall's lists, and numbers in messages from 1. Positions are centers in meters, as given in the hall.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum HallError {
@@ -191,22 +191,26 @@ impl fmt::Display for HallError {
             Self::WallOffField { index, at } => {
                 write!(
                     f,
-                    "wall {index} has an end at {at} m, which is not on the field"
+                    "wall {} has an end at {at} m, which is not on the field",
+                    index + 1
                 )
             }
             Self::WallTooShort { index, at } => {
-                write!(f, "wall {index} at {at} m is shorter than {BODY_MIN_M} m")
+                let number = index + 1;
+                write!(f, "wall {number} at {at} m is shorter than {BODY_MIN_M} m")
             }
             Self::ObstacleSize { index, value_m } => size(f, "obstacle", index, value_m),
             Self::RobotSize { index, value_m } => size(f, "robot", index, value_m),
             Self::RobotWheels { index } => {
                 write!(
                     f,
-                    "the limits of the wheels of robot {index} must be more than zero, and its heading finite"
+                    "the limits of the wheels of robot {} must be more than zero, and its heading finite",
+                    index + 1
                 )
             }
             Self::RobotOnWall { index, at, wall } => {
-                write!(f, "robot {index} at {at} m stands on wall {wall}")
+                let (robot, wall) = (index + 1, wall + 1);
+                write!(f, "robot {robot} at {at} m stands on wall {wall}")
             }
             Self::ObstacleOffField { index, at } => off_field(f, "obstacle", index, at),
             Self::RobotOffField { index, at } => off_field(f, "robot", index, at),
@@ -215,10 +219,12 @@ impl fmt::Display for HallError {
                 at,
                 obstacle,
             } => {
-                write!(f, "robot {index} at {at} m overlaps obstacle {obstacle}")
+                let (robot, obstacle) = (index + 1, obstacle + 1);
+                write!(f, "robot {robot} at {at} m overlaps obstacle {obstacle}")
             }
             Self::RobotOnRobot { index, at, other } => {
-                write!(f, "robot {index} at {at} m overlaps robot {other}")
+                let (robot, other) = (index + 1, other + 1);
+                write!(f, "robot {robot} at {at} m overlaps robot {other}")
             }
             Self::NoRoom { count, room } => {
                 write!(
@@ -233,14 +239,16 @@ impl fmt::Display for HallError {
 fn size(f: &mut fmt::Formatter<'_>, kind: &str, index: usize, value_m: f64) -> fmt::Result {
     write!(
         f,
-        "{kind} {index} is {value_m:?} m wide or high; must be a number from {BODY_MIN_M:?} to {SIDE_MAX_M:?}"
+        "{kind} {} is {value_m:?} m wide or high; must be a number from {BODY_MIN_M:?} to {SIDE_MAX_M:?}",
+        index + 1
     )
 }
 
 fn off_field(f: &mut fmt::Formatter<'_>, kind: &str, index: usize, at: Point) -> fmt::Result {
     write!(
         f,
-        "{kind} {index} at {at} m is not entirely inside the field"
+        "{kind} {} at {at} m is not entirely inside the field",
+        index + 1
     )
 }
 

@@ -62,9 +62,19 @@ impl Placer {
         region: Region,
         rng: &mut impl Rng,
     ) -> Option<Point> {
-        let at = random_free_place(&self.bodies, footprint, region, rng)?;
+        let at = self.find(footprint, region, rng)?;
         self.bodies.push_shaped(at, footprint);
         Some(at)
+    }
+
+    /// Finds a place as [`Self::place`] does, for something that is not solid: it hinders no other one.
+    pub fn find(
+        &self,
+        footprint: Option<Footprint>,
+        region: Region,
+        rng: &mut impl Rng,
+    ) -> Option<Point> {
+        random_free_place(&self.bodies, footprint, region, rng)
     }
 }
 

@@ -186,22 +186,22 @@ fn misplaced_bodies_are_reported() {
     for (actual, expected) in [
         (
             wrong(|hall| hall.obstacles = vec![at(5.0, 5.0), at(0.2, 5.0)]),
-            "obstacle 1 at (0.2, 5) m is not entirely inside the field",
+            "obstacle 2 at (0.2, 5) m is not entirely inside the field",
         ),
         (
             wrong(|hall| hall.robots = vec![at(5.0, f64::NAN)]),
-            "robot 0 at (5, NaN) m is not entirely inside the field",
+            "robot 1 at (5, NaN) m is not entirely inside the field",
         ),
         (
             wrong(|hall| hall.robots = vec![at(5.0, 5.0), at(7.0, 5.0), at(5.5, 5.0)]),
-            "robot 2 at (5.5, 5) m overlaps robot 0",
+            "robot 3 at (5.5, 5) m overlaps robot 1",
         ),
         (
             wrong(|hall| {
                 hall.obstacles = vec![at(1.0, 1.0), at(5.0, 5.0)];
                 hall.robots = vec![at(5.0, 5.5)];
             }),
-            "robot 0 at (5, 5.5) m overlaps obstacle 1",
+            "robot 1 at (5, 5.5) m overlaps obstacle 2",
         ),
     ] {
         assert_eq!(actual, expected);

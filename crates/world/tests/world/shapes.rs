@@ -417,24 +417,24 @@ fn what_cannot_be_is_refused_with_its_index() {
 
     assert_eq!(
         refused(&|hall| hall.shapes.walls = vec![wall((1.0, 1.0), (1.0, 99.0))]),
-        "wall 0 has an end at (1, 99) m, which is not on the field"
+        "wall 1 has an end at (1, 99) m, which is not on the field"
     );
     assert_eq!(
         refused(&|hall| hall.shapes.walls = vec![wall((1.0, 1.0), (1.0, 1.0))]),
-        "wall 0 at (1, 1) m is shorter than 0.001 m"
+        "wall 1 at (1, 1) m is shorter than 0.001 m"
     );
     assert_eq!(
         refused(&|hall| hall.shapes.walls = vec![wall((5.0, 4.8), (9.0, 9.0))]),
-        "robot 0 at (5, 5) m stands on wall 0"
+        "robot 1 at (5, 5) m stands on wall 1"
     );
     let disc = |radius_m| Shape::Disc { radius_m };
     assert_eq!(
         refused(&|hall| hall.shapes.robots = BTreeMap::from([(0, disc(0.0))])),
-        "robot 0 is 0.0 m wide or high; must be a number from 0.001 to 1000000.0"
+        "robot 1 is 0.0 m wide or high; must be a number from 0.001 to 1000000.0"
     );
     assert_eq!(
         refused(&|hall| hall.shapes.robots = BTreeMap::from([(0, disc(6.0))])),
-        "robot 0 at (5, 5) m is not entirely inside the field"
+        "robot 1 at (5, 5) m is not entirely inside the field"
     );
     let many = vec![wall((1.0, 1.0), (1.0, 2.0)); WALLS_MAX + 1];
     assert_eq!(
