@@ -1,5 +1,6 @@
 //! What a robot senses of what is within range: where it looks, what walls hide, what it misses, and where it errs.
 
+use std::f64::consts::TAU;
 use std::fmt::Arguments;
 
 use protocol::RobotName;
@@ -88,6 +89,10 @@ impl<'a> Viewpoint<'a> {
         let Some(field_rad) = self.sensing.field_of_view_rad else {
             return true;
         };
+        // Rounding would hide some of what is exactly behind it.
+        if field_rad >= TAU {
+            return true;
+        }
         let offset = at - self.at;
         let distance_m = offset.length_squared_m2().sqrt();
         let ahead = direction(self.heading_rad);
@@ -113,7 +118,11 @@ pub(crate) fn ranges_m<R>(
     }
     let mut ranges = world.ranges_m(robot, &directions, rays.range_m);
     for range_m in &mut ranges {
-        *range_m = (*range_m * RANGE_STEPS_PER_M + 0.5).floor() / RANGE_STEPS_PER_M;
+        // A ray that meets nothing is as long as the scenario says, so that robots can tell.
+        if *range_m < rays.range_m {
+            let rounded_m = (*range_m * RANGE_STEPS_PER_M + 0.5).floor() / RANGE_STEPS_PER_M;
+            *range_m = rounded_m.min(rays.range_m);
+        }
     }
     ranges
 }

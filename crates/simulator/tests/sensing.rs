@@ -41,9 +41,13 @@ range = "3 m"
 "#;
 
 fn scenario(sensing: &str) -> Result<Scenario, FileError> {
+    parse(&format!("{FILE}{sensing}\n"))
+}
+
+fn parse(file: &str) -> Result<Scenario, FileError> {
     let source = Source {
         name: "test".into(),
-        text: format!("{FILE}{sensing}\n"),
+        text: file.to_owned(),
     };
     Scenario::parse(&source, Path::new("."))
 }
@@ -82,7 +86,12 @@ impl Exchange<TickUpdate, Arc<Report>, CommandText> for Watchers {
 
 /// The news of A in ticks 0 to `ticks`, while it looks in a direction.
 fn news(sensing: &str, heading_rad: f64, ticks: usize) -> Vec<TickUpdate> {
-    let mut simulation = Simulation::new(scenario(sensing).unwrap(), 1).unwrap();
+    news_of(&format!("{FILE}{sensing}\n"), heading_rad, ticks)
+}
+
+/// The same of another file.
+fn news_of(file: &str, heading_rad: f64, ticks: usize) -> Vec<TickUpdate> {
+    let mut simulation = Simulation::new(parse(file).unwrap(), 1).unwrap();
     let names = simulation.names().to_vec();
     let a = names[0].clone();
     simulation.list_bodies(&a, true);
@@ -230,5 +239,44 @@ fn rules_of_sensing_are_kept_and_checked() {
         let error = scenario(wrong).unwrap_err();
         let shown = config::render_plain(&error, None, 200);
         assert!(shown.contains(reason), "{shown}");
+    }
+}
+
+#[test]
+fn a_field_of_view_all_around_has_what_is_exactly_behind() {
+    // B is 2 m to the right of A, which looks to the left of it by angles whose sine and cosine are rounded.
+    for step in 0..2000 {
+        let angle_rad = 0.001 * f64::from(step);
+        let behind = Point::new(
+            5.0 - 2.0 * libm::cos(angle_rad),
+            5.0 - 2.0 * libm::sin(angle_rad),
+        );
+        let text = format!(
+            "duration = \"10 s\"\n[field]\nsize = [\"10 m\", \"10 m\"]\nbody = \"0.5 m\"\n\
+             [[robot]]\nname = \"A\"\nat = [\"5 m\", \"5 m\"]\ndrive = {{ heading = \"{angle_rad} rad\" }}\n\
+             [[robot]]\nname = \"B\"\nat = [\"{} m\", \"{} m\"]\n\
+             [sensing]\nrange = \"3 m\"\nfield_of_view = \"360 deg\"\n",
+            behind.x, behind.y
+        );
+        let news = news_of(&text, 0.0, 0);
+        assert_eq!(news[0].sensed.len(), 1, "{angle_rad} rad");
+    }
+}
+
+#[test]
+fn a_ray_that_meets_nothing_is_as_long_as_the_rays() {
+    // Not a whole number of steps of 0.1 mm, above and below the next one.
+    for range in ["1.00004 m", "1.00006 m", "0.33333333 m", "3.3 ft", "1 m"] {
+        let news = news(
+            &format!("rays = {{ count = 4, range = \"{range}\" }}"),
+            0.0,
+            1,
+        );
+        let range_m = scenario(&format!("rays = {{ range = \"{range}\" }}")).unwrap();
+        let range_m = range_m.sensing.rays.unwrap().range_m;
+        // The first ray ends at the obstacle, 0.75 m ahead; the third and the fourth meet nothing.
+        let ranges = &news[1].ranges;
+        assert_eq!(ranges[0], range_m.min(0.75), "{range}");
+        assert_eq!(ranges[2..], [range_m; 2], "{range}");
     }
 }
