@@ -8,8 +8,8 @@ use crate::shapes::any_hall;
 use proptest::prelude::*;
 use rand::RngExt;
 use world::{
-    Blocker, Body, Hall, HallError, MoveOutcome, Point, Pose, Shape, Shapes, Velocity, Wall,
-    Wheels, World,
+    Blocker, Body, Hall, HallError, MoveOutcome, Placer, Point, Pose, Region, Shape, Shapes,
+    Velocity, Wall, Wheels, World,
 };
 
 /// Overlaps up to this are rounding, m.
@@ -217,6 +217,104 @@ proptest! {
             }
         }
         prop_assert!(world == twin);
+    }
+}
+
+/// Whether a point is in a polygon: how often its border goes around it is odd.
+fn is_within(polygon: &[Point], point: Point) -> bool {
+    let mut is_in = false;
+    for (index, a) in polygon.iter().enumerate() {
+        let b = polygon[(index + 1) % polygon.len()];
+        let is_between = (a.y > point.y) != (b.y > point.y);
+        if is_between && point.x < a.x + (b.x - a.x) * (point.y - a.y) / (b.y - a.y) {
+            is_in = !is_in;
+        }
+    }
+    is_in
+}
+
+/// Places at which a body of this half extent touches a wall, or overlaps it by about as much as is allowed.
+fn touching(wall: &Wall, half_m: f64, share: f64, off_m: f64) -> Point {
+    let along = wall.to - wall.from;
+    let length_m = along.length_squared_m2().sqrt();
+    let normal = Point::new(-along.y, along.x) * (1.0 / length_m);
+    wall.from + along * share + normal * (half_m + off_m)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(300))]
+
+    #[test]
+    fn nobody_leaves_a_closed_room_with_acute_corners(
+        radii_m in prop::collection::vec(1.0..45.0, 3..12),
+        shapes in prop::collection::vec((any::<bool>(), 0.001..2.0, 0.001..2.0, any::<bool>()), 1..5),
+        is_turned in any::<bool>(),
+        seed in any::<u64>(),
+    ) {
+        let middle = Point::new(50.0, 50.0);
+        let corners: Vec<Point> = radii_m
+            .iter()
+            .enumerate()
+            .map(|(index, radius_m)| {
+                let angle_rad = TAU * index as f64 / radii_m.len() as f64 + 0.1;
+                middle + Point::new(libm::cos(angle_rad), libm::sin(angle_rad)) * *radius_m
+            })
+            .collect();
+        let mut hall = reception(0);
+        hall.field.size_m = (100.0, 100.0);
+        hall.field.body_m = 0.5;
+        hall.tick_s = 0.5;
+        hall.max_speed_mps = 1e6;
+        hall.robots.clear();
+        hall.obstacles.clear();
+        for (index, &from) in corners.iter().enumerate() {
+            let to = corners[(index + 1) % corners.len()];
+            hall.shapes.walls.push(if is_turned { Wall { from: to, to: from } } else { Wall { from, to } });
+        }
+        let mut placer = Placer::new(&hall).unwrap();
+        let region = Region::Disc { center: middle, radius_m: 6.0 };
+        for (index, (is_disc, x_m, y_m, drives)) in shapes.into_iter().enumerate() {
+            let shape = if is_disc {
+                Shape::Disc { radius_m: x_m / 2.0 }
+            } else {
+                Shape::Rectangle { width_m: x_m, height_m: y_m }
+            };
+            let at = placer.place(Some(shape.into()), region, &mut rng(seed ^ index as u64));
+            let Some(at) = at.filter(|at| is_within(&corners, *at)) else { continue };
+            let robot = hall.robots.len();
+            hall.shapes.robots.insert(robot, shape);
+            if drives {
+                hall.shapes.wheels.insert(robot, FREE);
+            }
+            hall.robots.push(at);
+        }
+        // One that was placed outside the room is solid in the placer only.
+        let Ok(mut world) = World::new(&hall, rng(seed)) else { return Ok(()) };
+
+        let mut random = rng(seed ^ 1);
+        for _ in 0..60 {
+            let mut proposals = Vec::new();
+            for (robot, &at) in world.robots().to_vec().iter().enumerate() {
+                let far_m: f64 = [0.1, 2.0, 50.0, 1e5][random.random_range(0..4)];
+                let mut signed = |limit: f64| (random.random::<f64>() - 0.5) * 2.0 * limit;
+                let step = Point::new(signed(1.0), signed(1.0)) * far_m.min(60.0);
+                world.drive(robot, Velocity { linear_mps: signed(far_m), angular_radps: signed(6.0) });
+
+                let (half_m, _) = world.shape(Body::Robot(robot)).half_m();
+                let wall = world.walls()[random.random_range(0..corners.len())];
+                let off_m = [0.0, 1e-9, -1e-9, -1.5e-9, -1e-6][random.random_range(0..5)];
+                let side = [1.0, -1.0][random.random_range(0..2)];
+                let beside = touching(&wall, side * half_m, random.random(), side * off_m);
+                proposals.push(Some(if random.random() { at + step } else { beside }));
+            }
+            world.advance(&proposals);
+
+            for (robot, &at) in world.robots().iter().enumerate() {
+                prop_assert!(is_within(&corners, at), "robot {} at {}", robot, at);
+            }
+            // The turns of robots that are this fast are not told by their headings.
+            check_promises(&world, &[]);
+        }
     }
 }
 
