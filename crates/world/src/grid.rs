@@ -20,6 +20,9 @@ const CELLS: u64 = 1 << 20;
 /// share a cell.
 const CELLS_PER_BODY: u64 = 16;
 
+/// Cells around a body of the size of a cell.
+const CELLS_AROUND: usize = 9;
+
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Grid {
     columns: usize,
@@ -83,7 +86,8 @@ impl Grid {
 
     /// Calls `visit` for every body whose center is within `reach_m` of `center` along both axes.
     ///
-    /// It is also called for some bodies outside that window. The order is unspecified.
+    /// It is also called for some bodies outside that window. The order is unspecified. It takes no more steps than there are cells in
+    /// the window, or bodies on the field, whichever are fewer.
     pub(crate) fn visit_around(&self, center: Point, reach_m: f64, mut visit: impl FnMut(usize)) {
         // The cells of bodies and of the window's edges come from the same monotone function, rounding
         // included. A body inside the window is therefore never in a cell outside it.
@@ -91,6 +95,12 @@ impl Grid {
         let right = self.column(center.x + reach_m);
         let bottom = self.row(center.y - reach_m);
         let top = self.row(center.y + reach_m);
+
+        // Bodies much larger than a cell, or a large range.
+        if (right - left + 1) * (top - bottom + 1) > self.next.len().max(CELLS_AROUND) {
+            (0..self.next.len()).for_each(visit);
+            return;
+        }
 
         for row in bottom..=top {
             let start = row * self.columns;
@@ -190,6 +200,22 @@ mod tests {
 
         grid.pop();
         assert_eq!(found(&grid, Point::new(9.0, 9.0), 0.6), [1]);
+    }
+
+    #[test]
+    fn a_window_of_many_cells_takes_no_more_steps_than_there_are_bodies() {
+        let mut grid = Grid::new((10.0, 10.0), 0.01, 20);
+        for index in 0..20 {
+            grid.push(Point::new(0.5 * f64::from(index), 5.0));
+        }
+
+        // A million windows of a million cells each would take minutes.
+        for _ in 0..1_000_000 {
+            let mut count = 0;
+            grid.visit_around(Point::new(5.0, 5.0), 5.0, |_| count += 1);
+            assert_eq!(count, 20);
+        }
+        assert_eq!(found(&grid, Point::new(2.0, 5.0), 0.001), [4]);
     }
 
     #[test]
