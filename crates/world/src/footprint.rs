@@ -5,7 +5,7 @@
 //! [`TOLERANCE_M`].
 
 use crate::limits::TOLERANCE_M;
-use crate::point::Point;
+use crate::point::{Point, cross, dot};
 use crate::shape::{Shape, Wall};
 use crate::wheels::Wheels;
 
@@ -259,14 +259,6 @@ impl Wall {
 
 fn squared(length_m: f64) -> f64 {
     length_m.max(0.0) * length_m.max(0.0)
-}
-
-fn dot(a: Point, b: Point) -> f64 {
-    a.x * b.x + a.y * b.y
-}
-
-fn cross(a: Point, b: Point) -> f64 {
-    a.x * b.y - a.y * b.x
 }
 
 /// The direction at a right angle to a displacement, of length 1; `None` for a displacement that is none.

@@ -40,6 +40,16 @@ impl Point {
     }
 }
 
+/// The product of two lengths and the cosine of the angle between them, m².
+pub(crate) fn dot(a: Point, b: Point) -> f64 {
+    a.x * b.x + a.y * b.y
+}
+
+/// The area between two displacements, m²; more than 0 where the second is to the left of the first.
+pub(crate) fn cross(a: Point, b: Point) -> f64 {
+    a.x * b.y - a.y * b.x
+}
+
 impl Add for Point {
     type Output = Self;
 

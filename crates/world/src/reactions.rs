@@ -5,7 +5,7 @@
 
 use crate::bodies::{Bodies, Body};
 use crate::limits::TOLERANCE_M;
-use crate::point::Point;
+use crate::point::{Point, dot};
 
 /// What guests near a robot do in one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -95,8 +95,4 @@ impl Response {
 fn unit(displacement: Point) -> Option<Point> {
     let length_m = displacement.length_squared_m2().sqrt();
     (length_m > TOLERANCE_M).then(|| displacement * (1.0 / length_m))
-}
-
-fn dot(a: Point, b: Point) -> f64 {
-    a.x * b.x + a.y * b.y
 }

@@ -3,7 +3,7 @@
 use crate::bodies::Body;
 use crate::footprint::Footprint;
 use crate::motion::World;
-use crate::point::Point;
+use crate::point::{Point, cross, dot};
 use crate::shape::{Shape, Wall};
 
 /// Something that is not looked through.
@@ -58,7 +58,7 @@ fn crossed_disc(from: Point, to: Point, center: Point, radius_m: f64) -> Option<
     if step_m2 == 0.0 {
         return (outside_m2 < 0.0).then_some((f64::NEG_INFINITY, f64::INFINITY));
     }
-    let half_b = offset.x * step.x + offset.y * step.y;
+    let half_b = dot(offset, step);
     let discriminant = half_b * half_b - step_m2 * outside_m2;
     if discriminant <= 0.0 {
         return None;
@@ -69,17 +69,22 @@ fn crossed_disc(from: Point, to: Point, center: Point, radius_m: f64) -> Option<
 
 /// The share of a way at which it crosses a wall, both ends of the wall included.
 fn crossed_wall(from: Point, to: Point, wall: &Wall) -> Option<f64> {
-    let cross = |one: Point, other: Point| one.x * other.y - one.y * other.x;
-    let (step, along, offset) = (to - from, wall.to - wall.from, wall.from - from);
-    let area = cross(step, along);
-    if area == 0.0 {
+    let step = to - from;
+    let one = wall.from - from;
+    let other = wall.to - from;
+    // Walls that meet have the same numbers here for the end that they share: no way passes between them by rounding.
+    let one_side = cross(step, one);
+    let other_side = cross(step, other);
+    let apart = one_side - other_side;
+    let is_between = one_side.min(other_side) <= 0.0 && one_side.max(other_side) >= 0.0;
+    if !is_between || apart == 0.0 {
         // A wall has no thickness: nobody sees it from its end.
         return None;
     }
-    let share = cross(offset, along) / area;
-    let share_of_wall = cross(offset, step) / area;
-    let is_crossed = (0.0..1.0).contains(&share) && (0.0..=1.0).contains(&share_of_wall);
-    is_crossed.then_some(share)
+
+    let crossing = one + (other - one) * (one_side / apart);
+    let share = dot(crossing, step) / step.length_squared_m2();
+    (0.0..1.0).contains(&share).then_some(share)
 }
 
 /// The shares of a way between which one of its coordinates is within `half` of `center`; they are equal if it never is.

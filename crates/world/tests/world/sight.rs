@@ -205,4 +205,38 @@ proptest! {
             }
         }
     }
+
+    #[test]
+    fn no_way_passes_where_two_walls_meet(
+        eye in (0.0..10.0, 0.0..10.0_f64),
+        joint in (0.0..10.0, 0.0..10.0_f64),
+        ends in prop::collection::vec((0.0..10.0, 0.0..10.0_f64), 2),
+        beyond in 1.01..5.0_f64,
+        order in any::<(bool, bool)>(),
+    ) {
+        let point = |(x, y): (f64, f64)| Point::new(x, y);
+        let (eye, joint) = (point(eye), point(joint));
+        let side = |end: Point| {
+            let (way, offset) = (joint - eye, end - joint);
+            way.x * offset.y - way.y * offset.x
+        };
+        let (one, other) = (point(ends[0]), point(ends[1]));
+        // The walls go to both sides of the way.
+        prop_assume!(joint.distance_m(eye) > 0.1);
+        prop_assume!(side(one) * side(other) < 0.0);
+        prop_assume!(one.distance_m(joint).min(other.distance_m(joint)) > 0.1);
+
+        let wall = |end: Point, is_turned: bool| Opaque::Wall(if is_turned {
+            Wall { from: end, to: joint }
+        } else {
+            Wall { from: joint, to: end }
+        });
+        let walls = [wall(one, order.0), wall(other, order.1)];
+        let to = eye + (joint - eye) * beyond;
+        prop_assert!(is_hidden(eye, to, &walls));
+        prop_assert!(is_hidden(to, eye, &walls));
+        let entered = walls.iter().filter_map(|wall| wall.entered_after(eye, to));
+        let first = entered.fold(1.0, f64::min);
+        prop_assert!((first - 1.0 / beyond).abs() < 1e-6, "{}", first);
+    }
 }
