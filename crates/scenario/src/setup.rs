@@ -1,5 +1,6 @@
 //! The set-up: what an operator can change between two epochs, checked field by field.
 
+use config::{FileError, Source};
 use protocol::messages::{FieldError, LogFile, Range, Setup};
 use world::{Guests, Triangular};
 
@@ -74,12 +75,42 @@ impl Scenario {
         {
             errors.add(&error.field(), &error);
         }
+        if errors.0.is_empty()
+            && let Err(error) = scenario.fit_unnamed()
+        {
+            let is_resized = setup.field_m != self.field_m;
+            let field = if is_resized { "field_m" } else { "duration_s" };
+            errors.add(field, &error.reason());
+        }
 
         if errors.0.is_empty() {
             Ok(scenario)
         } else {
             Err(errors.0)
         }
+    }
+
+    /// Fits what a set-up does not name to what it changes: sites and peaks at random places are placed anew, and layers cover the field.
+    ///
+    /// # Errors
+    /// What would not be right any more in the record of the scenario, such as a site that is not on the field.
+    fn fit_unnamed(&mut self) -> Result<(), FileError> {
+        placing::place_sites_at_random(self)
+            .and_then(|()| placing::place_peaks_at_random(self))
+            .map_err(|(_, reason)| FileError::new(reason))?;
+
+        let record = Source {
+            name: "the set-up".to_owned(),
+            text: self.to_toml()?,
+        };
+        let recorded = Self::parse_alone(&record)?;
+        for (name, layer) in &mut self.layers {
+            if let Some(of_field) = recorded.layers.get(name) {
+                layer.columns = of_field.columns;
+                layer.rows = of_field.rows;
+            }
+        }
+        Ok(())
     }
 
     /// The obstacles of a set-up, which has places only: one at the place of another keeps its shape.

@@ -231,3 +231,93 @@ fn a_robot_whose_name_is_a_number_is_reported_by_its_own_name() {
         errors[0].reason
     );
 }
+
+/// A scenario with what a set-up does not name: sites, layers and walls.
+fn world() -> Scenario {
+    let text = r#"
+        seed = 7
+        duration = "30 s"
+        [field]
+        size = ["10 m", "10 m"]
+        [[wall]]
+        points = [["1 m", "3 m"], ["6 m", "3 m"]]
+        [[site]]
+        name = "T"
+        at = ["7 m", "7 m"]
+        [[site]]
+        name = "U"
+        count = 2
+        at = "random"
+        [[layer]]
+        name = "dust"
+        cell = "0.5 m"
+        range = "2 m"
+        peaks = [{ at = "random", radius = "2 m", height = 1 }]
+        [[robot]]
+        name = "A"
+        at = ["5 m", "5 m"]
+        [[expect]]
+        name = "it is there"
+        never = { robot = "A", behavior = "GONE" }
+    "#;
+    parse(text)
+}
+
+fn parse(text: &str) -> Scenario {
+    let source = Source {
+        name: "world".into(),
+        text: text.to_owned(),
+    };
+    Scenario::parse_alone(&source).unwrap()
+}
+
+#[test]
+fn what_a_set_up_does_not_name_fits_to_it() {
+    for (size_m, seed) in [
+        ([10.0, 10.0], 7),
+        ([10.0, 10.0], 8),
+        ([8.0, 20.0], 7),
+        ([30.0, 9.2], 3),
+    ] {
+        let mut setup = world().setup();
+        setup.field_m = size_m;
+        setup.seed = seed;
+        let changed = world().with_setup(&setup).unwrap();
+        assert_eq!(changed.setup(), setup);
+
+        // Its record is read, and is the same.
+        let written = changed.to_toml().unwrap();
+        let read = parse(&written);
+        assert_eq!(read.to_toml().unwrap(), written);
+        assert_eq!(read.layers["dust"].columns, changed.layers["dust"].columns);
+        assert_eq!(read.layers["dust"].rows, changed.layers["dust"].rows);
+
+        // A file with this set-up has the same places.
+        let text = world().to_toml_without_seed().unwrap();
+        let [width, height] = size_m;
+        let text = text.replace(
+            "size = [\"10 m\", \"10 m\"]",
+            &format!("size = [\"{width} m\", \"{height} m\"]"),
+        );
+        let fresh = parse(&format!("seed = {seed}\n{text}"));
+        assert_eq!(fresh.field_m, size_m);
+        assert_eq!(fresh.sites, changed.sites);
+        assert_eq!(fresh.layers, changed.layers);
+    }
+}
+
+#[test]
+fn a_set_up_that_what_it_does_not_name_does_not_fit_is_refused() {
+    for (size_m, reason) in [
+        ([6.5, 6.5], "is outside the field"),
+        ([5.5, 8.0], "is not on the field"),
+        ([900.0, 900.0], "more than the 131072 allowed"),
+    ] {
+        let mut setup = world().setup();
+        setup.field_m = size_m;
+        let errors = world().with_setup(&setup).unwrap_err();
+        assert_eq!(errors.len(), 1, "{errors:?}");
+        assert_eq!(errors[0].field, "field_m");
+        assert!(errors[0].reason.contains(reason), "{errors:?}");
+    }
+}

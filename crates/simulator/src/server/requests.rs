@@ -312,10 +312,12 @@ fn next_scenario(
             .join("\n"),
         fields,
     })?;
-    Ok(Scenario {
-        seed: seed.unwrap_or(next.seed),
-        ..next
-    })
+    match seed {
+        Some(seed) => next
+            .with_seed(seed)
+            .map_err(|error| refused(error.in_words())),
+        None => Ok(next),
+    }
 }
 
 /// The scenario that a text from outside describes, for the robots that are there.
