@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::fs::File;
+use std::io::{Read, Seek};
 use std::os::unix::ffi::OsStrExt;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
@@ -494,11 +495,9 @@ const OTHERS: [&str; 8] = [
 
 impl Making {
     fn play(&self, place: &Place) -> Output {
-        let is_endless = matches!(self.name, "simulator" | "replay");
-        let limit_s = if is_endless { "1" } else { "60" };
         let mut command = Command::new("timeout");
         command
-            .args(["--signal=TERM", limit_s])
+            .args(["--signal=TERM", "60"])
             .arg(programs().join(self.program))
             .current_dir(root())
             .stdin(Stdio::null())
@@ -517,7 +516,10 @@ impl Making {
         if !OTHERS.contains(&self.name) {
             command.arg("--out").arg(place.out());
         }
-        command.output().unwrap()
+        match self.name {
+            "simulator" | "replay" => output_until_it_speaks(&mut command),
+            _ => command.output().unwrap(),
+        }
     }
 
     /// Whether the command may change what stands there.
@@ -531,6 +533,34 @@ impl Making {
                 is_report || name.ends_with("--replace") && is_over
             }
         }
+    }
+}
+
+/// What a program prints that would not end by itself: it is stopped after its first words, which it says when its folder is made.
+fn output_until_it_speaks(command: &mut Command) -> Output {
+    let mut printed = tempfile::tempfile().unwrap();
+    let mut child = command
+        .stdout(printed.try_clone().unwrap())
+        .stderr(printed.try_clone().unwrap())
+        .spawn()
+        .unwrap();
+    let is_over = eventually("the program has ended or said something", || {
+        let is_over = child.try_wait().unwrap().is_some();
+        let has_spoken = printed.metadata().unwrap().len() > 0;
+        (is_over || has_spoken).then_some(is_over)
+    });
+    if !is_over {
+        kill(&child, Signal::SIGTERM);
+    }
+
+    let status = child.wait().unwrap();
+    let mut stdout = Vec::new();
+    printed.rewind().unwrap();
+    printed.read_to_end(&mut stdout).unwrap();
+    Output {
+        status,
+        stdout,
+        stderr: Vec::new(),
     }
 }
 
