@@ -306,8 +306,18 @@ fn what_cannot_be_placed_is_refused_with_line_and_reason() {
         ),
         (
             format!("{robot}radius = \"-1 m\"\n"),
-            "[[robot]]",
-            "robot A is -2 m wide or high",
+            "radius = ",
+            "this body is -2 m wide or high",
+        ),
+        (
+            format!("{}radius = \"-1 m\"\n", bulk("\"random\"", 2)),
+            "radius = ",
+            "this body is -2 m wide or high",
+        ),
+        (
+            format!("[[obstacle]]\nat = \"random\"\nsize = [\"1 m\", \"0.05 cm\"]\n{robot}"),
+            "size = ",
+            "this body is 0.0005 m wide or high: bodies are from 0.001 m to 1000000 m",
         ),
         (
             bulk(&GRID.replace("columns = 2", "columns = 0"), 2),

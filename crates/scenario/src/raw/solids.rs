@@ -7,7 +7,7 @@ use config::units::Length;
 use config::{FileError, Source};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
-use world::{Shape, WALLS_MAX, Wall};
+use world::{BODY_MIN_M, SIDE_MAX_M, Shape, WALLS_MAX, Wall};
 
 use super::super::checked::{Obstacle, to_wire, to_world};
 use super::super::floor_plan::{self, Placement};
@@ -188,23 +188,36 @@ pub(super) fn shape(
     radius: Option<&Spanned<Length>>,
     source: &Source,
 ) -> Result<Option<Shape>, FileError> {
-    match (size, radius) {
-        (None, None) => Ok(None),
+    let (shape, span) = match (size, radius) {
+        (None, None) => return Ok(None),
         (Some(size), None) => {
             let Spacing([width, height]) = *size.get_ref();
-            Ok(Some(Shape::Rectangle {
+            let shape = Shape::Rectangle {
                 width_m: width.0,
                 height_m: height.0,
-            }))
+            };
+            (shape, size.span())
         }
-        (None, Some(radius)) => Ok(Some(Shape::Disc {
-            radius_m: radius.get_ref().0,
-        })),
+        (None, Some(radius)) => {
+            let radius_m = radius.get_ref().0;
+            (Shape::Disc { radius_m }, radius.span())
+        }
         (Some(_), Some(radius)) => {
             let reason = "a body has a size or a radius, not both";
-            Err(FileError::at(source, Some(radius.span()), reason))
+            return Err(FileError::at(source, Some(radius.span()), reason));
+        }
+    };
+
+    let (half_x_m, half_y_m) = shape.half_m();
+    for side_m in [2.0 * half_x_m, 2.0 * half_y_m] {
+        if !(BODY_MIN_M..=SIDE_MAX_M).contains(&side_m) {
+            let reason = format!(
+                "this body is {side_m} m wide or high: bodies are from {BODY_MIN_M} m to {SIDE_MAX_M} m"
+            );
+            return Err(FileError::at(source, Some(span), &reason));
         }
     }
+    Ok(Some(shape))
 }
 
 /// The keys of a shape: `size`, `radius`.
