@@ -452,4 +452,52 @@ proptest! {
             prop_assert_eq!(cell == -1.0, is_changed, "{} {}", column, row);
         }
     }
+
+    #[test]
+    fn the_fastest_diffusion_that_is_accepted_keeps_the_sum_and_the_bounds(
+        columns in 1_u32..40,
+        rows in 1_u32..40,
+        cell_m in 0.1_f64..3.0,
+        tick_s in 0.01_f64..2.0,
+        heights in prop::collection::vec(((0.0..1.0, 0.0..1.0_f64), -1e12..1e12_f64), 1..5),
+        share in prop_oneof![Just(1.0), 0.0..1.0_f64],
+    ) {
+        let fastest = cell_m * cell_m / (4.0 * tick_s);
+        let size_m = [f64::from(columns) * cell_m, f64::from(rows) * cell_m];
+        let mut text = format!(
+            "tick = \"{tick_s} s\"\n[field]\nsize = [\"{} m\", \"{} m\"]\nbody = \"0.1 cm\"\n\
+             [[layer]]\nname = \"dust\"\ncell = \"{cell_m} m\"\ndiffuse = {:?}\n",
+            size_m[0], size_m[1], fastest * share
+        );
+        for ((x, y), height) in heights {
+            text += &format!(
+                "[[layer.peaks]]\nat = [\"{} m\", \"{} m\"]\nradius = \"{} m\"\nheight = {height:?}\n",
+                x * size_m[0], y * size_m[1], 2.0 * cell_m
+            );
+        }
+        let scenario = scenario(&text);
+        let mut layers = Layers::new(&scenario);
+        prop_assert_eq!(dust(&layers).len(), (columns * rows) as usize);
+
+        let ends = |cells: &[f64]| {
+            let low = cells.iter().copied().fold(f64::INFINITY, f64::min);
+            let high = cells.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            (low, high)
+        };
+        let start = dust(&layers);
+        let (low, high) = ends(&start);
+        let scale = low.abs().max(high.abs()).max(1.0);
+        let sum: f64 = start.iter().sum();
+        for _ in 0..300 {
+            layers.pass_tick();
+            let cells = dust(&layers);
+            let now = ends(&cells);
+            prop_assert!(now.0 >= low - 1e-9 * scale && now.1 <= high + 1e-9 * scale, "{:?}", now);
+            let now: f64 = cells.iter().sum();
+            prop_assert!((now - sum).abs() <= 1e-9 * scale * cells.len() as f64, "{} {}", now, sum);
+        }
+        for frame in layers.frames() {
+            prop_assert_eq!(frame.levels.len(), start.len().div_ceil(3) * 4);
+        }
+    }
 }

@@ -2,6 +2,7 @@
 
 use crate::bodies::Body;
 use crate::footprint::Footprint;
+use crate::limits::TOLERANCE_M;
 use crate::motion::World;
 use crate::point::{Point, cross, dot};
 use crate::shape::{Shape, Wall};
@@ -22,7 +23,7 @@ pub enum Opaque {
 
 impl Opaque {
     /// The share of the way from `from` to `to` after which the way enters it: 0 if it begins inside. `None` if it passes by, or
-    /// only touches it, or ends at it.
+    /// touches a corner or a rim, or ends at it. A way along the side of a rectangle enters it.
     #[must_use]
     pub fn entered_after(&self, from: Point, to: Point) -> Option<f64> {
         let (enter, leave) = match *self {
@@ -90,8 +91,9 @@ fn crossed_wall(from: Point, to: Point, wall: &Wall) -> Option<f64> {
 /// The shares of a way between which one of its coordinates is within `half` of `center`; they are equal if it never is.
 fn crossed(from: f64, to: f64, center: f64, half: f64) -> (f64, f64) {
     let step = to - from;
-    if step == 0.0 {
-        let is_within = (from - center).abs() < half;
+    // A way along the side of a body is in it, so that none passes between bodies side by side.
+    if step.abs() <= TOLERANCE_M {
+        let is_within = (from - center).abs() <= half + TOLERANCE_M;
         return if is_within {
             (f64::NEG_INFINITY, f64::INFINITY)
         } else {

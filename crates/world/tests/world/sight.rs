@@ -44,10 +44,40 @@ fn a_wall_hides_what_is_behind_it_and_nothing_beside_it() {
     ] {
         assert_eq!(is_hidden(eye, Point::new(x, y), &wall), hidden, "{x}, {y}");
     }
-    // A way along the face only touches it.
+    // A way along the face is hidden, and one that touches a corner is not.
     let (from, to) = (Point::new(4.5, 0.0), Point::new(4.5, 9.0));
+    assert!(is_hidden(from, to, &wall));
+    let (from, to) = (Point::new(3.5, 4.0), Point::new(5.5, 2.0));
     assert!(!is_hidden(from, to, &wall));
     assert!(!is_hidden(eye, eye, &wall));
+}
+
+#[test]
+fn no_way_passes_between_blocks_side_by_side() {
+    // Blocks of 2 ft on a grid of 1 ft, as people place them, and ways along the lines of the grid.
+    let ft = |number: u32| f64::from(number) * 0.3048;
+    for first in 1..40 {
+        let wall: Vec<Opaque> = (0..5)
+            .map(|index| block(ft(20), ft(first + 2 * index), 0.3048, 0.3048))
+            .collect();
+        for line in first..=first + 8 {
+            for x in [1, 2, 3, 5, 7, 11] {
+                let (from, to) = (
+                    Point::new(ft(x), ft(line)),
+                    Point::new(ft(40 - x), ft(line)),
+                );
+                assert!(is_hidden(from, to, &wall), "{from} {to}");
+                assert!(is_hidden(to, from, &wall), "{to} {from}");
+                // By rounding, a direction is never quite that of the grid.
+                let direction = Point::new(
+                    libm::cos(std::f64::consts::PI),
+                    libm::sin(std::f64::consts::PI),
+                );
+                let to = to + Point::new(0.0, -direction.y);
+                assert!(is_hidden(from, to, &wall), "{from} {to}");
+            }
+        }
+    }
 }
 
 /// A field of 10 m by 10 m with bodies of 1 m.

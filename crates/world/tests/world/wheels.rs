@@ -242,7 +242,7 @@ fn touching(wall: &Wall, half_m: f64, share: f64, off_m: f64) -> Point {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(300))]
+    #![proptest_config(ProptestConfig::with_cases(100))]
 
     #[test]
     fn nobody_leaves_a_closed_room_with_acute_corners(
