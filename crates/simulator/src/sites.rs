@@ -286,6 +286,10 @@ impl Site {
             if number.is_some_and(|number| !self.allows(key, number)) {
                 return Err(SiteRefusal::Bound);
             }
+            // Also where it is minus zero: no event tells the one from the other.
+            if number == Some(0.0) {
+                state.insert(key, Variable::Number(0.0));
+            }
         }
         Ok(state)
     }

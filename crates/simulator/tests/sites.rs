@@ -94,6 +94,19 @@ fn each_action_sees_what_the_one_before_left() {
 }
 
 #[test]
+fn zero_has_no_sign_in_the_state_of_a_site() {
+    for action in [
+        SiteAction::set("T", "stock", -0.0),
+        SiteAction::set("T", "stock", -0.0).and_add("stock", -0.0),
+    ] {
+        let mut sites = Sites::new(&scenario(FILE));
+        carry_out(&mut sites, &vec![(name("A"), vec![action])]);
+        let stock = sites.state("T").unwrap().get("stock").unwrap().as_f64();
+        assert!(stock.unwrap().is_sign_positive());
+    }
+}
+
+#[test]
 fn an_action_is_carried_out_wholly_or_refused_with_the_first_reason_that_holds() {
     let long = "x".repeat(MAX_SITE_TEXT_BYTES + 1);
     let limit = "x".repeat(MAX_SITE_TEXT_BYTES);
