@@ -34,8 +34,8 @@ const MAX_FACTORS: usize = 8;
 const MAX_VALUES: usize = 1_000;
 /// Most bytes of a text for people.
 const MAX_TEXT_BYTES: usize = 2_000;
-/// Most measures.
-const MAX_MEASURES: usize = 200;
+/// Most measures of an experiment; a scenario has fewer, which are taken in every tick.
+const MAX_EXPERIMENT_MEASURES: usize = 200;
 /// Columns of tables and keys of results that no factor, measure or expectation has.
 const RESERVED: [&str; 10] = [
     NAMED,
@@ -745,8 +745,8 @@ fn check_measures(
 ) -> Result<Vec<Measure>, FileError> {
     let span = measures.span();
     let measures = measures.into_inner();
-    if measures.is_empty() || measures.len() > MAX_MEASURES {
-        let reason = format!("an experiment has 1 to {MAX_MEASURES} measures");
+    if measures.is_empty() || measures.len() > MAX_EXPERIMENT_MEASURES {
+        let reason = format!("an experiment has 1 to {MAX_EXPERIMENT_MEASURES} measures");
         return Err(refuse(source, span, reason));
     }
 
