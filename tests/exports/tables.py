@@ -113,6 +113,7 @@ def state(robot: dict, report: dict | None) -> dict:
         "y_m": robot["location"]["y"],
         "blocked": robot.get("blocked", False),
         "missed": "missed" in robot,
+        "heading_rad": robot.get("heading_rad"),
     }
     if report is not None:
         cells |= {

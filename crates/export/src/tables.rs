@@ -28,7 +28,7 @@ const EVENTS: &str = "event robot generation x_m y_m blocked_by blocked_by_robot
                       site key value_before value_after layer cells change set by_hand expectation verdict text seed version protocol tick_s reason digest";
 /// A row for each robot in each tick.
 const STATES: &str = "robot generation x_m y_m speed_mps direction_rad emotion behavior blocked missed commands \
-                      proposal_x_m proposal_y_m";
+                      proposal_x_m proposal_y_m heading_rad";
 /// A row for each state variable of each robot in each tick.
 const VARIABLES: &str = "robot variable type value number";
 
@@ -259,6 +259,7 @@ fn state_cells<'a>(robot: &'a PlacedRobot, report: Option<&'a Report>) -> Vec<Co
         ("y_m", robot.location.y.into()),
         ("blocked", robot.blocked.into()),
         ("missed", robot.missed.is_some().into()),
+        ("heading_rad", robot.heading_rad.into()),
     ];
     if let Some(report) = report {
         cells.extend([

@@ -18,7 +18,7 @@ _NEEDS = {"pandas": ("pandas", "pyarrow"), "polars": ("polars",)}
 
 # The columns that are not of texts, as docs/exports.md and docs/experiments.md have them.
 _INTEGERS = "epoch tick generation seq until_tick seed protocol commands cells unit yoked_to_seed".split()
-_REALS = "time_s x_m y_m tick_s speed_mps direction_rad proposal_x_m proposal_y_m change number".split()
+_REALS = "time_s x_m y_m tick_s speed_mps direction_rad proposal_x_m proposal_y_m heading_rad change number".split()
 _FLAGS = "cuts_commands cuts_queries begins by_hand blocked missed".split()
 _TYPES = dict.fromkeys(_INTEGERS, "int64") | dict.fromkeys(_REALS, "double") | dict.fromkeys(_FLAGS, "bool")
 
