@@ -10,7 +10,7 @@ use config::speed::SpeedError;
 use config::units::Time;
 use config::{Changes, FileError, Source, Speed};
 use protocol::{RobotName, RobotPattern, RunName};
-use scenario::{OnLate, Scenario};
+use scenario::{Interruption, OnLate, Scenario};
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -409,6 +409,46 @@ impl LaunchFile {
         for (robot, spec) in &scenario.robots {
             if !run_by.contains_key(robot) {
                 return Err(self.not_run(robot, &spec.class));
+            }
+        }
+        self.check_shared(scenario)
+    }
+
+    /// Checks that what ends the process of a robot is meant for all robots of the process: otherwise the run would be another one than
+    /// that of the scenario, in which each robot is by itself.
+    fn check_shared(&self, scenario: &Scenario) -> Result<(), FileError> {
+        for process in &self.processes {
+            let [first, others @ ..] = &process.robots[..] else {
+                continue;
+            };
+            let of_first = scenario.interruptions(first);
+            for other in others {
+                let of_other = scenario.interruptions(other);
+                if of_first == of_other {
+                    continue;
+                }
+
+                let of_one = |interruptions: &[Interruption], others: &[Interruption]| {
+                    let mut alone = interruptions.iter().filter(|one| !others.contains(one));
+                    alone.next().map(|interruption| interruption.at)
+                };
+                let (robot, spared, at) = match of_one(&of_first, &of_other) {
+                    Some(at) => (first, other, at),
+                    None => (
+                        other,
+                        first,
+                        of_one(&of_other, &of_first).unwrap_or_default(),
+                    ),
+                };
+                let at_s = at as f64 * scenario.tick_s;
+                let text = format!(
+                    "at {at_s} s the scenario stops or restarts {robot} and not {spared}, and both are in this process"
+                );
+                let help = format!(
+                    "a fault of a robot and a change of its parameters end its process: give {robot} a process of its own, or let \
+                     the scenario name all robots of the process"
+                );
+                return Err(self.refuse(process, &text, &help));
             }
         }
         Ok(())

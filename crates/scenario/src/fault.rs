@@ -92,6 +92,15 @@ impl Fault {
     }
 }
 
+/// What stops the process of a robot, or starts it again, in the course of a run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Interruption {
+    /// It happens before the clock of this tick.
+    pub at: Tick,
+    /// The fault, and its end; `None` for a change of the robot's parameters.
+    pub fault: Option<(FaultKind, FaultEnd)>,
+}
+
 /// The end of a fault.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum FaultEnd {

@@ -33,7 +33,7 @@ pub use checked::{
     DEFAULT_SEED, MAX_GUESTS, Obstacle, RecordContents, RobotSpec, Scenario, SyncPoint,
 };
 pub use checked::{to_wire, to_world};
-pub use fault::{Fault, FaultEnd};
+pub use fault::{Fault, FaultEnd, Interruption};
 pub use guests::GuestRules;
 pub use lateness::Lateness;
 pub use layers::{LayerSpec, Peak};

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeSet;
 
-use protocol::messages::Parameters;
+use protocol::messages::{FaultKind, Parameters};
 use protocol::{RobotName, Tick};
 
 use super::change::Change;
 use super::checked::Scenario;
-use super::fault::Fault;
+use super::fault::{Fault, FaultEnd, Interruption};
 use super::lateness::Lateness;
 use super::network::Network;
 
@@ -138,10 +138,45 @@ impl Scenario {
         robots
     }
 
+    /// What stops the process of a robot, or starts it again, in the course of the run; without what leaves no trace in the record.
+    #[must_use]
+    pub fn interruptions(&self, robot: &RobotName) -> Vec<Interruption> {
+        let mut interruptions = of_faults(&self.faults, robot);
+        for change in &self.changes {
+            interruptions.extend(of_faults(&change.faults, robot));
+            if change.restarted.contains(robot) {
+                interruptions.push(Interruption {
+                    at: change.at,
+                    fault: None,
+                });
+            }
+        }
+        interruptions
+    }
+
     /// Robots that a fault wants to start again before a tick.
     pub fn restarts_wanted_at(&self, tick: Tick) -> BTreeSet<RobotName> {
         let faults = self.faults_at(tick).iter();
         let restarts = faults.filter(|fault| fault.is_restart() && fault.at == tick);
         restarts.map(|fault| fault.robot.clone()).collect()
     }
+}
+
+/// The faults that interrupt a robot. One that only the wall clock knows holds the clock, and all robots of the process wait.
+fn of_faults(faults: &[Fault], robot: &RobotName) -> Vec<Interruption> {
+    let mut interruptions = Vec::new();
+    for fault in faults.iter().filter(|fault| fault.robot == *robot) {
+        let is_unseen = match fault.kind {
+            FaultKind::Slow => true,
+            FaultKind::Hang => matches!(fault.end, FaultEnd::After(_)),
+            FaultKind::Crash | FaultKind::Restart => false,
+        };
+        if !is_unseen {
+            interruptions.push(Interruption {
+                at: fault.at,
+                fault: Some((fault.kind, fault.end)),
+            });
+        }
+    }
+    interruptions
 }

@@ -221,6 +221,54 @@ fn an_entry_is_as_many_processes_as_its_robots_need() {
     );
 }
 
+/// What is said about one process for both robots of the hall with these lines.
+fn together(lines: &str) -> Result<(), FileError> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("hall.toml");
+    std::fs::write(&path, format!("{lines}{SCENARIO}")).unwrap();
+    let scenario = Scenario::load(&path, &Changes::default()).unwrap();
+    let text =
+        "scenario = \"hall.toml\"\n[[process]]\nname = \"all\"\ncommand = [\"x\"]\nrobots = \"*\"";
+    let source = Source {
+        name: "launch/x.toml".to_owned(),
+        text: text.to_owned(),
+    };
+    LaunchFile::parse(source, folder.path())?.assign_robots(&scenario)
+}
+
+#[test]
+fn what_ends_a_process_is_meant_for_all_robots_of_it() {
+    let change = |set: &str| format!("[[change]]\nat = \"3 s\"\nset = [{set}]\n");
+    let fault = |robot: &str, end: &str| {
+        format!("[[fault]]\nrobot = \"{robot}\"\ndo = \"crash\"\nat = \"5 s\"\nuntil = \"{end}\"\n")
+    };
+    for apart in [
+        change("\"robot.Leguin.params.x=1\""),
+        change("\"robot.*.params.x=1\"") + &change("\"robot.Leguin.params.x=2\"").replace('3', "4"),
+        "on_late = \"continue\"\n".to_owned() + &fault("Leguin", "9 s"),
+        "on_late = \"continue\"\n".to_owned() + &fault("Leguin", "9 s") + &fault("Butler", "8 s"),
+        "[[fault]]\nrobot = \"Butler\"\ndo = \"restart\"\nat = \"5 s\"\n".to_owned(),
+        change("'fault=[{ robot = \"Butler\", do = \"restart\", at = \"5 s\" }]'"),
+    ] {
+        let error = together(&apart).expect_err(&apart);
+        let shown = config::render_plain(&error, None, 200);
+        assert!(shown.contains("launch/x.toml:5:"), "{shown}");
+        assert!(shown.contains("the scenario stops or restarts"), "{shown}");
+        assert!(shown.contains("a process of its own"), "{shown}");
+    }
+
+    for alike in [
+        change("\"robot.*.params.x=1\""),
+        change("\"network.commands.loss=0.5\""),
+        "on_late = \"continue\"\n".to_owned() + &fault("Leguin", "9 s") + &fault("Butler", "9 s"),
+        "[[fault]]\nrobot = \"Butler\"\ndo = \"slow\"\nat = \"5 s\"\n".to_owned(),
+        "[[fault]]\nrobot = \"Butler\"\ndo = \"hang\"\nat = \"5 s\"\nfor = \"1 s\"\n".to_owned(),
+    ] {
+        let given = together(&alike);
+        assert!(given.is_ok(), "{alike}\n{given:?}");
+    }
+}
+
 #[test]
 fn a_misspelt_key_is_shown_with_file_line_and_caret() {
     let shown = refusal("[[process]]\nname = \"Butler\"\ncomand = [\"cars-butler\"]");
