@@ -39,7 +39,8 @@ pub(crate) struct ExecutionArgs {
     pub(crate) set: Vec<Override>,
 }
 
-fn parse_seed(text: &str) -> Result<u64, String> {
+/// Reads a seed, or draws one.
+pub(crate) fn parse_seed(text: &str) -> Result<u64, String> {
     if text == "random" {
         return draw_seed();
     }

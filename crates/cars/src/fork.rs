@@ -12,10 +12,10 @@ use lab::fork::Fork;
 use lab::moment::Moment;
 use launch::RunOptions;
 use protocol::{Epoch, RunName};
-use scenario::Scenario;
+use scenario::{ChanceKind, Scenario};
 
 use crate::errors::{Result, refusal};
-use crate::execution::if_taken;
+use crate::execution::{if_taken, parse_seed};
 use crate::table;
 
 /// `cars fork`.
@@ -27,7 +27,13 @@ pub(crate) struct ForkArgs {
     /// What changes from the next tick on, for example `network.commands.loss=0.3` or `robot.Butler.params.affect=off`.
     #[arg(long = "set", value_name = "PATH=VALUE")]
     set: Vec<Override>,
-    /// Name of the fork; without it RUN-fork-TICK.
+    /// The seed of what is drawn from the next tick on, or `random` to draw one: the same past with another future.
+    #[arg(long, value_name = "N|random", value_parser = parse_seed)]
+    seed: Option<u64>,
+    /// Draw only this anew: network, guests, sensing, robot.NAME (a name or a pattern), separated by commas; without it, all.
+    #[arg(long, value_name = "KIND", value_delimiter = ',', requires = "seed")]
+    reseed: Vec<ChanceKind>,
+    /// Name of the fork; without it RUN-fork-TICK, with -seed-N after it if there is one.
     #[arg(long, value_name = "NAME")]
     run: Option<RunName>,
     /// Replace the run with this name, if it is over. Without it, the fork takes the next free name.
@@ -82,12 +88,15 @@ pub(crate) fn fork(args: ForkArgs) -> Result<ExitCode> {
         tick,
         set: args.set,
         duration_s: args.duration.map(|duration| duration.0),
+        reseed: args.seed.map(|seed| (seed, args.reseed)),
     };
     let scenario = fork.scenario()?;
 
-    let run = args
-        .run
-        .unwrap_or_else(|| parent.with_suffix(&format!("-fork-{tick}")));
+    let suffix = match args.seed {
+        Some(seed) => format!("-fork-{tick}-seed-{seed}"),
+        None => format!("-fork-{tick}"),
+    };
+    let run = args.run.unwrap_or_else(|| parent.with_suffix(&suffix));
     let place = args.out.join(run.as_str());
     if args.replace && is_same_place(&place, parent_folder.path()) {
         return Err(refusal!(

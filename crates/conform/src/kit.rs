@@ -193,6 +193,7 @@ impl Kit {
             known_sites: Vec::new(),
             parameters: role.parameters,
             earlier_parameters: Vec::new(),
+            reseeds: Vec::new(),
             later_parameters: Vec::new(),
             news_flag: 0,
             last_state: None,

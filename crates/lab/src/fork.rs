@@ -7,8 +7,7 @@ use protocol::{Event, RunName, Tick};
 use record::difference::between;
 use record::{Entry, Record};
 use record::{EpochFiles, RunFolder, Summary};
-use scenario::Parent;
-use scenario::Scenario;
+use scenario::{ChanceKind, Parent, Scenario};
 use simulator::Recorder;
 
 use crate::error::LabError;
@@ -31,6 +30,8 @@ pub struct Fork<'a> {
     pub set: Vec<Override>,
     /// Another duration, simulated seconds.
     pub duration_s: Option<f64>,
+    /// The seed of what is drawn from the next tick on, and the kinds that are drawn anew: all, if none is named.
+    pub reseed: Option<(u64, Vec<ChanceKind>)>,
 }
 
 impl Fork<'_> {
@@ -61,9 +62,12 @@ impl Fork<'_> {
         let source = changes.apply(&Source::read(&self.files.scenario)?)?;
         let mut content: toml::Table = source.parse()?;
         content.insert("parent".to_owned(), parent_table(&parent));
+        let next_s = (self.tick + 1) as f64 * before.tick_s;
         if !set.is_empty() {
-            let at_s = (self.tick + 1) as f64 * before.tick_s;
-            add_change(&mut content, at_s, set);
+            add_change(&mut content, next_s, set);
+        }
+        if let Some((seed, of)) = &self.reseed {
+            add_reseed(&mut content, next_s, *seed, of);
         }
         let source = Source {
             name: format!("{} (forked)", self.files.scenario.display()),
@@ -164,12 +168,28 @@ fn add_change(content: &mut toml::Table, at_s: f64, set: Vec<toml::Value>) {
     let mut change = toml::Table::new();
     change.insert("at".to_owned(), format!("{at_s} s").into());
     change.insert("set".to_owned(), set.into());
+    add(content, "change", change);
+}
 
-    let changes = content
-        .entry("change")
+fn add_reseed(content: &mut toml::Table, at_s: f64, seed: u64, of: &[ChanceKind]) {
+    let mut reseed = toml::Table::new();
+    reseed.insert("at".to_owned(), format!("{at_s} s").into());
+    let seed = i64::try_from(seed).unwrap_or(i64::MAX);
+    reseed.insert("seed".to_owned(), seed.into());
+    if !of.is_empty() {
+        let of: Vec<String> = of.iter().map(ToString::to_string).collect();
+        reseed.insert("of".to_owned(), of.into());
+    }
+    add(content, "reseed", reseed);
+}
+
+/// Adds a table to an array of tables.
+fn add(content: &mut toml::Table, name: &str, table: toml::Table) {
+    let tables = content
+        .entry(name)
         .or_insert_with(|| toml::Value::Array(Vec::new()));
-    if let toml::Value::Array(changes) = changes {
-        changes.push(change.into());
+    if let toml::Value::Array(tables) = tables {
+        tables.push(table.into());
     }
 }
 

@@ -1,7 +1,8 @@
 //! Work with one run: executing a scenario in this process ([`run`]), reading a run's folder ([`folder`]), executing a recorded
-//! run again ([`verify`]) and letting it go on otherwise ([`fork`]), comparing two runs ([`diff`]), judging a recorded run
+//! run again ([`verify`]) and letting it go on otherwise, recorded ([`fork`]) or in memory ([`branch`]), comparing two runs ([`diff`]), judging a recorded run
 //! ([`judge`]), playing single robots from their records ([`replayed`]), and reading records to find damage ([`inspect`]).
 
+pub mod branch;
 pub mod diff;
 mod error;
 pub mod folder;

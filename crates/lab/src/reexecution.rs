@@ -20,7 +20,7 @@ use simulator::TickRecord;
 use crate::error::LabError;
 use crate::folder::NOT_RECORDED;
 use crate::replayed::action;
-use crate::run::{Local, go_on};
+use crate::run::{Local, RobotMaker, go_on, project_robots};
 
 /// An epoch that is executed again.
 pub(crate) struct Reexecution {
@@ -34,6 +34,7 @@ pub(crate) struct Reexecution {
     absent: BTreeSet<RobotName>,
     /// Robots that were taken from the record in some ticks, and the first of these.
     pub(crate) from_record: BTreeMap<RobotName, Tick>,
+    make: RobotMaker,
 }
 
 /// A tick that was executed again.
@@ -64,6 +65,18 @@ impl Reexecution {
     /// # Errors
     /// If the scenario cannot be set up.
     pub(crate) fn new(scenario: Scenario, epoch: Epoch) -> Result<Self, LabError> {
+        Self::with_robots(scenario, epoch, project_robots())
+    }
+
+    /// The beginning of an epoch whose robots are made by `make`, as far as it makes them.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub(crate) fn with_robots(
+        scenario: Scenario,
+        epoch: Epoch,
+        make: RobotMaker,
+    ) -> Result<Self, LabError> {
         // Robots learn the name of the run, and nothing of the record depends on it.
         let run = RunName::unknown();
         let script = RecordedReports::default();
@@ -71,7 +84,7 @@ impl Reexecution {
         let mut from_record = BTreeMap::new();
         let mut robots = BTreeMap::new();
         for (name, spec) in &scenario.robots {
-            let robot = robots::make(&spec.class).unwrap_or_else(|| {
+            let robot = make(name, &spec.class).unwrap_or_else(|| {
                 scripted.insert(name.clone());
                 from_record.insert(name.clone(), 0);
                 script.robot()
@@ -86,6 +99,26 @@ impl Reexecution {
             scripted,
             absent: BTreeSet::new(),
             from_record,
+            make,
+        })
+    }
+
+    /// A copy after a tick.
+    ///
+    /// # Errors
+    /// If a robot cannot be copied, or is taken from the record.
+    pub(crate) fn snapshot(&self) -> Result<Self, LabError> {
+        if let Some(robot) = self.scripted.first() {
+            return Err(cannot_go_on(robot));
+        }
+        Ok(Self {
+            run: self.run.clone(),
+            local: self.local.snapshot().map_err(|robot| cannot_copy(&robot))?,
+            script: RecordedReports::default(),
+            scripted: BTreeSet::new(),
+            absent: self.absent.clone(),
+            from_record: self.from_record.clone(),
+            make: self.make.clone(),
         })
     }
 
@@ -184,7 +217,7 @@ impl Reexecution {
     fn join(&mut self, name: &RobotName, tick: Tick) {
         let simulation = &self.local.simulation;
         let class = &simulation.scenario().robots[name].class;
-        let robot = match robots::make(class) {
+        let robot = match (self.make)(name, class) {
             Some(robot) => {
                 self.scripted.remove(name);
                 robot
@@ -307,6 +340,13 @@ pub(crate) fn cannot_go_on(robot: &RobotName) -> LabError {
     .with_help(
         "a run is forked in one process; robots in other languages, and robots that went on after a tick that they had \
          missed, have a state that only their processes knew",
+    )
+}
+
+/// Why a run cannot branch.
+pub(crate) fn cannot_copy(robot: &RobotName) -> LabError {
+    LabError::refused(format!("{robot} cannot be copied in the middle of a run")).with_help(
+        "a robot of Rust that implements `Robot::snapshot` can; the robots of the project do",
     )
 }
 

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use protocol::messages::{End, FaultKind, OnLate};
@@ -174,7 +175,7 @@ fn go_on_with(
     Ok(())
 }
 
-/// A simulation and its robots in this process, before tick 0.
+/// A simulation and its robots in this process.
 pub struct Local {
     /// The simulation.
     pub simulation: Simulation,
@@ -190,6 +191,17 @@ impl Local {
     pub fn new(scenario: Scenario, run: &RunName) -> Result<Self, LabError> {
         let robots = make_robots(&scenario, Path::new("the scenario"))?;
         Self::with_robots(scenario, 1, run, robots)
+    }
+
+    /// A copy that goes on as this one does, between two ticks.
+    ///
+    /// # Errors
+    /// The first robot that cannot be copied.
+    pub fn snapshot(&self) -> Result<Self, RobotName> {
+        Ok(Self {
+            robots: self.robots.snapshot()?,
+            simulation: self.simulation.clone(),
+        })
     }
 
     /// Creates the simulation of an epoch with these robots.
@@ -364,6 +376,15 @@ pub fn check_faults(scenario: &Scenario, after: Tick) -> Result<(), LabError> {
 
 /// Makes the robot of a name and a class; `None` if it makes no such robots.
 pub type Make<'a> = &'a dyn Fn(&RobotName, &str) -> Option<Box<dyn Robot>>;
+
+/// Makes robots as [`Make`] does, for as long as a run and its branches need them.
+pub type RobotMaker = Arc<dyn Fn(&RobotName, &str) -> Option<Box<dyn Robot>> + Send + Sync>;
+
+/// Makes the robots of the project.
+#[must_use]
+pub fn project_robots() -> RobotMaker {
+    Arc::new(of_class)
+}
 
 /// Makes the robots of the project.
 fn of_class(_: &RobotName, class: &str) -> Option<Box<dyn Robot>> {

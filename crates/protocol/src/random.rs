@@ -22,6 +22,13 @@ pub fn stream(seed: u64, name: &str) -> Stream {
     Stream::seed_from_u64(seed ^ fnv1a(name.as_bytes()))
 }
 
+/// The seed of streams that are drawn anew from a tick on, by what re-seeds the run (`seed`) and what they are for. Streams that
+/// last have the tick in `of`, so that two re-seeds with the same seed do not repeat each other.
+#[must_use]
+pub fn reseeded(seed: u64, of: &str) -> u64 {
+    stream(seed, &format!("reseed/{of}")).next_u64() & MAX_SEED
+}
+
 /// The next draw as a number from 0 up to but not including 1: its upper 53 bits over 2^53.
 pub fn unit(stream: &mut Stream) -> f64 {
     (stream.next_u64() >> 11) as f64 / (1_u64 << 53) as f64

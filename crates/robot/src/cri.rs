@@ -35,6 +35,17 @@ pub trait Robot: Send {
     /// [`init`](Robot::init). By default the robot starts afresh.
     fn resume(&mut self, _cars: &mut Cars<'_>, _last: &StateVariables) {}
 
+    /// A copy of the robot that goes on as it does, so that a run in one process can branch without being executed again
+    /// from its start. By default `None`: there is no copy.
+    fn snapshot(&self) -> Option<Box<dyn Robot>> {
+        None
+    }
+
+    /// The robot's stream ([`Cars::random`]) is another one from this tick on, because the run is re-seeded. Called before
+    /// [`tick`](Robot::tick). A robot that keeps streams which it has split from it splits them anew; any other one has
+    /// nothing to do, which is the default.
+    fn reseed(&mut self, _cars: &mut Cars<'_>) {}
+
     /// Whether the robot perceives all bodies around it ([`Cars::bodies`]): its news are larger then.
     fn senses_bodies(&self) -> bool {
         false

@@ -10,8 +10,8 @@ use lockstep::{
     ParticipantOutput, Stamp, StateQuery, TickOutcome, Timeouts, Timing, Turn,
 };
 use protocol::messages::{
-    CommandText, FaultKind, MAX_ENTRIES, OnLate, Panel, Presence, PublicState, Report, TickUpdate,
-    Welcome,
+    CommandText, FaultKind, MAX_ENTRIES, OnLate, Panel, Presence, PublicState, Report,
+    StreamReseed, TickUpdate, Welcome,
 };
 use protocol::{Generation, RobotName, Tick};
 
@@ -109,6 +109,34 @@ impl LocalHost {
             participants,
             stopped: BTreeSet::new(),
             timeouts,
+        }
+    }
+
+    /// A copy that goes on as this one does, between two ticks.
+    ///
+    /// # Errors
+    /// The first robot that cannot be copied ([`Robot::snapshot`]).
+    pub fn snapshot(&self) -> Result<Self, RobotName> {
+        let mut runners = Vec::with_capacity(self.runners.len());
+        for (runner, name) in self.runners.iter().zip(&self.names) {
+            runners.push(runner.snapshot().ok_or_else(|| name.clone())?);
+        }
+
+        Ok(Self {
+            barrier: self.barrier.clone(),
+            outputs: self.outputs.clone(),
+            names: self.names.clone(),
+            runners,
+            participants: self.participants.clone(),
+            stopped: self.stopped.clone(),
+            timeouts: self.timeouts,
+        })
+    }
+
+    /// Has a robot draw from another stream from a tick on. Without effect on a robot that is not of the roster.
+    pub fn reseed(&mut self, name: &RobotName, reseed: StreamReseed) {
+        if let Some(index) = self.index(name) {
+            self.runners[index].reseed(reseed);
         }
     }
 

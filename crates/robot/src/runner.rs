@@ -6,7 +6,7 @@ use std::sync::Arc;
 use lockstep::{Begin, Sent, Turn};
 use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::messages::{
-    CommandText, Panel, Point, PublicState, Report, TickUpdate, Velocity, Welcome,
+    CommandText, Panel, Point, PublicState, Report, StreamReseed, TickUpdate, Velocity, Welcome,
 };
 use protocol::random::{Stream, stream};
 use protocol::{FieldError, Message, Tick, encode};
@@ -65,6 +65,24 @@ impl Runner {
             left_out: LeftOut::default(),
             gave_up: None,
         }
+    }
+
+    /// A copy that goes on as this one does; `None` if the robot cannot be copied.
+    pub(crate) fn snapshot(&self) -> Option<Self> {
+        Some(Self {
+            robot: self.robot.snapshot()?,
+            welcome: self.welcome.clone(),
+            random: self.random.clone(),
+            proposal: self.proposal,
+            outbox: self.outbox.clone(),
+            left_out: self.left_out,
+            gave_up: self.gave_up.clone(),
+        })
+    }
+
+    /// Has the robot draw from another stream from a tick on, as if its welcome had said so.
+    pub(crate) fn reseed(&mut self, reseed: StreamReseed) {
+        Arc::make_mut(&mut self.welcome).reseeds.push(reseed);
     }
 
     /// What it was told when it joined.
@@ -169,6 +187,7 @@ impl Runner {
         if turn.begin == Begin::Init {
             self.proposal = self.welcome.location;
         }
+        let is_reseeded = self.take_reseeds(turn.tick);
         let told = news.correction.map(|correction| correction.location);
         let told = told.or(news.pose.map(|pose| pose.location));
         let location = told.unwrap_or(self.proposal);
@@ -205,6 +224,9 @@ impl Runner {
         {
             self.robot.resume(&mut cars, &last.state_variables);
         }
+        if turn.begin == Begin::GoOn && is_reseeded {
+            self.robot.reseed(&mut cars);
+        }
         let mut action = Action::default();
         if cars.gave_up.is_none() {
             action = self.robot.tick(&mut cars);
@@ -223,6 +245,25 @@ impl Runner {
             log.push(format!("warning: {warning}"));
         }
         Ok((location, action))
+    }
+
+    /// Draws from the last of the streams that are due. Returns whether one is.
+    fn take_reseeds(&mut self, tick: Tick) -> bool {
+        let due = self
+            .welcome
+            .reseeds
+            .partition_point(|reseed| reseed.tick <= tick);
+        if due == 0 {
+            return false;
+        }
+
+        let welcome = Arc::make_mut(&mut self.welcome);
+        let last = welcome.reseeds.drain(..due).next_back();
+        if let Some(reseed) = last {
+            welcome.seed = reseed.seed;
+            self.random = stream(welcome.seed, &welcome.stream);
+        }
+        true
     }
 
     /// Makes the report and the public state of an action, once they are fit to be sent.

@@ -71,7 +71,7 @@ struct TaskEntry {
 }
 
 /// A robot that shares tasks.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Bidder {
     parameters: BidderParameters,
     tasks: Vec<KnownSite>,
@@ -114,6 +114,10 @@ impl Robot for Bidder {
 
         let task = self.task.map(|task| self.tasks[task].name.as_str());
         action.variable("task", task.unwrap_or_default())
+    }
+
+    fn snapshot(&self) -> Option<Box<dyn Robot>> {
+        Some(Box::new(self.clone()))
     }
 
     fn is_quick(&self) -> bool {

@@ -16,6 +16,7 @@ use crate::switch::Switch;
 pub(crate) const NEUTRAL: &str = "NEUTRAL";
 
 /// A generator and its switch. Switched off, the generator never runs and stays in its initial state.
+#[derive(Clone)]
 pub(crate) struct SwitchableGenerator<M, B> {
     switch: Switch,
     script: Script,

@@ -21,6 +21,11 @@ impl Jokes {
         Self { chance, until_s }
     }
 
+    /// Draws from another stream, from the next joke on.
+    pub(crate) fn reseed(&mut self, chance: Chance) {
+        self.chance = chance;
+    }
+
     pub(crate) fn advance(&mut self, tick_s: f64) {
         self.until_s -= tick_s;
     }

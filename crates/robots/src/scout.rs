@@ -53,7 +53,7 @@ impl Default for ScoutParameters {
 }
 
 /// A robot that covers a field.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Scout {
     parameters: ScoutParameters,
     /// Where others were when they were heard last, with that time, seconds.
@@ -90,6 +90,10 @@ impl Robot for Scout {
             Action::go(cars, goal, self.parameters.speed * strength).behavior("SPREAD")
         };
         action.variable("neighbors", neighbors.len() as f64)
+    }
+
+    fn snapshot(&self) -> Option<Box<dyn Robot>> {
+        Some(Box::new(self.clone()))
     }
 
     fn is_quick(&self) -> bool {

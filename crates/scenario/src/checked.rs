@@ -14,6 +14,7 @@ use super::guests::GuestRules;
 use super::lateness::Lateness;
 use super::layers::LayerSpec;
 use super::network::Network;
+use super::reseed::Reseed;
 use super::sensing::Sensing;
 use super::sites::{SiteSpec, start_states};
 
@@ -76,6 +77,8 @@ pub struct Scenario {
     pub faults: Vec<Fault>,
     /// Changes during the run, in the order of their ticks.
     pub changes: Vec<Change>,
+    /// Where chance becomes another one, in the order of ticks.
+    pub reseeds: Vec<Reseed>,
     /// What the run is expected to do.
     pub expectations: Vec<Expectation>,
     /// What is measured of the run while it goes on.

@@ -13,6 +13,7 @@ pub mod network;
 mod over_time;
 mod placing;
 mod raw;
+pub mod reseed;
 pub mod roster;
 mod sensing;
 mod setup;
@@ -38,6 +39,7 @@ pub use guests::GuestRules;
 pub use lateness::Lateness;
 pub use layers::{LayerSpec, Peak};
 pub use network::Network;
+pub use reseed::{ChanceKind, Reseed};
 pub use sensing::Sensing;
 pub use sites::{OnConflict, SiteSpec, SiteVariable};
 

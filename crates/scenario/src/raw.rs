@@ -11,6 +11,7 @@ pub(super) mod mood;
 mod network;
 mod numbers;
 mod place;
+mod reseed;
 mod sensing;
 mod site;
 mod solids;
@@ -41,6 +42,7 @@ use layer::LayerTable;
 use network::NetworkTable;
 use numbers::positive;
 use place::StartPlace;
+use reseed::ReseedTable;
 use sensing::SensingTable;
 use site::SiteTable;
 use solids::{Fixed, FloorPlanTable, ObstacleTable, Size, WallTable};
@@ -95,6 +97,8 @@ pub(super) struct ScenarioFile {
     measures: Vec<Spanned<ScenarioMeasure>>,
     end_when: Option<Spanned<TickCondition>>,
     parent: Option<ParentTable>,
+    #[serde(default, rename = "reseed", skip_serializing_if = "Vec::is_empty")]
+    reseeds: Vec<Spanned<ReseedTable>>,
     #[serde(default, rename = "obstacle", skip_serializing_if = "Vec::is_empty")]
     obstacles: Vec<ObstacleTable>,
     #[serde(default, rename = "site", skip_serializing_if = "Vec::is_empty")]
@@ -208,6 +212,9 @@ impl ScenarioFile {
         for change in &self.changes {
             change.get_ref().remark(&mut times);
         }
+        for reseed in &self.reseeds {
+            reseed.get_ref().remark(&mut times);
+        }
         Ok(times.remarks)
     }
 
@@ -259,6 +266,7 @@ impl ScenarioFile {
         let record = record(self.record, source)?;
         let network = network::check(self.network, &robots, tick_s, source)?;
         let faults = fault::check(self.faults, &robots, &lateness, tick_s, settled, source)?;
+        let reseeds = reseed::check(self.reseeds, &robots, tick_s, source)?;
         let setting = RunSetting {
             tick_s,
             ticks,
@@ -296,6 +304,7 @@ impl ScenarioFile {
             network,
             faults,
             changes: Vec::new(),
+            reseeds,
             expectations,
             measures,
             end_when,
@@ -609,6 +618,8 @@ impl From<&checked::Scenario> for ScenarioFile {
         let faults = faults.map(|fault| unplaced(FaultTable::of(fault, tick_s)));
         let changes = scenario.changes.iter();
         let changes = changes.map(|change| unplaced(ChangeTable::of(change, tick_s)));
+        let reseeds = scenario.reseeds.iter();
+        let reseeds = reseeds.map(|reseed| unplaced(ReseedTable::of(reseed, tick_s)));
         let expectations = scenario.expectations.iter().cloned().map(unplaced);
         let obstacles = scenario.obstacles.iter().map(ObstacleTable::of);
         let sites = scenario.sites.iter();
@@ -640,6 +651,7 @@ impl From<&checked::Scenario> for ScenarioFile {
             measures: scenario.measures.iter().cloned().map(unplaced).collect(),
             end_when: scenario.end_when.clone().map(unplaced),
             parent: scenario.parent.as_ref().map(ParentTable::from),
+            reseeds: reseeds.collect(),
             obstacles: obstacles.collect(),
             sites: sites.map(unplaced).collect(),
             layers: layers.collect(),

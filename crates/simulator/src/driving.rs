@@ -8,7 +8,7 @@ use scenario::to_wire;
 use world::World;
 
 /// Robots that propose what does not count.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Driving {
     /// Robots that have been warned.
     warned: BTreeSet<RobotName>,

@@ -19,7 +19,7 @@ const SERVED: &str = "served";
 const MISSED: &str = "missed";
 
 /// What all robots show and count, and the guests' moods.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct GuestState {
     rules: GuestRules,
     guests: Vec<Guest>,

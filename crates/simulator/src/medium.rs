@@ -120,10 +120,34 @@ pub struct NetworkDecisions {
     pub events: Vec<Event>,
 }
 
+/// What the network decides in the next tick whatever it draws: the counterfactual of one event.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ForcedVerdict {
+    /// The sender, or the robot that queries.
+    pub from: RobotName,
+    /// The target.
+    pub to: RobotName,
+    /// What is forced.
+    pub verdict: NetworkVerdict,
+}
+
+/// What the network decides about a message in a tick.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NetworkVerdict {
+    /// The command with this number arrives in the tick, once.
+    Arrives(Seq),
+    /// The command with this number is lost, also if it has been under way.
+    IsLost(Seq),
+    /// The target can be queried.
+    IsAnswered,
+}
+
 /// The network. Commands arrive in the tick after they were sent, unless the scenario delays or loses them.
 #[derive(Debug, Clone)]
 pub struct Medium {
     seed: u64,
+    /// Seed of the streams of links with bursts, which last.
+    burst_seed: u64,
     tick_s: f64,
     network: Network,
     roster: Vec<RobotName>,
@@ -139,6 +163,8 @@ pub struct Medium {
     places: Vec<Point>,
     /// Number of commands sent so far on each link, and of those with texts that the scenario names.
     counts: BTreeMap<Counted, u64>,
+    /// What is decided in the next tick whatever is drawn.
+    forced: Vec<ForcedVerdict>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -188,6 +214,7 @@ impl Medium {
     pub fn new(seed: u64, tick_s: f64, network: Network, roster: Vec<RobotName>) -> Self {
         let mut medium = Self {
             seed,
+            burst_seed: seed,
             tick_s,
             network: Network::default(),
             roster,
@@ -197,6 +224,7 @@ impl Medium {
             cut: BTreeMap::new(),
             places: Vec::new(),
             counts: BTreeMap::new(),
+            forced: Vec::new(),
         };
 
         medium.count_for(&network);
@@ -234,6 +262,21 @@ impl Medium {
         self.network = network;
     }
 
+    /// Draws from other streams from the next decision on: those of `seed`, and of `burst_seed` whether a link is in a burst. Links
+    /// stay as they are.
+    pub fn reseed(&mut self, [seed, burst_seed]: [u64; 2]) {
+        self.seed = seed;
+        self.burst_seed = burst_seed;
+        for ((kind, pair), state) in &mut self.bursts {
+            state.chance = BurstState::chance(burst_seed, *kind, pair);
+        }
+    }
+
+    /// Has something decided in the next tick, whatever is drawn. All is drawn as without it.
+    pub fn force(&mut self, verdict: ForcedVerdict) {
+        self.forced.push(verdict);
+    }
+
     /// Accepts a command that was sent in the last tick.
     pub fn accept(&mut self, command: SentCommand) {
         self.sent.push(command);
@@ -252,6 +295,7 @@ impl Medium {
         }
         self.deliver(tick, &mut decision);
         self.decide_queries(tick, &mut decision);
+        self.forced.clear();
         decision
     }
 
@@ -321,7 +365,7 @@ impl Medium {
 
                 // A link that gets bursts in the middle of a run is good then, and draws from the beginning of its stream: the tick of
                 // the change is in the record, so a run that is executed again does the same.
-                let seed = self.seed;
+                let seed = self.burst_seed;
                 let state = self
                     .bursts
                     .entry((kind, pair.clone()))
@@ -352,8 +396,14 @@ impl Medium {
             return;
         }
 
-        if self.is_named(&command) {
+        let forced = self.forced_verdict(&command);
+        let is_named = self.is_named(&command);
+        if (is_named && forced.is_none()) || forced == Some(NetworkVerdict::IsLost(command.seq)) {
             events.push(command.dropped(Cause::Scripted));
+            return;
+        }
+        if forced.is_some() {
+            self.arrivals.entry(tick).or_default().push((command, 1));
             return;
         }
 
@@ -394,6 +444,20 @@ impl Medium {
         }
         let arrivals = self.arrivals.entry(until).or_default();
         arrivals.push((command, copies));
+    }
+
+    /// What is forced of a command.
+    fn forced_verdict(&self, command: &SentCommand) -> Option<NetworkVerdict> {
+        let mut forced = self.forced.iter();
+        let own = forced.find(|forced| {
+            let is_own = [
+                NetworkVerdict::Arrives(command.seq),
+                NetworkVerdict::IsLost(command.seq),
+            ]
+            .contains(&forced.verdict);
+            is_own && forced.from == command.from && forced.to == command.to
+        });
+        own.map(|forced| forced.verdict)
     }
 
     /// Counts a command; returns whether the scenario names it as lost.
@@ -462,7 +526,13 @@ impl Medium {
         let mut bytes: BTreeMap<RobotName, usize> = BTreeMap::new();
         for (command, copies) in arrivals {
             // A cut also loses the commands that are under way.
-            if self.is_cut(&command.from, &command.to, MessageKind::Commands) {
+            let forced = self.forced_verdict(&command);
+            if forced == Some(NetworkVerdict::IsLost(command.seq)) {
+                decision.events.push(command.dropped(Cause::Scripted));
+                continue;
+            }
+            let is_cut = self.is_cut(&command.from, &command.to, MessageKind::Commands);
+            if is_cut && forced.is_none() {
                 decision.events.push(command.dropped(Cause::Partition));
                 continue;
             }
@@ -513,7 +583,12 @@ impl Medium {
             let pair = (asker.clone(), target.clone());
             let channel = self.channel(MessageKind::Queries, &pair);
             let lost = self.loss(MessageKind::Queries, &channel, &pair, drawn);
-            if lost.is_none() && !answer_is_cut {
+            let is_forced = self.forced.iter().any(|forced| {
+                forced.verdict == NetworkVerdict::IsAnswered
+                    && forced.from == asker
+                    && forced.to == target
+            });
+            if is_forced || (lost.is_none() && !answer_is_cut) {
                 continue;
             }
 
@@ -578,12 +653,17 @@ impl Medium {
 
 impl BurstState {
     /// A link that is good before its first tick.
-    fn good(seed: u64, kind: MessageKind, (from, to): &Pair) -> Self {
-        let kind = kind.name();
+    fn good(seed: u64, kind: MessageKind, pair: &Pair) -> Self {
         Self {
             is_bad: false,
-            chance: stream(seed, &format!("medium/burst/{kind}/{from}/{to}")),
+            chance: Self::chance(seed, kind, pair),
         }
+    }
+
+    /// The stream of a link.
+    fn chance(seed: u64, kind: MessageKind, (from, to): &Pair) -> Stream {
+        let kind = kind.name();
+        stream(seed, &format!("medium/burst/{kind}/{from}/{to}"))
     }
 }
 

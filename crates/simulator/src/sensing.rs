@@ -44,7 +44,7 @@ impl<'a> Viewpoint<'a> {
         };
         Self {
             sensing,
-            seed: scenario.seed,
+            seed: scenario.sensing_seed(tick),
             tick,
             robot,
             at,

@@ -23,10 +23,12 @@ use crate::digest::{Digest, TickDigest};
 use crate::driving::{Driving, pose};
 use crate::guests::GuestState;
 use crate::layers::Layers;
-use crate::medium::{Arrival, Medium, SentCommand};
+use crate::medium::{Arrival, ForcedVerdict, Medium, SentCommand};
 use crate::sensing::{Viewpoint, ranges_m};
 use crate::sites::{SiteOrders, Sites, most_bytes};
-use scenario::{Change, FaultEnd, Lateness, Override, Scenario, to_wire, to_world};
+use scenario::{
+    ChanceKind, Change, FaultEnd, Lateness, Override, Reseed, Scenario, to_wire, to_world,
+};
 
 /// Most bodies in the news of a robot, so that the news fit into a message.
 const MAX_BODIES: usize = 4096;
@@ -74,7 +76,8 @@ impl TickRecord {
     }
 }
 
-/// One epoch of a run.
+/// One epoch of a run. A copy goes on as it does.
+#[derive(Clone)]
 pub struct Simulation {
     scenario: Scenario,
     epoch: Epoch,
@@ -260,6 +263,7 @@ impl Simulation {
         self.now = self.tick + 1;
         self.events = std::mem::take(&mut self.between);
         self.change_scenario();
+        self.reseed_chance();
 
         // Robots move by what they proposed in the tick before, guests by their own stream, and by the faces of that tick.
         self.drive_robots();
@@ -298,6 +302,44 @@ impl Simulation {
         if let Some(network) = network {
             self.medium.set_network(network);
         }
+    }
+
+    /// Chance becomes another one. Robots take their part of it by themselves ([`Welcome::reseeds`]), and sensing asks the scenario.
+    fn reseed_chance(&mut self) {
+        for reseed in &self.scenario.reseeds {
+            if reseed.at != self.now {
+                continue;
+            }
+            if let Some(seeds) = reseed.of_network() {
+                self.medium.reseed(seeds);
+            }
+            if let Some(seed) = reseed.of_guests() {
+                self.world.reseed(stream(seed, "guests"));
+            }
+            self.events.push(Event::Changed {
+                set: reseed.to_string(),
+                by_hand: false,
+            });
+        }
+    }
+
+    /// Has the network decide something in the next tick that has not begun, whatever it draws.
+    pub fn force(&mut self, verdict: ForcedVerdict) {
+        self.medium.force(verdict);
+    }
+
+    /// Has chance be another one from the next tick on that has not begun. Robots of this process must be told by themselves:
+    /// [`Reseed::of_robot`].
+    pub fn reseed(&mut self, seed: u64, of: &[ChanceKind]) -> Reseed {
+        let reseed = Reseed {
+            at: self.now + 1,
+            seed,
+            of: of.to_vec(),
+        };
+        let reseeds = &mut self.scenario.reseeds;
+        let place = reseeds.partition_point(|one| one.at <= reseed.at);
+        reseeds.insert(place, reseed.clone());
+        reseed
     }
 
     /// Has something done to the run from the next tick on that has not begun, as a person wants it.
@@ -1137,7 +1179,7 @@ impl Simulation {
             generation,
             epoch: self.epoch,
             tick: self.tick,
-            seed: self.scenario.seed,
+            seed: self.scenario.stream_seed(name, next_tick),
             stream: self.stream_of(name, generation, open),
             tick_s: self.scenario.tick_s,
             field_m: self.scenario.field_m,
@@ -1150,6 +1192,7 @@ impl Simulation {
             parameters: parameters.clone(),
             earlier_parameters: within_message(earlier),
             later_parameters: within_message(later),
+            reseeds: self.scenario.stream_reseeds(name, next_tick),
             news_flag: 1 << (index % NEWS_FLAGS),
             // With an answer to the open tick the newest state is that one, and others may still query
             // the one before.

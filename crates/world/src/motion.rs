@@ -96,6 +96,11 @@ impl<R: Rng> World<R> {
         })
     }
 
+    /// Has guests draw from another stream from the next tick on. The courses that they are on stay.
+    pub fn reseed(&mut self, rng: R) {
+        self.rng = rng;
+    }
+
     /// Advances the world by one tick, in which no guest reacts to a robot. See [`World::advance_with`].
     ///
     /// # Panics

@@ -12,6 +12,7 @@ mod affect_table;
 mod again;
 mod book;
 mod boundaries;
+mod branch;
 mod built_in;
 mod by_hand;
 mod components;

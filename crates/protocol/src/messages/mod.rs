@@ -49,7 +49,7 @@ pub use static_world::{BodyShape, SensingLimits, StaticWorld};
 pub use step::{
     Clock, Command, CommandText, Correction, Delivery, End, JoinAnswer, JoinRequest, NEWS_FLAGS,
     Parameters, ParametersAnswer, ParametersOffer, Refusal, Report, SensedBody, SensedKind,
-    SensedRobot, TickUpdate, Waiting, Welcome,
+    SensedRobot, StreamReseed, TickUpdate, Waiting, Welcome,
 };
 pub use target::{OTHERS, Target};
 pub use variables::{StateVariables, Variable};

@@ -134,7 +134,7 @@ pub struct Welcome {
     pub epoch: Epoch,
     /// Last tick that was granted in it.
     pub tick: Tick,
-    /// Seed of the epoch.
+    /// Seed of the epoch, or what its stream was last drawn anew from before it joined.
     pub seed: u64,
     /// Name of the random stream that is its own; see [`crate::random`].
     pub stream: String,
@@ -165,6 +165,9 @@ pub struct Welcome {
     /// Its parameters after the changes that the scenario has planned: a robot that refuses one of them does so at once.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub later_parameters: Vec<Parameters>,
+    /// Where its stream is drawn anew in the middle of the epoch, in the order of ticks. Most runs have none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub reseeds: Vec<StreamReseed>,
     /// The flag of [`Clock::news`] that is its own.
     #[serde(default)]
     pub news_flag: u32,
@@ -176,6 +179,15 @@ pub struct Welcome {
     /// the other robots query this state during the open tick.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub state_before: Option<PublicState>,
+}
+
+/// From a tick on, a robot draws from a stream with its own name and another seed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct StreamReseed {
+    /// The first tick with draws from the new stream.
+    pub tick: Tick,
+    /// Seed of the new stream.
+    pub seed: u64,
 }
 
 impl Welcome {

@@ -46,6 +46,7 @@ const JOKES: &[&str] = &[
 ];
 
 /// The waiter.
+#[derive(Clone)]
 pub struct Butler {
     parameters: ButlerParameters,
     emotion: SwitchableGenerator<ButlerMeasures, ButlerBehavior>,
@@ -211,6 +212,14 @@ impl Robot for Butler {
         };
         self.bsg = BehaviorGenerator::new(TABLE, behavior);
         cars.log("is back, and takes over where the last one was lost");
+    }
+
+    fn reseed(&mut self, cars: &mut Cars<'_>) {
+        self.state.reseed(cars.random());
+    }
+
+    fn snapshot(&self) -> Option<Box<dyn Robot>> {
+        Some(Box::new(self.clone()))
     }
 
     fn is_quick(&self) -> bool {

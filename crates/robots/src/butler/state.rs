@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use affect::akr::Appraisal;
 use affect::progress::{ApproachEstimator, RateEstimator};
 use affect::{Feeling, ParameterError, StandardEmotion};
-use robot::{Cars, Point, StateVariables};
+use robot::{Cars, Point, StateVariables, Stream};
 use serde::{Deserialize, Serialize};
 
 use super::checks::ButlerChecks;
@@ -156,6 +156,14 @@ impl ButlerMemory {
         if parameters.recruitment.by.is_on() {
             self.recruiter = Recruiter::new(Chance::split(cars.random()));
         }
+    }
+
+    /// Draws from other random streams from now on. The times that are drawn already stay.
+    pub(super) fn reseed(&mut self, random: &mut Stream) {
+        self.taps = Chance::split(random);
+        self.turns = Chance::split(random);
+        self.jokes.reseed(Chance::split(random));
+        self.recruiter.reseed(Chance::split(random));
     }
 
     /// From now on this is the refiller who is to come.

@@ -43,6 +43,7 @@ const JOKES: &[&str] = &[
 ];
 
 /// The refiller.
+#[derive(Clone)]
 pub struct Leguin {
     parameters: LeguinParameters,
     emotion: SwitchableGenerator<LeguinMeasures, LeguinBehavior>,
@@ -208,6 +209,14 @@ impl Robot for Leguin {
 
     fn parameters_check(&self) -> Option<ParametersCheck> {
         Some(|parameters| Self::new(read_parameters(parameters)?).map(drop))
+    }
+
+    fn reseed(&mut self, cars: &mut Cars<'_>) {
+        self.state.reseed(cars.random());
+    }
+
+    fn snapshot(&self) -> Option<Box<dyn Robot>> {
+        Some(Box::new(self.clone()))
     }
 
     fn is_quick(&self) -> bool {

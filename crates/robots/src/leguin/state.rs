@@ -1,7 +1,7 @@
 //! What Leguin remembers from tick to tick besides emotion and behavior, and what she publishes of it.
 
 use affect::akr::Appraisal;
-use robot::{Cars, Point, StateVariables};
+use robot::{Cars, Point, StateVariables, Stream};
 use serde::{Deserialize, Serialize};
 
 use super::checks::LeguinChecks;
@@ -97,6 +97,12 @@ impl LeguinMemory {
 
         self.turns = Chance::split(cars.random());
         self.jokes = Jokes::new(Chance::split(cars.random()), parameters.joke_mean_s);
+    }
+
+    /// Draws from other random streams from now on. The times that are drawn already stay.
+    pub(super) fn reseed(&mut self, random: &mut Stream) {
+        self.turns = Chance::split(random);
+        self.jokes.reseed(Chance::split(random));
     }
 
     /// Advances the timers by one tick that she spent in this behavior.

@@ -128,6 +128,11 @@ impl Recruiter {
         }
     }
 
+    /// Draws from another stream from now on.
+    pub fn reseed(&mut self, chance: Chance) {
+        self.chance = chance;
+    }
+
     /// What has happened so far.
     #[must_use]
     pub fn counts(&self) -> RecruitingCounts {

@@ -380,6 +380,7 @@ pub(crate) fn welcome(
         known_sites: Vec::new(),
         parameters,
         earlier_parameters: Vec::new(),
+        reseeds: Vec::new(),
         later_parameters: Vec::new(),
         news_flag: news_flag(robot, roster),
         last_state: None,
