@@ -237,6 +237,22 @@ enum ByHand {
         /// Its target.
         to: RobotName,
     },
+    /// Delay the next command from one robot to another.
+    Delay {
+        /// Its sender.
+        from: RobotName,
+        /// Its target.
+        to: RobotName,
+        /// How much later it arrives, simulated time, for example "5 s"; at most 1000 ticks.
+        by: Time,
+    },
+    /// Have the next command from one robot to another arrive twice.
+    Duplicate {
+        /// Its sender.
+        from: RobotName,
+        /// Its target.
+        to: RobotName,
+    },
     /// Kill the process of a robot.
     Crash(FaultArgs),
     /// Stop the process of a robot.
@@ -342,6 +358,12 @@ impl From<ByHand> for Intervention {
             ByHand::Cut { from, to, one_way } => Self::Cut { from, to, one_way },
             ByHand::Heal { from, to, one_way } => Self::Heal { from, to, one_way },
             ByHand::Lose { from, to } => Self::Lose { from, to },
+            ByHand::Delay { from, to, by } => Self::Delay {
+                from,
+                to,
+                by_s: by.0,
+            },
+            ByHand::Duplicate { from, to } => Self::Duplicate { from, to },
             ByHand::Crash(fault) => fault.intervention(FaultKind::Crash),
             ByHand::Hang(fault) => fault.intervention(FaultKind::Hang),
             ByHand::Restart { robot } => Self::Fault {

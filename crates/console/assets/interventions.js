@@ -22,6 +22,8 @@ const HEAL = "Heal";
 const OF_NOW = "Only the present can be changed.";
 /** Most effects that are listed one by one. */
 const MOST_EFFECTS = 12;
+/** By how much the next command is delayed, seconds. */
+const DELAY_S = 5;
 
 export class Interventions {
   /**
@@ -207,6 +209,10 @@ export class Interventions {
           @click=${() => this.do({ intervention: "heal", from, to, one_way: this.isOneWay })}>Heal</button>
         <button type="button" data-testid="do-lose" ?disabled=${!isLink} title="of the commands from the one robot to the other"
           @click=${() => this.do({ intervention: "lose", from: from[0], to: to[0] })}>Lose the next command</button>
+        <button type="button" data-testid="do-delay" ?disabled=${!isLink} title="the next command from the one robot to the other arrives this much later"
+          @click=${() => this.do({ intervention: "delay", from: from[0], to: to[0], by_s: DELAY_S })}>Delay it by ${DELAY_S} s</button>
+        <button type="button" data-testid="do-duplicate" ?disabled=${!isLink} title="the next command from the one robot to the other arrives twice"
+          @click=${() => this.do({ intervention: "duplicate", from: from[0], to: to[0] })}>Double it</button>
       </div>`;
   }
 

@@ -349,8 +349,16 @@ fn event_cells(event: &Event) -> Vec<Column<'_>> {
             cells.push(("payload_bytes", bytes.into()));
             cells
         }
-        Event::CommandDelivered { from, to, seq } | Event::CommandDuplicated { from, to, seq } => {
-            message_cells(from, to, Some(*seq))
+        Event::CommandDelivered { from, to, seq } => message_cells(from, to, Some(*seq)),
+        Event::CommandDuplicated {
+            from,
+            to,
+            seq,
+            because,
+        } => {
+            let mut cells = message_cells(from, to, Some(*seq));
+            cells.extend(because.map(|because| ("because", json_name(&because))));
+            cells
         }
         Event::CommandDropped {
             from,
@@ -367,9 +375,11 @@ fn event_cells(event: &Event) -> Vec<Column<'_>> {
             to,
             seq,
             until,
+            because,
         } => {
             let mut cells = message_cells(from, to, Some(*seq));
             cells.push(("until_tick", (*until).into()));
+            cells.extend(because.map(|because| ("because", json_name(&because))));
             cells
         }
         Event::QueryLost { from, to, because } => {

@@ -68,6 +68,7 @@ fn delayed(seq: u64, until: Tick) -> Event {
         to: name("Leguin"),
         seq,
         until,
+        because: None,
     }
 }
 
@@ -76,6 +77,7 @@ fn doubled(seq: u64) -> Event {
         from: name("Butler"),
         to: name("Leguin"),
         seq,
+        because: None,
     }
 }
 

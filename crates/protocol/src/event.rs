@@ -147,6 +147,9 @@ pub enum Event {
         seq: Seq,
         /// Tick at which it will arrive.
         until: Tick,
+        /// `Scripted` if the scenario names this command; none by chance.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        because: Option<Cause>,
     },
     /// The medium doubled a command: it arrives twice in the same tick.
     CommandDuplicated {
@@ -156,6 +159,9 @@ pub enum Event {
         to: RobotName,
         /// Its number among the sender's.
         seq: Seq,
+        /// `Scripted` if the scenario names this command; none by chance.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        because: Option<Cause>,
     },
     /// The medium lost what a robot might ask another one in this tick, by chance; cuts are told when they change.
     QueryLost {
@@ -345,7 +351,7 @@ impl std::fmt::Display for Blocker {
     }
 }
 
-/// Why the medium lost a message.
+/// Why the medium lost a message, delayed or doubled it.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
 )]
@@ -365,7 +371,7 @@ pub enum Cause {
     Overflow,
     /// No robot of the roster has the name of the target.
     Unknown,
-    /// The scenario names this command as lost.
+    /// The scenario names this command.
     Scripted,
 }
 
@@ -382,6 +388,11 @@ impl std::fmt::Display for Cause {
             Self::Scripted => "as the scenario has it",
         })
     }
+}
+
+/// A cause at the end of a sentence; nothing for chance.
+fn reason(because: Option<Cause>) -> String {
+    because.map_or_else(String::new, |because| format!(", {because}"))
 }
 
 impl Line {
@@ -574,15 +585,24 @@ impl Event {
                 to,
                 seq,
                 until,
+                because,
             } => says(
                 to,
                 LogKind::Command,
-                format!("command {seq} of {from} is held back until tick {until}"),
+                format!(
+                    "command {seq} of {from} is held back until tick {until}{}",
+                    reason(*because)
+                ),
             ),
-            Self::CommandDuplicated { from, to, seq } => says(
+            Self::CommandDuplicated {
+                from,
+                to,
+                seq,
+                because,
+            } => says(
                 to,
                 LogKind::Command,
-                format!("command {seq} of {from} comes twice"),
+                format!("command {seq} of {from} comes twice{}", reason(*because)),
             ),
             Self::LinkCut {
                 from,

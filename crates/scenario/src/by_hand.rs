@@ -9,7 +9,7 @@ use protocol::{RobotName, Tick};
 use super::change::Change;
 use super::checked::Scenario;
 use super::fault::{Fault, FaultEnd};
-use super::network::{Counted, LostCommand, Network, Partition};
+use super::network::{Counted, NamedCommand, NamedFate, Network, Partition, ticks};
 use super::raw;
 use super::raw::change::MAX_CHANGES;
 use super::raw::words;
@@ -37,7 +37,14 @@ impl Scenario {
                 words::partitions(&self.with_healed(from, to, *one_way, at)?, self.tick_s)?
             }
             Intervention::Lose { from, to } => {
-                words::lost(&self.with_lost(from, to, at, sent), self.tick_s)?
+                self.words_of_next(NamedFate::Lost, from, to, at, sent)?
+            }
+            Intervention::Delay { from, to, by_s } => {
+                let fate = NamedFate::Late(ticks(*by_s, self.tick_s));
+                self.words_of_next(fate, from, to, at, sent)?
+            }
+            Intervention::Duplicate { from, to } => {
+                self.words_of_next(NamedFate::Doubled, from, to, at, sent)?
             }
             Intervention::Fault { robot, kind, for_s } => {
                 let faults = self.with_fault(robot, *kind, *for_s, at)?;
@@ -206,33 +213,41 @@ impl Scenario {
         links
     }
 
-    fn with_lost(
+    /// The words that give the next command on a link this fate: the first one that does not have it already, and is not lost.
+    fn words_of_next(
         &self,
+        fate: NamedFate,
         from: &RobotName,
         to: &RobotName,
         at: Tick,
         sent: impl Fn(&Counted) -> u64,
-    ) -> Network {
+    ) -> Result<Override, String> {
         let mut network = self.network_from(at);
         network
-            .lost
-            .retain(|lost| lost.number > sent(&lost.counted));
+            .named
+            .retain(|named| named.number > sent(&named.counted));
 
         let counted = Counted {
             from: from.clone(),
             to: to.clone(),
             text: None,
         };
+        let is_taken = |number: u64| {
+            network.named.iter().any(|named| {
+                let has_fate = named.fate == NamedFate::Lost || is_same_kind(named.fate, fate);
+                has_fate && named.counted == counted && named.number == number
+            })
+        };
         let mut number = sent(&counted) + 1;
-        while network
-            .lost
-            .iter()
-            .any(|lost| lost.counted == counted && lost.number == number)
-        {
+        while is_taken(number) {
             number += 1;
         }
-        network.lost.push(LostCommand { counted, number });
-        network
+        network.named.push(NamedCommand {
+            counted,
+            number,
+            fate,
+        });
+        words::named(&network, fate, self.tick_s)
     }
 
     /// The network of a tick, without partitions that are over by then.
@@ -367,6 +382,10 @@ impl Scenario {
             restarted: Vec::new(),
         }
     }
+}
+
+fn is_same_kind(one: NamedFate, other: NamedFate) -> bool {
+    std::mem::discriminant(&one) == std::mem::discriminant(&other)
 }
 
 fn no_fault_holds(robot: &RobotName) -> String {

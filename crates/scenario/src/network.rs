@@ -14,8 +14,8 @@ pub struct Network {
     pub links: Vec<LinkRule>,
     /// Partitions of the network.
     pub partitions: Vec<Partition>,
-    /// Single commands that are lost.
-    pub lost: Vec<LostCommand>,
+    /// Single commands of which the scenario says what becomes of them.
+    pub named: Vec<NamedCommand>,
     /// How far the robots' radios reach; `None` for any distance.
     pub radio: Option<Radio>,
 }
@@ -27,14 +27,27 @@ pub struct Radio {
     pub range_m: f64,
 }
 
-/// A single command that is lost, whatever chance decides. Commands are counted over the epoch, whatever incarnation of the
-/// sender sent them and whatever became of them.
+/// A single command to which something happens, whatever chance decides. Commands are counted over the epoch, whatever incarnation
+/// of the sender sent them and whatever became of them.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct LostCommand {
+pub struct NamedCommand {
     /// Which commands are counted.
     pub counted: Counted,
-    /// Number of the lost one among them, from 1.
+    /// Number of the named one among them, from 1.
     pub number: u64,
+    /// What happens to it.
+    pub fate: NamedFate,
+}
+
+/// What happens to a command that the scenario names. Of the fates of a command, `Lost` is the strongest, then the longest delay.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NamedFate {
+    /// It is lost.
+    Lost,
+    /// It arrives this much later than without the entry, ticks.
+    Late(Tick),
+    /// It arrives twice.
+    Doubled,
 }
 
 /// A set of commands.
@@ -138,15 +151,6 @@ impl Network {
         let own = own.flatten();
         let mut all = own.chain([&self.commands, &self.queries]);
         all.any(|channel| channel.burst.is_some())
-    }
-
-    /// Longest delay of a command, ticks.
-    #[must_use]
-    pub fn longest_delay(&self, tick_s: f64) -> Tick {
-        let own = self.links.iter().filter_map(|link| link.commands);
-        let all = own.chain([self.commands]);
-        let delays_s = all.filter_map(|channel| Some(channel.delay_s?.max()));
-        ticks(delays_s.fold(0.0, f64::max), tick_s)
     }
 }
 

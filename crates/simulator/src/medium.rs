@@ -12,7 +12,7 @@ use protocol::random::{Stream, stream, unit};
 use protocol::{RobotName, Seq, Tick};
 
 use scenario::Network;
-use scenario::network::{Burst, Channel, Counted, ticks};
+use scenario::network::{Burst, Channel, Counted, NamedFate, ticks};
 
 /// A command that a robot or the operator has sent.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -235,19 +235,17 @@ impl Medium {
     /// Counts from now on the commands with texts that a network names; those on a link are counted anyway. A network that takes
     /// effect in the middle of a run is given at the beginning, because it names commands by their number in the run.
     pub fn count_for(&mut self, network: &Network) {
-        for lost in network
-            .lost
-            .iter()
-            .filter(|lost| lost.counted.text.is_some())
-        {
-            self.counts.entry(lost.counted.clone()).or_default();
+        for named in &network.named {
+            if named.counted.text.is_some() {
+                self.counts.entry(named.counted.clone()).or_default();
+            }
         }
     }
 
     /// Whether all commands among which a network names single ones have been counted from the beginning.
     #[must_use]
     pub fn has_counted_for(&self, network: &Network) -> bool {
-        let mut counted = network.lost.iter().map(|lost| &lost.counted);
+        let mut counted = network.named.iter().map(|named| &named.counted);
         counted.all(|counted| counted.text.is_none() || self.counts.contains_key(counted))
     }
 
@@ -397,8 +395,9 @@ impl Medium {
         }
 
         let forced = self.forced_verdict(&command);
-        let is_named = self.is_named(&command);
-        if (is_named && forced.is_none()) || forced == Some(NetworkVerdict::IsLost(command.seq)) {
+        let named = self.named_fates(&command);
+        let is_lost = named.is_lost && forced.is_none();
+        if is_lost || forced == Some(NetworkVerdict::IsLost(command.seq)) {
             events.push(command.dropped(Cause::Scripted));
             return;
         }
@@ -426,7 +425,7 @@ impl Medium {
             return;
         }
 
-        let late = ticks(delay_s, self.tick_s);
+        let late = ticks(delay_s, self.tick_s) + named.late;
         let until = tick + late;
         if late > 0 {
             events.push(Event::CommandDelayed {
@@ -434,13 +433,19 @@ impl Medium {
                 to: to.clone(),
                 seq,
                 until,
+                because: (named.late > 0).then_some(Cause::Scripted),
             });
         }
 
         let mut copies = 1;
-        if duplication < channel.duplication {
+        if duplication < channel.duplication || named.is_doubled {
             copies = 2;
-            events.push(Event::CommandDuplicated { from, to, seq });
+            events.push(Event::CommandDuplicated {
+                from,
+                to,
+                seq,
+                because: named.is_doubled.then_some(Cause::Scripted),
+            });
         }
         let arrivals = self.arrivals.entry(until).or_default();
         arrivals.push((command, copies));
@@ -460,8 +465,8 @@ impl Medium {
         own.map(|forced| forced.verdict)
     }
 
-    /// Counts a command; returns whether the scenario names it as lost.
-    fn is_named(&mut self, command: &SentCommand) -> bool {
+    /// Counts a command; returns what the scenario says of it by its number.
+    fn named_fates(&mut self, command: &SentCommand) -> NamedFates {
         let on_the_link = Counted {
             from: command.from.clone(),
             to: command.to.clone(),
@@ -474,16 +479,19 @@ impl Medium {
         // All links are counted: a change may name a command by its number later. Of texts only those that are named.
         self.counts.entry(on_the_link.clone()).or_default();
 
-        let mut is_named = false;
+        let mut fates = NamedFates::default();
         for counted in [on_the_link, with_its_text] {
             let Some(count) = self.counts.get_mut(&counted) else {
                 continue;
             };
             *count += 1;
-            let mut lost = self.network.lost.iter();
-            is_named |= lost.any(|lost| lost.counted == counted && lost.number == *count);
+            for named in &self.network.named {
+                if named.number == *count && named.counted == counted {
+                    fates.add(named.fate);
+                }
+            }
         }
-        is_named
+        fates
     }
 
     /// The cause for which a message is lost, if it is. `drawn` is its random number.
@@ -648,6 +656,25 @@ impl Medium {
             });
         }
         cuts
+    }
+}
+
+/// What the scenario says of one command.
+#[derive(Debug, Clone, Copy, Default)]
+struct NamedFates {
+    is_lost: bool,
+    /// Ticks by which it is late; 0 if it is not.
+    late: Tick,
+    is_doubled: bool,
+}
+
+impl NamedFates {
+    fn add(&mut self, fate: NamedFate) {
+        match fate {
+            NamedFate::Lost => self.is_lost = true,
+            NamedFate::Late(ticks) => self.late = self.late.max(ticks),
+            NamedFate::Doubled => self.is_doubled = true,
+        }
     }
 }
 

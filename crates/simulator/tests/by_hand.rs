@@ -136,6 +136,21 @@ fn lose() -> Intervention {
     }
 }
 
+fn delay(by_s: f64) -> Intervention {
+    Intervention::Delay {
+        from: name("A"),
+        to: name("B"),
+        by_s,
+    }
+}
+
+fn duplicate() -> Intervention {
+    Intervention::Duplicate {
+        from: name("A"),
+        to: name("B"),
+    }
+}
+
 fn set(one: &str) -> Intervention {
     Intervention::Set {
         set: vec![one.to_owned()],
@@ -178,7 +193,48 @@ fn everything() -> Vec<(Tick, Intervention)> {
         (8, set("network.commands.loss=1.0")),
         (9, cut(&["C"], &["B"], true)),
         (10, set("network.commands.loss=0.0")),
+        (10, delay(0.5)),
+        (10, duplicate()),
     ]
+}
+
+/// The next command is late or doubled, the one after it if that is so already; a command that is lost is passed over.
+#[test]
+fn the_next_command_is_delayed_or_doubled() {
+    let by_hand = [
+        (5, lose()),
+        (5, delay(1.0)),
+        (5, delay(1.0)),
+        (5, duplicate()),
+    ];
+    let (_, records) = play_by_hand(scenario(""), &by_hand);
+    let mut fates = Vec::new();
+    for record in &records {
+        for event in record.events.iter() {
+            match event {
+                Event::CommandDelayed { seq, until, .. } => {
+                    fates.push((record.tick, "late", *seq, *until));
+                }
+                Event::CommandDuplicated { seq, .. } => {
+                    fates.push((record.tick, "twice", *seq, record.tick));
+                }
+                Event::CommandDropped { seq, .. } => {
+                    fates.push((record.tick, "lost", *seq, record.tick));
+                }
+                _ => {}
+            }
+        }
+    }
+    let seq = fates[0].2;
+    assert_eq!(
+        fates,
+        [
+            (5, "lost", seq, 5),
+            (6, "late", seq + 1, 8),
+            (6, "twice", seq + 1, 6),
+            (7, "late", seq + 2, 9),
+        ]
+    );
 }
 
 #[test]
@@ -417,6 +473,9 @@ fn what_cannot_be_done_changes_nothing_and_says_why() {
             set("network.lose=[{from=\"A\",to=\"B\",number=1,text=\"x\"}]"),
             "leave `text` out",
         ),
+        (delay(0.0), "by 1 to 1000 ticks"),
+        (delay(-1.0), "by 1 to 1000 ticks"),
+        (delay(501.0), "by 1 to 1000 ticks"),
         (
             Intervention::Lose {
                 from: name("A"),

@@ -397,6 +397,85 @@ fn a_named_command_changes_nothing_of_the_fate_of_others() {
     assert_eq!(with_named, by_chance);
 }
 
+/// The decisions of a network in which chance decides, with and without an entry about command 3.
+fn with_and_without(entry: &str) -> [BTreeMap<u64, NetworkDecisions>; 2] {
+    let chance = "network.commands = { loss = 0.2, duplication = 0.2, delay = { min = \"0 s\", mode = \"1 s\", max = \"3 s\" } }";
+    [
+        play(&format!("{chance}\n{entry}"), 200, |_, _| ()),
+        play(chance, 200, |_, _| ()),
+    ]
+}
+
+/// What the network has decided about a command of A.
+fn events_of(decisions: &BTreeMap<u64, NetworkDecisions>, of: u64) -> Vec<Event> {
+    let all = decisions.values().flat_map(|decision| &decision.events);
+    let about = all.filter(|event| match event {
+        Event::CommandDelayed { seq, .. }
+        | Event::CommandDuplicated { seq, .. }
+        | Event::CommandDropped { seq, .. } => *seq == of,
+        _ => false,
+    });
+    about.cloned().collect()
+}
+
+/// Without chance the named command is late by exactly this, or comes twice; all others have the fate that chance gives them.
+#[test]
+fn exactly_the_named_command_is_delayed_or_doubled() {
+    let late = "network.delay = [{ from = 'A', to = 'B', number = 3, by = '2 s' }]";
+    let decisions = play(late, 6, |_, _| ());
+    let arrivals = [(2, 1), (3, 2), (5, 4), (6, 5), (7, 6)];
+    assert_eq!(arrived(&decisions), arrivals, "3 arrives in tick 8");
+    let expected = Event::CommandDelayed {
+        from: name("A"),
+        to: name("B"),
+        seq: 3,
+        until: 8,
+        because: Some(Cause::Scripted),
+    };
+    assert_eq!(events_of(&decisions, 3), [expected]);
+
+    let double = "network.duplicate = [{ from = 'A', to = 'B', number = 3 }]";
+    let decisions = play(double, 4, |_, _| ());
+    assert_eq!(
+        arrived(&decisions),
+        [(2, 1), (3, 2), (4, 3), (4, 3), (5, 4)]
+    );
+    let expected = Event::CommandDuplicated {
+        from: name("A"),
+        to: name("B"),
+        seq: 3,
+        because: Some(Cause::Scripted),
+    };
+    assert_eq!(events_of(&decisions, 3), [expected]);
+
+    for entry in [late, double] {
+        let [with, without] = with_and_without(entry);
+        for seq in (1..=200).filter(|seq| *seq != 3) {
+            assert_eq!(events_of(&with, seq), events_of(&without, seq), "{seq}");
+        }
+    }
+}
+
+/// A delay of the scenario adds to the one by chance. Loss by chance stays loss, and a command that is named as lost is lost.
+#[test]
+fn fates_of_a_named_command_add_up() {
+    let by_chance = "network.commands.delay = '1 s'\n";
+    let late = "network.delay = [{ from = 'A', to = 'B', number = 3, by = '2 s' }, \
+                { from = 'A', to = 'B', number = 3, by = '3 s', text = 'other' }]";
+    let until = |network: &str| match &events_of(&play(network, 9, |_, _| ()), 3)[..] {
+        [Event::CommandDelayed { until, .. }] => Some(*until),
+        _ => None,
+    };
+    assert_eq!(until(by_chance), Some(6));
+    assert_eq!(until(&format!("{by_chance}{late}")), Some(10));
+    assert_eq!(until(&format!("network.commands.loss = 1.0\n{late}")), None);
+
+    let lose = "network.lose = [{ from = 'A', to = 'B', number = 3 }]";
+    let decisions = play(&format!("{late}\n{lose}"), 9, |_, _| ());
+    assert_eq!(lost(&decisions), [(3, Cause::Scripted)]);
+    assert_eq!(events_of(&decisions, 3).len(), 1);
+}
+
 #[test]
 fn commands_of_a_text_are_counted_on_their_own() {
     let network = "[[network.lose]]\nfrom = 'A'\nto = 'B'\nnumber = 2\ntext = 'hurry'";
@@ -429,6 +508,9 @@ fn a_command_is_counted_from_the_beginning_of_the_run() {
 fn impossible_networks_are_refused_where_they_stand() {
     let partition = |rest: &str| format!("[[network.partition]]\n{rest}");
     let lose = |rest: &str| format!("[[network.lose]]\n{rest}");
+    let late = |by: &str| {
+        format!("[[network.delay]]\nfrom = \"A\"\nto = \"B\"\nnumber = 1\nby = \"{by}\"")
+    };
 
     for (network, reason) in [
         ("network.commands.loss = 1.5".to_owned(), "from 0 to 1"),
@@ -485,6 +567,18 @@ fn impossible_networks_are_refused_where_they_stand() {
             lose("from = \"A\"\nto = \"B\"\nnumber = 0"),
             "counted from 1",
         ),
+        (late("0 s"), "by 1 to 1000 ticks: 0.5 s to 500 s"),
+        (late("0.2 s"), "by 1 to 1000 ticks"),
+        (late("-1 s"), "by 1 to 1000 ticks"),
+        (late("500.5 s"), "by 1 to 1000 ticks"),
+        (
+            "[[network.delay]]\nfrom = \"A\"\nto = \"B\"\nnumber = 1".to_owned(),
+            "missing field `by`",
+        ),
+        (
+            "[[network.duplicate]]\nfrom = \"A\"\nto = \"B\"\nnumber = 0".to_owned(),
+            "counted from 1",
+        ),
     ] {
         let error = parse(&network).unwrap_err().in_words();
         assert!(
@@ -500,7 +594,10 @@ fn the_resolved_file_has_the_same_network() {
                    queries = { loss = 0.1 }\nradio = { range = \"4.5 m\" }\n[[network.link]]\nfrom = \"A\"\nto = \"B\"\ncommands = { loss = 1.0 }\n\
                    [[network.partition]]\ngroups = [[\"A\"], [\"B\", \"C\"]]\nfrom = \"5 s\"\nuntil = \"7 s\"\none_way = true\ncuts = [\"queries\"]\n\
                    [[network.lose]]\nfrom = \"A\"\nto = \"B\"\nnumber = 3\ntext = \"refill\"\n\
-                   [[network.lose]]\nfrom = \"B\"\nto = \"A\"\nnumber = 1\n";
+                   [[network.lose]]\nfrom = \"B\"\nto = \"A\"\nnumber = 1\n\
+                   [[network.delay]]\nfrom = \"A\"\nto = \"B\"\nnumber = 3\nby = \"500 s\"\n\
+                   [[network.delay]]\nfrom = \"A\"\nto = \"C\"\nnumber = 1\nby = \"0.5 s\"\ntext = \"refill\"\n\
+                   [[network.duplicate]]\nfrom = \"B\"\nto = \"C\"\nnumber = 2\n";
     let scenario = parse(network).unwrap();
     let text = scenario.to_toml().unwrap();
     let again = Scenario::parse(

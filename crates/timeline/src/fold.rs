@@ -131,6 +131,7 @@ impl Timeline {
                     sent: tick,
                     until: None,
                     is_doubled: false,
+                    is_named: false,
                     ends: Vec::new(),
                 };
                 // Numbers are unique within an epoch. Should one come again, the command before is
@@ -139,11 +140,21 @@ impl Timeline {
                 before.map(Span::Command).into_iter().collect()
             }
             Event::CommandDelayed {
-                from, seq, until, ..
-            } => self.change_command(from, *seq, |command| command.until = Some(*until)),
-            Event::CommandDuplicated { from, seq, .. } => {
-                self.change_command(from, *seq, |command| command.is_doubled = true)
-            }
+                from,
+                seq,
+                until,
+                because,
+                ..
+            } => self.change_command(from, *seq, |command| {
+                command.until = Some(*until);
+                command.is_named |= because.is_some();
+            }),
+            Event::CommandDuplicated {
+                from, seq, because, ..
+            } => self.change_command(from, *seq, |command| {
+                command.is_doubled = true;
+                command.is_named |= because.is_some();
+            }),
             Event::CommandDelivered { from, seq, .. } => {
                 let end = CommandEnd { tick, lost: None };
                 self.change_command(from, *seq, |command| command.ends.push(end))

@@ -161,6 +161,8 @@ pub struct CommandSpan {
     pub until: Option<Tick>,
     /// Whether the medium doubled it.
     pub is_doubled: bool,
+    /// Whether the scenario names it as one that is held back or doubled.
+    pub is_named: bool,
     /// What became of its copies so far; one that is missing is still under way.
     pub ends: Vec<CommandEnd>,
 }

@@ -221,11 +221,13 @@ fn each_copy_of_a_command_has_its_fate() {
         to: name("B"),
         seq: 3,
         until: 9,
+        because: None,
     };
     let doubled = |seq| Event::CommandDuplicated {
         from: a(),
         to: name("B"),
         seq,
+        because: None,
     };
     let (timeline, over) = folded(&[
         (0, sent(1, "one")),

@@ -43,9 +43,9 @@ struct PartitionEntry {
     until: Option<String>,
 }
 
-/// An entry of `network.lose`.
+/// An entry of `network.lose`, `network.delay` or `network.duplicate`.
 #[derive(Deserialize, PartialEq)]
-struct Loss {
+struct CommandEntry {
     from: String,
     to: String,
     #[serde(flatten)]
@@ -86,10 +86,9 @@ fn known(change: &ChangeSpan, tick_s: f64) -> Option<Vec<String>> {
             let changed = Changed::<PartitionEntry>::read(change, tick_s)?;
             ("partitions", changed.words()?, changed.list.is_empty())
         }
-        "network.lose" => {
-            let changed = Changed::<Loss>::read(change, tick_s)?;
-            ("losses", changed.words(), changed.list.is_empty())
-        }
+        "network.lose" => named("lose", "losses", change, tick_s)?,
+        "network.delay" => named("delay", "delays", change, tick_s)?,
+        "network.duplicate" => named("duplicate", "duplicates", change, tick_s)?,
         _ => return None,
     };
 
@@ -220,14 +219,20 @@ impl Changed<PartitionEntry> {
     }
 }
 
-impl Changed<Loss> {
-    /// The links on which further commands are lost.
-    fn words(&self) -> Vec<String> {
-        let added = self.added();
-        let losing = added.map(|loss| (loss.from.clone(), loss.to.clone()));
-        let losing: BTreeSet<Link> = losing.collect();
-        links("lose", losing).into_iter().collect()
-    }
+/// What a list of single commands does: what it is called, the links of further commands in words, and whether it is empty.
+fn named(
+    verb: &str,
+    what: &'static str,
+    change: &ChangeSpan,
+    tick_s: f64,
+) -> Option<(&'static str, Vec<String>, bool)> {
+    let changed = Changed::<CommandEntry>::read(change, tick_s)?;
+    let added = changed.added();
+    let further: BTreeSet<Link> = added
+        .map(|command| (command.from.clone(), command.to.clone()))
+        .collect();
+    let words = links(verb, further).into_iter().collect();
+    Some((what, words, changed.list.is_empty()))
 }
 
 /// The links between the groups of a partition.
@@ -345,6 +350,12 @@ mod tests {
         assert_eq!(label(21, first, None), "lose Butler → Leguin");
         let second = r#"network.lose=[{ from = "Butler", number = 3, to = "Leguin" }, { from = "Leguin", number = 1, to = "Butler" }]"#;
         assert_eq!(label(22, second, Some(first)), "lose Leguin → Butler");
+        let late = r#"network.delay=[{ by = "5 s", from = "A", number = 3, to = "B" }]"#;
+        assert_eq!(label(21, late, None), "delay A → B");
+        let double = r#"network.duplicate=[{ from = "A", number = 3, to = "B" }]"#;
+        assert_eq!(label(21, double, None), "duplicate A → B");
+        assert_eq!(label(21, double, Some(double)), "duplicates as before");
+        assert_eq!(label(21, "network.delay=[]", None), "no delays");
     }
 
     #[test]

@@ -93,6 +93,9 @@ impl Titles {
         if command.is_doubled {
             title += "; doubled";
         }
+        if command.is_named {
+            title += &format!(", {}", Cause::Scripted);
+        }
         for end in &command.ends {
             let tick = self.tick(end.tick);
             title += &match end.lost {

@@ -151,6 +151,22 @@ pub enum Intervention {
         /// Its target.
         to: RobotName,
     },
+    /// Delays the next command on a link.
+    Delay {
+        /// Its sender.
+        from: RobotName,
+        /// Its target.
+        to: RobotName,
+        /// By how much, simulated seconds.
+        by_s: f64,
+    },
+    /// Has the next command on a link arrive twice.
+    Duplicate {
+        /// Its sender.
+        from: RobotName,
+        /// Its target.
+        to: RobotName,
+    },
     /// Brings a fault upon the process of a robot.
     Fault {
         /// Whose.
@@ -187,7 +203,11 @@ impl Intervention {
                 few(set.len(), "what.set")?;
                 set.iter().try_for_each(|one| short(one, "what.set"))
             }
-            Self::Lose { .. } | Self::Fault { .. } | Self::Recover { .. } => Ok(()),
+            Self::Delay { by_s, .. } => finite(*by_s, "what.by_s"),
+            Self::Lose { .. }
+            | Self::Duplicate { .. }
+            | Self::Fault { .. }
+            | Self::Recover { .. } => Ok(()),
         }
     }
 }

@@ -11,7 +11,7 @@ use world::Triangular;
 
 use super::super::checked::RobotSpec;
 use super::super::network::{
-    Burst, Channel, Counted, LinkRule, LostCommand, Network, Partition, Radio, ticks,
+    Burst, Channel, Counted, LinkRule, NamedCommand, NamedFate, Network, Partition, Radio, ticks,
 };
 use super::numbers::Range;
 use super::times;
@@ -20,7 +20,7 @@ use super::unplaced::unplaced;
 
 /// Longest delay of a command, ticks.
 const MAX_DELAY_TICKS: u64 = 1000;
-/// Most links, partitions and lost commands.
+/// Most links, partitions and commands of each fate.
 const MAX_ENTRIES: usize = 10_000;
 
 #[derive(Debug, Deserialize, Serialize)]
@@ -33,8 +33,12 @@ pub(super) struct NetworkTable {
     links: Vec<Spanned<LinkTable>>,
     #[serde(default, rename = "partition", skip_serializing_if = "Vec::is_empty")]
     partitions: Vec<Spanned<PartitionTable>>,
-    #[serde(default, rename = "lose", skip_serializing_if = "Vec::is_empty")]
-    lost: Vec<LoseTable>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    lose: Vec<CommandTable>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    delay: Vec<DelayTable>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    duplicate: Vec<CommandTable>,
 }
 
 #[derive(Debug, Default, Deserialize, Serialize)]
@@ -86,13 +90,25 @@ struct PartitionTable {
     cuts: Option<Vec<Cuts>>,
 }
 
+/// A command that is lost, or arrives twice.
 #[derive(Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-struct LoseTable {
+struct CommandTable {
     from: Spanned<RobotName>,
     to: Spanned<RobotName>,
     number: Spanned<u64>,
     text: Option<String>,
+}
+
+/// A command that is late.
+#[derive(Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+struct DelayTable {
+    from: Spanned<RobotName>,
+    to: Spanned<RobotName>,
+    number: Spanned<u64>,
+    text: Option<String>,
+    by: Spanned<Time>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
@@ -122,10 +138,18 @@ pub(super) fn check(
 
     let span = Some(raw.span());
     let raw = raw.into_inner();
-    let entries = raw.links.len().max(raw.partitions.len());
-    if entries.max(raw.lost.len()) > MAX_ENTRIES {
-        let text = "more than 10000 links, partitions or lost commands";
-        return Err(FileError::at(source, span, text));
+    let most = [
+        raw.links.len(),
+        raw.partitions.len(),
+        raw.lose.len(),
+        raw.delay.len(),
+        raw.duplicate.len(),
+    ];
+    if most.into_iter().any(|entries| entries > MAX_ENTRIES) {
+        let text = format!(
+            "more than {MAX_ENTRIES} links, partitions, or commands that are lost, delayed or duplicated"
+        );
+        return Err(FileError::at(source, span, &text));
     }
 
     let checker = Checker {
@@ -145,8 +169,16 @@ pub(super) fn check(
     for partition in raw.partitions {
         network.partitions.push(checker.partition(partition)?);
     }
-    for lost in raw.lost {
-        network.lost.push(checker.lost(lost)?);
+    for lost in raw.lose {
+        network.named.push(checker.named(lost, NamedFate::Lost)?);
+    }
+    for late in raw.delay {
+        network.named.push(checker.late(late)?);
+    }
+    for doubled in raw.duplicate {
+        network
+            .named
+            .push(checker.named(doubled, NamedFate::Doubled)?);
     }
     Ok(network)
 }
@@ -174,21 +206,43 @@ impl Checker<'_> {
         })
     }
 
-    fn lost(&self, raw: LoseTable) -> Result<LostCommand, FileError> {
+    fn named(&self, raw: CommandTable, fate: NamedFate) -> Result<NamedCommand, FileError> {
         let number = *raw.number.get_ref();
         if number == 0 {
             let reason = "commands are counted from 1";
             return Err(self.refuse(raw.number.span(), reason));
         }
 
-        Ok(LostCommand {
+        Ok(NamedCommand {
             counted: Counted {
                 from: self.known(raw.from)?,
                 to: self.known(raw.to)?,
                 text: raw.text,
             },
             number,
+            fate,
         })
+    }
+
+    fn late(&self, raw: DelayTable) -> Result<NamedCommand, FileError> {
+        let Time(by_s) = *raw.by.get_ref();
+        let by = ticks(by_s, self.tick_s);
+        if by_s.is_nan() || !(1..=MAX_DELAY_TICKS).contains(&by) {
+            let most_s = MAX_DELAY_TICKS as f64 * self.tick_s;
+            let reason = format!(
+                "a command is delayed by 1 to {MAX_DELAY_TICKS} ticks: {} s to {most_s} s",
+                self.tick_s
+            );
+            return Err(self.refuse(raw.by.span(), &reason));
+        }
+
+        let command = CommandTable {
+            from: raw.from,
+            to: raw.to,
+            number: raw.number,
+            text: raw.text,
+        };
+        self.named(command, NamedFate::Late(by))
     }
 
     fn radio(&self, raw: &RadioTable) -> Result<Radio, FileError> {
@@ -242,7 +296,7 @@ impl Checker<'_> {
         };
 
         if ticks(max.0, self.tick_s) > MAX_DELAY_TICKS {
-            return Err("a delay is at most 1000 ticks".to_owned());
+            return Err(format!("a delay is at most {MAX_DELAY_TICKS} ticks"));
         }
         Triangular::new(min.0, mode.0, max.0).map_err(|error| format!("delay: {error}"))
     }
@@ -334,6 +388,17 @@ impl NetworkTable {
             return None;
         }
 
+        let mut lose = Vec::new();
+        let mut delay = Vec::new();
+        let mut duplicate = Vec::new();
+        for named in &network.named {
+            match named.fate {
+                NamedFate::Lost => lose.push(named.into()),
+                NamedFate::Late(by) => delay.push(DelayTable::of(named, by, tick_s)),
+                NamedFate::Doubled => duplicate.push(named.into()),
+            }
+        }
+
         let links = network.links.iter().map(LinkTable::from);
         let partitions = network.partitions.iter();
         let partitions = partitions.map(|partition| PartitionTable::of(partition, tick_s));
@@ -345,7 +410,9 @@ impl NetworkTable {
             }),
             links: links.map(unplaced).collect(),
             partitions: partitions.map(unplaced).collect(),
-            lost: network.lost.iter().map(LoseTable::from).collect(),
+            lose,
+            delay,
+            duplicate,
         }))
     }
 }
@@ -362,13 +429,31 @@ impl From<&LinkRule> for LinkTable {
     }
 }
 
-impl From<&LostCommand> for LoseTable {
-    fn from(lost: &LostCommand) -> Self {
+impl From<&NamedCommand> for CommandTable {
+    fn from(named: &NamedCommand) -> Self {
         Self {
-            from: unplaced(lost.counted.from.clone()),
-            to: unplaced(lost.counted.to.clone()),
-            number: unplaced(lost.number),
-            text: lost.counted.text.clone(),
+            from: unplaced(named.counted.from.clone()),
+            to: unplaced(named.counted.to.clone()),
+            number: unplaced(named.number),
+            text: named.counted.text.clone(),
+        }
+    }
+}
+
+impl DelayTable {
+    fn of(named: &NamedCommand, by: u64, tick_s: f64) -> Self {
+        let CommandTable {
+            from,
+            to,
+            number,
+            text,
+        } = named.into();
+        Self {
+            from,
+            to,
+            number,
+            text,
+            by: unplaced(Time(by as f64 * tick_s)),
         }
     }
 }

@@ -4,7 +4,7 @@ use config::Override;
 use serde::Serialize;
 
 use super::super::fault::Fault;
-use super::super::network::Network;
+use super::super::network::{NamedFate, Network};
 use super::fault::FaultTable;
 use super::network::NetworkTable;
 
@@ -13,9 +13,14 @@ pub(crate) fn partitions(network: &Network, tick_s: f64) -> Result<Override, Str
     list_of_network(network, tick_s, "partition")
 }
 
-/// Sets all commands that a network loses by their numbers.
-pub(crate) fn lost(network: &Network, tick_s: f64) -> Result<Override, String> {
-    list_of_network(network, tick_s, "lose")
+/// Sets all commands of a network that have such a fate by their numbers.
+pub(crate) fn named(network: &Network, fate: NamedFate, tick_s: f64) -> Result<Override, String> {
+    let list = match fate {
+        NamedFate::Lost => "lose",
+        NamedFate::Late(_) => "delay",
+        NamedFate::Doubled => "duplicate",
+    };
+    list_of_network(network, tick_s, list)
 }
 
 fn list_of_network(network: &Network, tick_s: f64, name: &str) -> Result<Override, String> {

@@ -279,7 +279,11 @@ fn concerns_processes(what: &Intervention) -> bool {
             let mut set = set.iter();
             set.any(|one| one.starts_with("fault") || one.starts_with("robot"))
         }
-        Intervention::Cut { .. } | Intervention::Heal { .. } | Intervention::Lose { .. } => false,
+        Intervention::Cut { .. }
+        | Intervention::Heal { .. }
+        | Intervention::Lose { .. }
+        | Intervention::Delay { .. }
+        | Intervention::Duplicate { .. } => false,
     }
 }
 
