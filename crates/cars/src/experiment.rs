@@ -437,13 +437,22 @@ fn conclude(results: &Results, folder: &Path, is_json: bool) -> Result<ExitCode>
 
 /// Names the expectations of the experiment that runs have not met, and returns the worst verdict.
 fn name_verdicts(results: &Results) -> Verdict {
-    let mut worst = Verdict::NotAsked;
+    let mut worst = Verdict::Unreached;
     for judged in results.judged() {
         let verdict = judged.verdict();
         worst = worst.max(verdict);
+        let unreached = judged.unreached.len();
+        if unreached > 0 {
+            let expectation = judged.expectation;
+            let runs = judged.judged;
+            terminal::note(match runs - unreached {
+                0 => format!("never reached: {expectation}: in none of {runs} runs"),
+                reached => format!("reached: {expectation}: in {reached} of {runs} runs"),
+            });
+        }
 
         let units = match verdict {
-            Verdict::Pass => continue,
+            Verdict::Pass | Verdict::Unreached => continue,
             Verdict::NotAsked => &judged.not_asked,
             Verdict::Undecided => &judged.undecided,
             Verdict::Fail => &judged.failed,

@@ -13,6 +13,7 @@ const STANDINGS = [
   ["fail", { mark: "✗", one: "fails", many: "fail" }],
   ["undecided", { mark: "?", one: "undecided", many: "undecided" }],
   ["open", { mark: "…", one: "open", many: "open" }],
+  ["unreached", { mark: "–", one: "unreached", many: "unreached" }],
   ["not_asked", { mark: "–", one: "not asked", many: "not asked" }],
   ["pass", { mark: "✓", one: "holds", many: "hold" }],
 ];

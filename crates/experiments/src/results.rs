@@ -53,6 +53,8 @@ pub struct ExpectationResult<'a> {
     pub undecided: Vec<usize>,
     /// Numbers of the units in which what it is expected after did not happen.
     pub not_asked: Vec<usize>,
+    /// Numbers of the units in which what is to be reached in some run was not.
+    pub unreached: Vec<usize>,
     /// How many units were judged.
     pub judged: usize,
 }
@@ -69,6 +71,9 @@ impl ExpectationResult<'_> {
         }
         if !self.not_asked.is_empty() && self.not_asked.len() == self.judged {
             return Verdict::NotAsked;
+        }
+        if !self.unreached.is_empty() && self.unreached.len() == self.judged {
+            return Verdict::Unreached;
         }
         Verdict::Pass
     }
@@ -171,6 +176,7 @@ impl Results {
                 failed: Vec::new(),
                 undecided: Vec::new(),
                 not_asked: Vec::new(),
+                unreached: Vec::new(),
                 judged: 0,
             };
             for outcome in &self.outcomes {
@@ -183,6 +189,7 @@ impl Results {
                     verdict if verdict == Verdict::Fail.name() => &mut judged.failed,
                     verdict if verdict == Verdict::Undecided.name() => &mut judged.undecided,
                     verdict if verdict == Verdict::NotAsked.name() => &mut judged.not_asked,
+                    verdict if verdict == Verdict::Unreached.name() => &mut judged.unreached,
                     _ => continue,
                 };
                 units.push(outcome.unit);

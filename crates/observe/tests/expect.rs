@@ -344,6 +344,59 @@ fn a_watch_needs_its_three_parts() {
     assert_eq!(again.expect[0], read(NEVER_UNTIL).unwrap());
 }
 
+/// A goal is reached in the first tick in which its condition holds, and no run fails for it, however it ends.
+#[test]
+fn a_goal_is_reached_or_not_and_never_fails() {
+    let goal = "reach = { event = 'say', text = 'help' }";
+    let mut run = Run::of(goal);
+    run.quiet_until(4);
+    let judgment = run.tick(&[say("help")]).unwrap();
+    assert_eq!(judgment.verdict, Verdict::Pass);
+    assert!(
+        judgment.because.starts_with("tick 4 (2 s): "),
+        "{judgment:?}"
+    );
+
+    let mut missed = Run::of(goal);
+    missed.quiet_until(999);
+    for end in [End::Finished, End::Stopped, End::Aborted] {
+        let judgment = missed.watch.end(end);
+        assert_eq!(judgment.verdict, Verdict::Unreached);
+        assert_eq!(judgment.verdict.exit_status(), 0);
+    }
+
+    // A variable that was never published is named, and the verdict is the same.
+    let mut misspelled = Run::of("reach = { robot = 'A', variable = 'tray', above = 0 }");
+    misspelled.robot("A");
+    misspelled.quiet_until(3);
+    let judgment = misspelled.watch.end(End::Finished);
+    assert_eq!(judgment.verdict, Verdict::Unreached);
+    assert!(judgment.because.contains("tray"), "{judgment:?}");
+    assert!(Verdict::Unreached < Verdict::NotAsked && Verdict::Unreached < Verdict::Pass);
+}
+
+#[test]
+fn a_goal_has_its_condition_alone() {
+    let goal = "reach = { event = 'say', text = 'help' }\n";
+    for (more, why) in [
+        ("within = '5 s'", "`within` belongs to `eventually`"),
+        ("after = { event = 'say' }", "`after` belongs to"),
+        ("unless = { event = 'say' }", "belongs to"),
+        ("until = { event = 'say' }", "belongs to"),
+        ("never = { event = 'say' }", "has one of"),
+        ("always = { robot = 'A', behavior = 'IDLE' }", "has one of"),
+        (
+            "eventually = { event = 'say' }\nwithin = '5 s'",
+            "has one of",
+        ),
+    ] {
+        let error = read(&format!("{goal}{more}")).unwrap_err();
+        assert!(error.contains(why), "{more}: {error}");
+    }
+    let error = read("reach = { event = 'judged' }").unwrap_err();
+    assert!(error.contains("cannot name"), "{error}");
+}
+
 #[test]
 fn without_any_event_that_it_is_expected_after_it_is_not_asked() {
     let mut run = Run::of(AFTER_HEALING);

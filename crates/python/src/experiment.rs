@@ -149,10 +149,17 @@ fn play(
 }
 
 /// The fields of `cars.Verdict`.
-type Judgment = (String, &'static str, Vec<usize>, Vec<usize>, Vec<usize>);
+type Judgment = (
+    String,
+    &'static str,
+    Vec<usize>,
+    Vec<usize>,
+    Vec<usize>,
+    Vec<usize>,
+);
 
 /// What an experiment expects of every run: name, verdict, and the numbers of the units that fail it, of those in which it is
-/// undecided, and of those in which it was not asked.
+/// undecided, of those in which it was not asked, and of those in which it was not reached.
 #[pyfunction]
 pub(crate) fn verdicts(folder: PathBuf) -> PyResult<Vec<Judgment>> {
     let results = Results::load(&folder).map_err(reported)?;
@@ -166,6 +173,7 @@ pub(crate) fn verdicts(folder: PathBuf) -> PyResult<Vec<Judgment>> {
             judged.failed,
             judged.undecided,
             judged.not_asked,
+            judged.unreached,
         ));
     }
     Ok(verdicts)

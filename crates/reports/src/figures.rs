@@ -449,8 +449,9 @@ pub(super) fn verdicts(study: &Study<'_>) -> Option<Figure> {
         return None;
     }
 
-    let mut table =
-        Table::new("Expectation | condition | arm | pass | fail | undecided | not asked");
+    let mut table = Table::new(
+        "Expectation | condition | arm | pass | fail | undecided | not asked | unreached",
+    );
     let columns_title = match study.factors[..] {
         [only] => only,
         _ => "condition",
@@ -474,7 +475,13 @@ pub(super) fn verdicts(study: &Study<'_>) -> Option<Figure> {
             if counts.is_empty() {
                 continue;
             }
-            let verdicts = ["pass", "fail", "undecided", Verdict::NotAsked.name()];
+            let verdicts = [
+                "pass",
+                "fail",
+                "undecided",
+                Verdict::NotAsked.name(),
+                Verdict::Unreached.name(),
+            ];
             let counts = verdicts.map(|verdict| counts.get(verdict).copied().unwrap_or(0));
             let (condition, arm) = place;
             cells[arm][condition] = Some(verdict_cell(counts));
@@ -501,15 +508,16 @@ pub(super) fn verdicts(study: &Study<'_>) -> Option<Figure> {
     });
     let caption = format!(
         "Verdicts about the expectations: runs that pass of those in which it was asked, and how many fail or are undecided \
-         (open), because the run ended first. It is not asked where what it is expected after did not happen. Darker is a larger \
+         (open), because the run ended first. It is not asked where what it is expected after did not happen, and \
+         unreached where what some run should `reach` was not seen. Darker is a larger \
          share of runs that fail.{sentence}"
     );
     Some(Figure::new(panels, caption, Some(table)))
 }
 
 /// How many runs pass of those in which an expectation was asked.
-fn verdict_cell([pass, fail, undecided, _]: [u64; 4]) -> MatrixCell {
-    let asked = pass + fail + undecided;
+fn verdict_cell([pass, fail, undecided, _, unreached]: [u64; 5]) -> MatrixCell {
+    let asked = pass + fail + undecided + unreached;
     MatrixCell {
         share: fail as f64 / asked.max(1) as f64,
         text: match asked {

@@ -43,6 +43,8 @@ pub enum Rule {
         /// How long.
         within: Time,
     },
+    /// The condition holds in some tick of some run: it is a goal of hunts and experiments, and no run fails for it.
+    Reach(TickCondition),
     /// After each event that matches, the condition holds in some tick: in that of the event, or at the latest this time after it.
     After {
         /// Events from each of which on the condition is waited for; one of these patterns matches.
@@ -76,8 +78,8 @@ pub enum ExpectError {
     /// The explanation is too long.
     #[error("`what` has at most {MAX_WHAT_CHARS} characters")]
     What,
-    /// Not exactly one of `never`, `always` and `eventually` is given.
-    #[error("an expectation has one of `never`, `always` and `eventually`")]
+    /// Not exactly one of `never`, `always`, `eventually` and `reach` is given.
+    #[error("an expectation has one of `never`, `always`, `eventually` and `reach`")]
     Rule,
     /// `eventually` without a time.
     #[error("`eventually` needs a time: `within = \"60 s\"`")]
@@ -135,6 +137,8 @@ struct RuleTable {
     after: Option<Patterns>,
     #[serde(skip_serializing_if = "Option::is_none")]
     eventually: Option<TickCondition>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reach: Option<TickCondition>,
     #[serde(skip_serializing_if = "Option::is_none")]
     within: Option<Time>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -224,6 +228,14 @@ impl RuleTable {
             }
         }
 
+        if let Some(condition) = self.reach {
+            let has_other = has_never || has_eventually || self.always.is_some();
+            return match has_other {
+                true => Err(ExpectError::Rule),
+                false => Ok(Rule::Reach(observed(condition)?)),
+            };
+        }
+
         match (self.never, self.always, self.eventually, self.after) {
             (Some(condition), None, None, None) => Ok(Rule::Never(observed(condition)?)),
             (Some(condition), None, None, Some(after)) => Ok(Rule::NeverUntil {
@@ -290,6 +302,7 @@ impl From<Expectation> for RuleTable {
             always: None,
             after: None,
             eventually: None,
+            reach: None,
             within: None,
             unless: None,
             until: None,
@@ -298,6 +311,7 @@ impl From<Expectation> for RuleTable {
         match expectation.rule {
             Rule::Never(condition) => table.never = Some(condition),
             Rule::Always(condition) => table.always = Some(condition),
+            Rule::Reach(condition) => table.reach = Some(condition),
             Rule::Eventually { condition, within } => {
                 table.eventually = Some(condition);
                 table.within = Some(within);
@@ -349,6 +363,12 @@ impl Expectation {
         Ok(())
     }
 
+    /// Whether it is a goal of hunts and experiments, for which no single run fails.
+    #[must_use]
+    pub fn is_goal(&self) -> bool {
+        matches!(self.rule, Rule::Reach(_))
+    }
+
     /// Whether it depends on what robots report and where they are, and not on events, from which the states of sites follow.
     #[must_use]
     pub fn needs_states(&self) -> bool {
@@ -370,8 +390,10 @@ impl Expectation {
     /// Its conditions and its patterns.
     fn parts(&self) -> (Vec<&TickCondition>, Vec<&Pattern>) {
         match &self.rule {
-            Rule::Never(condition) | Rule::Always(condition) => (vec![condition], Vec::new()),
-            Rule::Eventually { condition, .. } => (vec![condition], Vec::new()),
+            Rule::Never(condition)
+            | Rule::Always(condition)
+            | Rule::Reach(condition)
+            | Rule::Eventually { condition, .. } => (vec![condition], Vec::new()),
             Rule::After {
                 trigger,
                 condition,

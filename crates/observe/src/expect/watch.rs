@@ -71,7 +71,7 @@ impl Monitor {
     pub fn new(expectation: &Expectation, setting: &RunSetting) -> Self {
         let rule = expectation.rule.clone();
         let condition = match &rule {
-            Rule::Never(condition) | Rule::Always(condition) => condition,
+            Rule::Never(condition) | Rule::Always(condition) | Rule::Reach(condition) => condition,
             Rule::Eventually { condition, .. }
             | Rule::After { condition, .. }
             | Rule::NeverUntil { condition, .. } => condition,
@@ -120,6 +120,11 @@ impl Monitor {
                 Some(Judgment::new(Verdict::Fail, format!("{here}: {reason}")))
             }
             Rule::Always(_) => self.observe_always(held.is_some()),
+            Rule::Reach(_) => {
+                let reason = held?;
+                let here = self.place(seen.tick);
+                Some(Judgment::new(Verdict::Pass, format!("{here}: {reason}")))
+            }
             Rule::Eventually { within, .. } => {
                 let within = *within;
                 self.observe_eventually(held, within)
@@ -253,6 +258,10 @@ impl Monitor {
             );
             return Judgment::new(Verdict::Undecided, because);
         }
+        if let Rule::Reach(_) = self.rule {
+            let because = self.with_unknown(format!("it was not reached until {here}"));
+            return Judgment::new(Verdict::Unreached, because);
+        }
         if let Rule::Eventually { .. } = self.rule {
             let because = format!("the run ended at {here}, and it had not happened");
             return Judgment::new(Verdict::Undecided, self.with_unknown(because));
@@ -287,7 +296,7 @@ impl Monitor {
                     self.asked
                 )
             }
-            Rule::After { .. } | Rule::Eventually { .. } => format!(
+            Rule::After { .. } | Rule::Eventually { .. } | Rule::Reach(_) => format!(
                 "it happened each time ({}) until {here}, at the latest after {} s",
                 self.met,
                 tick_seconds(self.longest, self.tick_s)

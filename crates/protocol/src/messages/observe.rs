@@ -178,6 +178,8 @@ pub struct HeldProcess {
 )]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
+    /// What should be seen in some run was not seen in this one.
+    Unreached,
     /// What it is expected after did not happen.
     NotAsked,
     /// It has.
@@ -193,6 +195,7 @@ impl Verdict {
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
+            Self::Unreached => "unreached",
             Self::NotAsked => "not_asked",
             Self::Pass => "pass",
             Self::Undecided => "undecided",
@@ -204,7 +207,7 @@ impl Verdict {
     #[must_use]
     pub fn exit_status(self) -> u8 {
         match self {
-            Self::Pass | Self::NotAsked => 0,
+            Self::Pass | Self::NotAsked | Self::Unreached => 0,
             Self::Fail => 1,
             Self::Undecided => 2,
         }

@@ -24,13 +24,16 @@ class Verdict(NamedTuple):
 
     expectation: str
     verdict: str
-    """``pass``, ``fail`` or ``undecided``: that of the worst run; ``not_asked`` if no run was asked."""
+    """``pass``, ``fail`` or ``undecided``: that of the worst run; ``not_asked`` if no run was asked, ``unreached`` if no run
+    reached what some run should."""
     failed: list[int]
     """Numbers of the units that fail it."""
     undecided: list[int]
     """Numbers of the units that ended before it was certain."""
     not_asked: list[int]
     """Numbers of the units in which what it is expected after did not happen."""
+    unreached: list[int]
+    """Numbers of the units in which what some run should ``reach`` was not seen."""
 
 
 class Experiment:

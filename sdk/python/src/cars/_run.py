@@ -40,9 +40,10 @@ class Run:
 
     @property
     def verdict(self) -> str:
-        """``pass``, ``fail`` or ``undecided``: the worst about what the scenario expects; ``not_asked`` if nothing was asked."""
+        """``pass``, ``fail`` or ``undecided``: the worst about what the scenario expects; ``not_asked`` if nothing was asked,
+        ``unreached`` if there is only what some run should reach, and this one did not."""
         verdicts = {judged["verdict"] for judged in self.summary.get("expectations", {}).values()}
-        return next((verdict for verdict in ("fail", "undecided", "pass", "not_asked") if verdict in verdicts), "pass")
+        return next((verdict for verdict in ("fail", "undecided", "pass", "not_asked", "unreached") if verdict in verdicts), "pass")
 
     def frames(self, kind: Optional[str] = None) -> Frames:
         """Its tables as frames, which are those of ``cars export``.

@@ -43,6 +43,17 @@ fn the_exit_status_is_that_of_the_worst_verdict_of_the_experiment() {
         "{notes}"
     );
 
+    // No run fails for a goal, whether it is reached in all, some or none of them.
+    let goals = "[[expect]]\nname = 'flies'\nreach = { robot = 'Butler', behavior = 'FLY' }\n\
+                 [[expect]]\nname = 'works'\nreach = { robot = 'Butler', behavior = 'SERVE' }\n";
+    let (status, notes) = judged(goals);
+    assert_eq!(status, 0, "{notes}");
+    assert!(
+        notes.contains("never reached: flies: in none of 3 runs"),
+        "{notes}"
+    );
+    assert!(!notes.contains("works"), "{notes}");
+
     let fails = "[[expect]]\nname = 'nobody speaks'\nnever = { event = 'command_sent' }\n";
     let (status, notes) = judged(&format!("{undecided}{fails}{passes}"));
     assert_eq!(status, 1, "{notes}");
