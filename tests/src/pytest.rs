@@ -13,9 +13,9 @@ use nix::unistd::Pid;
 
 use crate::{Lab, is_within, objections};
 
-/// How many files are tested at a time. They mostly wait.
+/// How many processes test at a time. They mostly wait.
 const AT_A_TIME: usize = 2;
-/// Longest that the tests of one file may take.
+/// Longest that the tests of one process may take.
 const PATIENCE: Duration = Duration::from_secs(540);
 
 /// Which tests are run.
@@ -36,21 +36,21 @@ impl Choice {
     }
 }
 
-/// Tests the files `test_*.py` of a folder, each by a process of its own and several at a time. `python` is the start of the
-/// command line: a Python that finds what the tests import.
+/// Tests the files `test_*.py` of a folder by several processes at a time. `python` is the start of the command line: a Python that
+/// finds what the tests import.
 ///
 /// # Panics
-/// If a test fails, with what pytest printed about its file.
+/// If a test fails, with what pytest printed.
 pub fn pytest(folder: &Path, choice: Choice, python: impl Fn() -> Command + Sync) {
     let lab = Lab::new();
-    let files = files_of(folder, choice);
+    let groups = groups(files_of(folder, choice), choice);
     let pytest = || {
         let mut python = python();
         python.args(["-m", "pytest", "-m", choice.marks()]);
         python
     };
-    let failed = objections(&files, AT_A_TIME, |file| {
-        let printed = test(lab.out(), file, pytest())?;
+    let failed = objections(&groups, AT_A_TIME, |files| {
+        let printed = test(lab.out(), files, pytest())?;
         test_again(lab.out(), &printed, pytest).then_some(printed)
     });
     assert!(failed.is_empty(), "{}", failed.join("\n"));
@@ -72,6 +72,19 @@ fn files_of(folder: &Path, choice: Choice) -> Vec<PathBuf> {
     // The longest first, so that no long one is left when all others are done.
     tests.sort_by_key(|path| Reverse(path.metadata().unwrap().len()));
     tests
+}
+
+/// The files that one process tests together. Usual tests are short: what they import would take as long in a process for each file.
+fn groups(files: Vec<PathBuf>, choice: Choice) -> Vec<Vec<PathBuf>> {
+    let count = match choice {
+        Choice::Usual => AT_A_TIME.min(files.len()),
+        Choice::Thorough => files.len(),
+    };
+    let mut groups = vec![Vec::new(); count];
+    for (index, file) in files.into_iter().enumerate() {
+        groups[index % count].push(file);
+    }
+    groups
 }
 
 fn has_tests(file: &Path, choice: Choice) -> bool {
@@ -99,7 +112,7 @@ fn test_again(out: &Path, printed: &str, pytest: impl Fn() -> Command) -> bool {
 
     let mut names = String::new();
     for id in failed {
-        if test(out, Path::new(id), pytest()).is_some() {
+        if test(out, &[PathBuf::from(id)], pytest()).is_some() {
             return true;
         }
         names.push_str(id);
@@ -114,17 +127,17 @@ fn test_again(out: &Path, printed: &str, pytest: impl Fn() -> Command) -> bool {
     false
 }
 
-/// Tests one file, or one test of it, in a process group of its own, so that nothing that it starts outlives it. Returns what
+/// Tests files, or single tests of them, in a process group of its own, so that nothing that they start outlives it. Returns what
 /// pytest printed and how it ended, if a test fails.
-fn test(out: &Path, file: &Path, mut python: Command) -> Option<String> {
-    let name = file.file_stem().unwrap().to_string_lossy();
+fn test(out: &Path, files: &[PathBuf], mut python: Command) -> Option<String> {
+    let name = files[0].file_stem().unwrap().to_string_lossy();
     let printed = out.join(format!("{name}.txt"));
     let output = File::create(&printed).unwrap();
     let mut pytest = python
         .args(["-v", "-ra", "--tb=short"])
         .args(["-p", "no:cacheprovider", "--basetemp"])
         .arg(out.join(&*name))
-        .arg(file)
+        .args(files)
         .stdin(Stdio::null())
         .stdout(output.try_clone().unwrap())
         .stderr(output)

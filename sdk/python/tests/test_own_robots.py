@@ -314,9 +314,11 @@ def test_a_robot_that_keeps_something_over_init_gets_fresh_processes(place: Plac
 @pytest.mark.parametrize(
     ("how", "reason"),
     [
-        ("kill", "signal 9|SIGKILL|killed"),
-        ("stop", "no tick for 3 s after tick 3: Boss is gone"),
-        ("sleep", "no tick for 3 s after tick 3: Boss is there but has not reported"),
+        pytest.param("kill", "signal 9|SIGKILL|killed", marks=pytest.mark.thorough),
+        pytest.param("stop", "no tick for 3 s after tick 3: Boss is gone", marks=pytest.mark.thorough),
+        pytest.param(
+            "sleep", "no tick for 3 s after tick 3: Boss is there but has not reported", marks=pytest.mark.thorough
+        ),
         ("raise", "no way out"),
     ],
 )

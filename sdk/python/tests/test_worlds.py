@@ -54,7 +54,9 @@ def test_programs_in_python_give_the_same_run(lab: Lab, world: str, names: str, 
     assert_same(lab.events("python"), lab.events("rust"))
 
 
-@pytest.mark.parametrize(("world", "names", "kind", "_"), WORLDS)
+@pytest.mark.parametrize(
+    ("world", "names", "kind", "_"), [WORLDS[0], pytest.param(*WORLDS[1], marks=pytest.mark.thorough)]
+)
 def test_an_experiment_takes_robots_in_python(
     tmp_path: Path, world: str, names: str, kind: type[Robot], _: object
 ) -> None:
