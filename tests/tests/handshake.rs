@@ -353,6 +353,7 @@ fn an_attempt_to_connect_that_ends_when_the_last_message_arrives_leaves_no_dead_
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn a_client_that_is_late_by_a_little_leaves_no_dead_session() {
     // The client's own limit is out of the way.
     let patient = "#handshake_ms=10000";
