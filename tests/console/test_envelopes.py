@@ -7,6 +7,8 @@ import pytest
 from envelopes import SAMPLE, WATCH, agree, shown_by
 from lab import eventually, newest, scrub, start_console, until
 
+pytestmark = pytest.mark.thorough
+
 
 @pytest.mark.parametrize("speed", [1, 5, "max"])
 @pytest.mark.parametrize("network", ["", 'network.commands={ delay="3 s" }', "network.commands={ loss=0.5 }"])

@@ -126,7 +126,7 @@ def is_still(run):
     return status if status and status["phase"] in ("ready", "paused", "ended") else None
 
 
-@pytest.mark.parametrize("speed", [20, "max"])
+@pytest.mark.parametrize("speed", [20, pytest.param("max", marks=pytest.mark.thorough)])
 def test_all_views_agree_at_every_stop_and_seek(launch, open_page, processes, speed):
     compare(launch, open_page, processes, seed=7, speed=speed, duration_s=200, stops=6, seeks=30)
 

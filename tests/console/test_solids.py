@@ -9,6 +9,8 @@ from playwright.sync_api import expect
 
 from lab import Launch, download, eventually, scrub, start_console, until
 
+pytestmark = pytest.mark.thorough
+
 RAYS = 24
 FIELD_OF_VIEW = 120
 
