@@ -344,7 +344,7 @@ impl TrialNotes {
                 let failed = self.played.failed.entry(expectation);
                 failed.or_insert(FailedExpectation { tick, because });
             }
-            Verdict::Pass | Verdict::Undecided => {}
+            Verdict::Pass | Verdict::Undecided | Verdict::Unreached => {}
         }
     }
 
