@@ -32,6 +32,7 @@ mod siblings;
 mod submit;
 mod table;
 mod verify;
+mod why;
 
 use std::process::ExitCode;
 
@@ -63,7 +64,8 @@ Compare:
   verify       Execute a recorded run again, and compare it tick by tick
   diff         Compare two recorded runs
   expect       Judge a recorded run by expectations
-  fork         Execute a recorded run up to a tick, and go on with changes
+  fork         Execute a recorded run up to a tick, and go on with changes, or with other chance
+  why          Find what decided a recorded run: where its outcome became likely, and by which event
 
 Control a run in progress:
   ctl          Start, pause, step, stop, set, cut, crash, query, command, and more
@@ -131,6 +133,10 @@ enum Subcommands {
     Expect(expect::ExpectArgs),
     /// Execute a recorded run again up to a tick, and let it go on with changes: `cars fork latest@240 --set …`.
     Fork(fork::ForkArgs),
+    /// Find what decided a recorded run: the probability of its outcome after each tick, and the events at which it jumps.
+    ///
+    /// It is computed from forks with other chance, and each cause is confirmed by forks without it.
+    Why(why::WhyArgs),
     /// Show a recorded run to consoles and other observers as if it were in progress: start, pause, step, seek, speed.
     Replay(replay::ReplayArgs),
     /// Control a run in progress, or a replay: init, start, pause, step, stop, speed, status; query and command its robots.
@@ -198,6 +204,7 @@ fn dispatch(subcommand: Subcommands) -> Result<ExitCode> {
         Subcommands::Diff(args) => verify::diff(&args),
         Subcommands::Expect(args) => expect::expect(&args),
         Subcommands::Fork(args) => fork::fork(args),
+        Subcommands::Why(args) => why::why(&args),
         Subcommands::Replay(args) => replay::replay(&args),
         Subcommands::Ctl(args) => control::ctl(args),
         Subcommands::Log(args) => control::log(&args),

@@ -1,7 +1,8 @@
 //! Work with many runs. An experiment is one scenario in several arms under several conditions over many seeds: a file
 //! ([`Experiment::load`]), of which some ship with the project. It is planned ([`Plan`]) into units, which are played on one
 //! machine or on many ([`engine`], [`submit`]) and kept in a folder ([`Store`]), whose results are read from there
-//! ([`Results`]). A hunt ([`mod@hunt`]) draws faults until an expectation fails. Commands that can be typed are written by
+//! ([`Results`]). A hunt ([`mod@hunt`]) draws faults until an expectation fails, and
+//! [`mod@why`] finds what decided a run. Commands that can be typed are written by
 //! [`shell`].
 
 mod case;
@@ -27,6 +28,7 @@ mod store;
 pub mod submit;
 mod unheard;
 mod unit;
+pub mod why;
 
 pub use observe::Measure;
 

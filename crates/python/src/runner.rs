@@ -159,6 +159,12 @@ impl Robot for PythonRobot {
         });
     }
 
+    fn reseed(&mut self, cars: &mut robot::Cars<'_>) {
+        self.call(cars, |object, cars| {
+            object.call_method1("reseed", (cars,)).map(drop)
+        });
+    }
+
     fn senses_bodies(&self) -> bool {
         self.senses_bodies
     }

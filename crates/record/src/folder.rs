@@ -14,7 +14,7 @@ use protocol::{Epoch, Event, Line, RunName};
 use scenario::Scenario;
 use scenario::files::{
     ENDPOINT, EVENTS, LATEST, LAUNCHED, LINKS, LOCK, LOG, LOGS, OPERATOR_CONFIG, RECORDING,
-    SCENARIO, SUMMARY, check_log_name,
+    SCENARIO, SUMMARY, WHY, check_log_name,
 };
 
 use crate::error::RecordError;
@@ -39,6 +39,10 @@ pub const DRAFT: &str = ".draft";
 const NEW: &str = ".new";
 /// Files that every epoch has.
 const PER_EPOCH: [&str; 3] = [SCENARIO, EVENTS, RECORDING];
+/// Folders in the folder of a run.
+const FOLDERS: [&str; 2] = [LOGS, WHY];
+/// How the names of the files of answers end.
+const ANSWER_ENDINGS: [&str; 2] = [".json", ".jsonl"];
 /// How the names of the logs of processes end.
 const LOG_ENDING: &str = ".log";
 /// Name of the file in which the console keeps its address and its token, among the logs.
@@ -336,9 +340,9 @@ impl RunFolder {
             _ => {}
         }
 
-        for folder in [moved.join(LOGS), moved.clone()] {
+        for folder in [moved.join(LOGS), moved.join(WHY), moved.clone()] {
             let Ok(entries) = std::fs::read_dir(&folder) else {
-                continue; // A run without logs of processes.
+                continue; // A run without logs of processes, or without answers.
             };
             for entry in entries {
                 let file = entry?.path();
@@ -398,10 +402,12 @@ impl RunFolder {
         Err(RecordError::folder(format!("{place} is not a folder")))
     }
 
-    /// Checks that no entry of the folder, and of that with the logs, is a link: what is written to one would be written elsewhere.
+    /// Checks that no entry of the folder, and of those in it, is a link: what is written to one would be written elsewhere.
     fn check_links(&self) -> Result<(), RecordError> {
         check_no_links(&self.path)?;
-        check_no_links(&self.file(LOGS))
+        FOLDERS
+            .iter()
+            .try_for_each(|folder| check_no_links(&self.file(folder)))
     }
 
     /// Makes the folder of the logs and writes the scenario: from then on it is the folder of a run.
@@ -490,6 +496,7 @@ impl RunFolder {
             }
         }
         files.extend(self.logs_of_processes());
+        files.extend(self.answers());
         files.push(self.file(SCENARIO));
         files
     }
@@ -502,7 +509,8 @@ impl RunFolder {
         self.clear()?;
         remove_if_there(&self.file(LOCK)).map_err(|error| self.failed("remove", &error))?;
 
-        for folder in [&self.file(LOGS), &self.path] {
+        let [logs, why] = FOLDERS.map(|folder| self.file(folder));
+        for folder in [&logs, &why, &self.path] {
             match std::fs::remove_dir(folder) {
                 Err(error)
                     if !matches!(
@@ -540,6 +548,18 @@ impl RunFolder {
             }
         }
         logs
+    }
+
+    /// The answers that were made of the run.
+    fn answers(&self) -> Vec<PathBuf> {
+        let entries = std::fs::read_dir(self.file(WHY)).into_iter().flatten();
+        let files = entries.flatten().map(|entry| entry.path());
+        files
+            .filter(|file| {
+                let name = file.file_name().unwrap_or_default().to_string_lossy();
+                ANSWER_ENDINGS.iter().any(|ending| name.ends_with(ending))
+            })
+            .collect()
     }
 
     /// Writes [`SCENARIO`], once for each epoch.

@@ -87,6 +87,30 @@ impl Scenario {
         words::faults(&faults, self.tick_s)
     }
 
+    /// The scenario without one of the partitions that are known in a tick, in its words.
+    ///
+    /// # Errors
+    /// In words, if it cannot be written.
+    pub fn words_without_partition(&self, index: usize, at: Tick) -> Result<Override, String> {
+        let mut network = self.network_at(at).clone();
+        if index < network.partitions.len() {
+            network.partitions.remove(index);
+        }
+        words::partitions(&network, self.tick_s)
+    }
+
+    /// The scenario without one of the faults that are known in a tick, in its words.
+    ///
+    /// # Errors
+    /// In words, if it cannot be written.
+    pub fn words_without_fault(&self, index: usize, at: Tick) -> Result<Override, String> {
+        let mut faults = self.faults_at(at).to_vec();
+        if index < faults.len() {
+            faults.remove(index);
+        }
+        words::faults(&faults, self.tick_s)
+    }
+
     /// A rule for late robots, or for one of them, in the words of the scenario.
     ///
     /// # Errors

@@ -24,6 +24,8 @@ pub const ENDPOINT: &str = "endpoint";
 pub const OPERATOR_CONFIG: &str = "operator_config";
 /// The changes of real links that `cars net play` made.
 pub const LINKS: &str = "links.jsonl";
+/// Folder with the answers of `cars why`, and with the outcomes of forks from which they are made.
+pub const WHY: &str = "why";
 pub use protocol::name::LATEST;
 
 /// Why a name cannot be that of the log.
@@ -67,6 +69,7 @@ fn is_taken(name: &str) -> bool {
         LAUNCHED,
         RECORDING,
         LINKS,
+        WHY,
     ];
     let prefixes = ["scenario", "events", "run-epoch"];
     names.contains(&name) || prefixes.iter().any(|prefix| name.starts_with(prefix))

@@ -6,7 +6,7 @@ use protocol::Message;
 use protocol::messages::{
     End, KnownSite, LayerAction, LayerResult, MAX_TEXT_BYTES, Panel, Parameters, Payload,
     Performative, Point, Pose, PublicState, Rays, SensedLayer, SensedRobot, SensedSite, SiteAction,
-    SiteResult, StateVariables, Variable, Velocity,
+    SiteResult, StateVariables, StreamReseed, Variable, Velocity,
 };
 use protocol::plain::escape_line;
 use protocol::{RobotName, RunName, Tick};
@@ -65,6 +65,8 @@ pub(super) enum ToProgram<'a> {
         roster: &'a [RobotName],
         #[serde(skip_serializing_if = "<[_]>::is_empty")]
         known_sites: &'a [KnownSite],
+        #[serde(skip_serializing_if = "<[_]>::is_empty")]
+        reseeds: &'a [StreamReseed],
         parameters: &'a Parameters,
         sensed: &'a [SensedRobot],
         #[serde(skip_serializing_if = "<[_]>::is_empty")]
@@ -176,6 +178,7 @@ impl<'a> ToProgram<'a> {
             pose,
             roster: &welcome.roster,
             known_sites: &welcome.known_sites,
+            reseeds: &welcome.reseeds,
             parameters: &welcome.parameters,
             sensed,
             sites,

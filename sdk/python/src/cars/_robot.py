@@ -97,6 +97,12 @@ class Robot(ABC):
         Called after :meth:`init`; a robot that does not care starts afresh.
         """
 
+    def reseed(self, cars: Cars) -> None:  # noqa: B027
+        """The run is re-seeded: ``cars.random`` is another stream from this tick on.
+
+        Called before :meth:`tick`. Only a robot that keeps generators of its own, made from ``cars.random``, has to make them anew.
+        """
+
     def panel(self) -> Panel:
         """What the console shows of it (the paper's ``paintComponent``)."""
         return Panel()

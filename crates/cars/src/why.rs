@@ -1,0 +1,206 @@
+//! `cars why`: what decided a recorded run.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::str::FromStr;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use config::units::Time;
+use experiments::why::{ForkEstimate, WhyAnswer, WhyOptions, why as find_out};
+use indicatif::{ProgressBar, ProgressStyle};
+use lab::folder::{find, recorded_epoch, run_name};
+use lab::run::project_robots;
+use protocol::Epoch;
+use protocol::time::time_s;
+use record::names::LATEST;
+use terminal::OutputError;
+
+use crate::errors::Result;
+
+/// Most jumps and causes that are printed.
+const MAX_ROWS: usize = 20;
+/// Set by Ctrl-C: what was played is kept.
+static STOP: AtomicBool = AtomicBool::new(false);
+
+/// `cars why`.
+#[derive(Debug, Args)]
+pub(crate) struct WhyArgs {
+    /// Name or folder of a run; without it the latest run.
+    #[arg(default_value = LATEST)]
+    run: PathBuf,
+    /// The name of an expectation or of a measure of the scenario, a condition such as '{ robot = "Butler", behavior = "INTERCEPT" }',
+    /// or the path of a number of the summary, such as robots.Butler.blocked; without it the expectation that failed first, or else
+    /// the last one.
+    #[arg(value_name = "WHAT")]
+    what: Option<String>,
+    /// Most forks, such as 2000, or the time after which no fork is begun, such as "5 min"; without it as many as the answer needs. The
+    /// same number of forks gives the same answer.
+    #[arg(long, value_name = "FORKS|TIME")]
+    budget: Option<Budget>,
+    /// Number of forks at the same time; without it the number of processors. The answer does not depend on it.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1024))]
+    jobs: Option<u64>,
+    /// The epoch; without it the last one.
+    #[arg(long, value_name = "N")]
+    epoch: Option<Epoch>,
+    /// Where run folders are made.
+    #[arg(long, default_value = "runs", value_name = "DIR")]
+    out: PathBuf,
+    /// Print the answer as JSON, as its file has it.
+    #[arg(long)]
+    json: bool,
+}
+
+/// How much is spent on an answer.
+#[derive(Debug, Clone, Copy)]
+enum Budget {
+    Forks(u64),
+    Time(Duration),
+}
+
+impl FromStr for Budget {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if let Ok(forks) = text.parse() {
+            return Ok(Self::Forks(forks));
+        }
+        let time: Time = text.parse().map_err(|_| {
+            format!("{text:?} is neither a number of forks nor a time such as \"5 min\"")
+        })?;
+        Duration::try_from_secs_f64(time.0)
+            .map(Self::Time)
+            .map_err(|error| error.to_string())
+    }
+}
+
+/// Finds out what decided a run.
+pub(crate) fn why(args: &WhyArgs) -> Result<ExitCode> {
+    let folder = find(&args.out, &args.run)?.resolved()?;
+    let files = recorded_epoch(&folder, args.epoch)?;
+    ctrlc::set_handler(|| STOP.store(true, Ordering::Relaxed))?;
+
+    let jobs = match args.jobs {
+        Some(jobs) => jobs as usize,
+        None => std::thread::available_parallelism().map_or(1, usize::from),
+    };
+    let options = WhyOptions {
+        what: args.what.clone(),
+        forks: match args.budget {
+            Some(Budget::Forks(forks)) => Some(forks),
+            _ => None,
+        },
+        until: match args.budget {
+            Some(Budget::Time(time)) => Instant::now().checked_add(time),
+            _ => None,
+        },
+        jobs,
+        make: project_robots(),
+        stop: &STOP,
+    };
+    let style = ProgressStyle::with_template("{spinner} {msg}, {elapsed}")?;
+    let bar = ProgressBar::new_spinner().with_style(style);
+    let (answer, path) = find_out(
+        &folder,
+        &run_name(&folder),
+        &files,
+        &options,
+        &mut |progress| {
+            bar.set_message(format!(
+                "{} forks asked for, now after tick {}",
+                progress.forks, progress.tick
+            ));
+            bar.tick();
+        },
+    )?;
+    bar.finish_and_clear();
+
+    let printed = if args.json {
+        let json = serde_json::to_string_pretty(&answer)?;
+        terminal::data(format_args!("{json}\n"))
+    } else {
+        let text = in_words(&answer);
+        terminal::print_line(format_args!("{text}\nanswer: {}", path.display()))
+    };
+    OutputError::unless_closed(printed)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The answer for people: a sentence, and a table of what was tried.
+fn in_words(answer: &WhyAnswer) -> String {
+    let mut text = format!("{}\n", answer.sentence);
+
+    let mut rows = Vec::new();
+    for jump in &answer.jumps {
+        let time_s = format!("{} s", time_s(jump.tick, answer.tick_s));
+        rows.push([
+            time_s.clone(),
+            "before".to_owned(),
+            amount(answer, &jump.before),
+        ]);
+        rows.push([
+            time_s.clone(),
+            "after".to_owned(),
+            amount(answer, &jump.after),
+        ]);
+        for tried in &jump.tried {
+            let restores = if tried.restores { " *" } else { "" };
+            let what = format!("without: {}{restores}", tried.what);
+            rows.push([time_s.clone(), what, amount(answer, &tried.without)]);
+        }
+    }
+    for effect in &answer.planned {
+        let time_s = format!("{} s", time_s(effect.tick, answer.tick_s));
+        let matters = if effect.matters { " *" } else { "" };
+        rows.push([
+            time_s,
+            format!("without {}{matters}", effect.what),
+            amount(answer, &effect.without),
+        ]);
+    }
+    rows.truncate(MAX_ROWS);
+    if !rows.is_empty() {
+        let head = ["time", "forks", "outcome"];
+        text += &format!("\n{}\n", terminal::table(head, rows, 1, head.len()));
+    }
+
+    if !answer.kinds.is_empty() {
+        text +=
+            "\nOther chance of one kind alone, from the first tick on, gives another outcome in:\n";
+        for effect in &answer.kinds {
+            text += &format!("  {}: {}\n", effect.kind, percent(&effect.changed));
+        }
+    }
+    text + &format!("\n{} forks\n", answer.forks)
+}
+
+fn amount(answer: &WhyAnswer, estimate: &ForkEstimate) -> String {
+    if answer.is_share {
+        return percent(estimate);
+    }
+    let value = estimate
+        .value
+        .map_or("none".to_owned(), |value| format!("{value:.3}"));
+    match (estimate.low, estimate.high) {
+        (Some(low), Some(high)) => format!("{value} ({low:.3} to {high:.3}), n = {}", estimate.n),
+        _ => format!("{value}, n = {}", estimate.n),
+    }
+}
+
+fn percent(estimate: &ForkEstimate) -> String {
+    let share = |value: f64| format!("{:.0}", value * 100.0);
+    let value = estimate.value.map_or("none".to_owned(), share);
+    match (estimate.low, estimate.high) {
+        (Some(low), Some(high)) => {
+            format!(
+                "{value} % ({} to {}), n = {}",
+                share(low),
+                share(high),
+                estimate.n
+            )
+        }
+        _ => format!("{value} %, n = {}", estimate.n),
+    }
+}

@@ -1,0 +1,17 @@
+//! What decided a run: the probability of its outcome after each tick, from forks that are re-seeded there, and the events at which
+//! that probability jumps. A jump is confirmed by forks in which exactly that event does not happen.
+
+mod answer;
+mod candidates;
+mod forks;
+mod plan;
+mod question;
+mod search;
+mod sentence;
+
+pub use answer::{
+    CurvePoint, ForkEstimate, Jump, JumpCause, KindEffect, PlannedEffect, TriedCause, WhyAnswer,
+};
+pub use forks::{WhyOptions, WhyProgress, why};
+pub use plan::{Counterfactual, ForkPlan};
+pub use question::Question;

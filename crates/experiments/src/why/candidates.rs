@@ -1,0 +1,260 @@
+//! What may have caused a jump in a tick, and what the scenario plans.
+
+use lab::branch::Trunk;
+use protocol::event::{Blocker, Cause};
+use protocol::messages::FaultKind;
+use protocol::{Event, RobotName, Seq, Tick};
+use record::Entry;
+use scenario::{ChanceKind, Scenario};
+
+use super::plan::Counterfactual;
+
+/// Most causes of a tick that are tried.
+const MAX_CANDIDATES: usize = 12;
+/// Most events of a tick that the answer names.
+const MAX_EVENTS: usize = 20;
+/// Most parts of a scenario's plan that are tried.
+const MAX_PLANNED: usize = 10;
+/// Most robots whose chance is tried by itself; that of more is tried together.
+const MAX_ROBOTS: usize = 4;
+/// How far back the text of a command is looked for, ticks.
+const MAX_UNDER_WAY: Tick = 200;
+
+/// The kinds of chance that a run has.
+pub(super) fn kinds(scenario: &Scenario) -> Vec<ChanceKind> {
+    let mut kinds = Vec::new();
+    if has_chance(scenario) {
+        kinds.push(ChanceKind::Network);
+    }
+    if scenario.guests.count > 0 {
+        kinds.push(ChanceKind::Guests);
+    }
+    if scenario.sensing.misses > 0.0 || scenario.sensing.noise_m > 0.0 {
+        kinds.push(ChanceKind::Sensing);
+    }
+    let names: Vec<&str> = if scenario.robots.len() > MAX_ROBOTS {
+        vec!["*"]
+    } else {
+        scenario.robots.keys().map(RobotName::as_str).collect()
+    };
+    kinds.extend(
+        names
+            .iter()
+            .filter_map(|name| format!("robot.{name}").parse().ok()),
+    );
+    kinds
+}
+
+/// Whether the network draws anything that matters, at some time.
+fn has_chance(scenario: &Scenario) -> bool {
+    let later = scenario.changes.iter().map(|change| &change.network);
+    let mut networks = later.chain([&scenario.network]);
+    networks.any(|network| {
+        let links = network.links.iter();
+        let mut channels = links
+            .flat_map(|link| [link.commands, link.queries])
+            .flatten()
+            .chain([network.commands, network.queries]);
+        channels.any(|channel| channel != scenario::network::Channel::default())
+    })
+}
+
+/// The events of a tick in words, those first that say most.
+pub(super) fn events(trunk: &Trunk, tick: Tick) -> Vec<String> {
+    let Some(entry) = trunk.entry(tick) else {
+        return Vec::new();
+    };
+    let mut words = Vec::new();
+    for (what, _) in all(trunk, entry) {
+        words.push(what);
+    }
+    let tick_s = trunk.simulation().scenario().tick_s;
+    for event in &entry.events {
+        // Those are among the causes, with more words.
+        let is_told = matches!(
+            event,
+            Event::CommandDelivered { .. }
+                | Event::CommandDropped { .. }
+                | Event::CommandDelayed { .. }
+                | Event::CommandDuplicated { .. }
+                | Event::QueryLost { .. }
+        );
+        if let (false, Some(line)) = (is_told, event.log_record(1, tick, tick_s)) {
+            words.push(format!("{}: {}", line.source, line.text));
+        }
+    }
+    words.dedup();
+    words.truncate(MAX_EVENTS);
+    words
+}
+
+/// What may have caused a jump in a tick, in words, and what happens without it.
+pub(super) fn candidates(trunk: &Trunk, tick: Tick) -> Vec<(String, Counterfactual)> {
+    let mut found = trunk
+        .entry(tick)
+        .map_or_else(Vec::new, |entry| all(trunk, entry));
+    found.truncate(MAX_CANDIDATES);
+    found
+}
+
+/// All that can be left out of a tick, what is rare first.
+fn all(trunk: &Trunk, entry: &Entry) -> Vec<(String, Counterfactual)> {
+    let mut found: Vec<(u8, String, Counterfactual)> = Vec::new();
+    for event in &entry.events {
+        if let Some((rank, what, instead)) = left_out(trunk, entry.tick, event)
+            && !found.iter().any(|(_, _, other)| *other == instead)
+        {
+            found.push((rank, what, instead));
+        }
+    }
+    found.sort_by_key(|(rank, ..)| *rank);
+    found
+        .into_iter()
+        .map(|(_, what, instead)| (what, instead))
+        .collect()
+}
+
+/// What is without an event, which is named in words, with its rank; `None` for an event that follows from others.
+fn left_out(trunk: &Trunk, tick: Tick, event: &Event) -> Option<(u8, String, Counterfactual)> {
+    let arrives = |from: &RobotName, to: &RobotName, seq: Seq| Counterfactual::Arrives {
+        from: from.clone(),
+        to: to.clone(),
+        seq,
+    };
+    let command = |from, to, seq| named(trunk, tick, from, to, seq);
+    match event {
+        Event::Changed { set, by_hand: true } => Some((
+            0,
+            format!("what was changed by hand: {set}"),
+            Counterfactual::NothingByHand,
+        )),
+        Event::CommandSent {
+            from, to, command, ..
+        } if from.is_operator() => Some((
+            0,
+            format!("the operator's command {command:?} to {to}"),
+            Counterfactual::NothingByHand,
+        )),
+        Event::CommandDropped {
+            from,
+            to,
+            seq,
+            because:
+                Cause::Loss | Cause::Burst | Cause::Partition | Cause::OutOfRange | Cause::Scripted,
+        } => Some((
+            1,
+            format!("{} was lost", command(from, to, *seq)),
+            arrives(from, to, *seq),
+        )),
+        Event::CommandDelayed { from, to, seq, .. } => Some((
+            2,
+            format!("{} was delayed", command(from, to, *seq)),
+            arrives(from, to, *seq),
+        )),
+        Event::CommandDuplicated { from, to, seq } => Some((
+            2,
+            format!("{} came twice", command(from, to, *seq)),
+            arrives(from, to, *seq),
+        )),
+        Event::QueryLost { from, to, .. } => Some((
+            3,
+            format!("{from} could not query {to}"),
+            Counterfactual::IsAnswered {
+                from: from.clone(),
+                to: to.clone(),
+            },
+        )),
+        Event::Blocked {
+            robot,
+            by: Blocker::Guest,
+            ..
+        } => Some((
+            4,
+            format!("a guest blocked {robot}"),
+            Counterfactual::WayIsFree {
+                robot: robot.clone(),
+            },
+        )),
+        Event::CommandDelivered { from, to, seq } if !from.is_operator() => Some((
+            5,
+            format!("{} arrived", command(from, to, *seq)),
+            Counterfactual::IsLost {
+                from: from.clone(),
+                to: to.clone(),
+                seq: *seq,
+            },
+        )),
+        _ => None,
+    }
+}
+
+/// A command in words, with its text.
+fn named(trunk: &Trunk, tick: Tick, by: &RobotName, target: &RobotName, number: Seq) -> String {
+    let first = tick.saturating_sub(MAX_UNDER_WAY);
+    for tick in (first..=tick).rev() {
+        for event in trunk
+            .entry(tick)
+            .into_iter()
+            .flat_map(|entry| &entry.events)
+        {
+            if let Event::CommandSent {
+                from, seq, command, ..
+            } = event
+                && from == by
+                && *seq == number
+            {
+                return format!("command {number} ({command}) from {by} to {target}");
+            }
+        }
+    }
+    format!("command {number} from {by} to {target}")
+}
+
+/// What the scenario plans, in words, and what is without it: partitions, faults, and commands that are lost by their numbers.
+pub(super) fn planned(trunk: &Trunk, scenario: &Scenario) -> Vec<(Tick, String, Counterfactual)> {
+    let last = trunk.last();
+    let mut planned = Vec::new();
+    for (index, partition) in scenario.network.partitions.iter().enumerate() {
+        let known = &scenario.network_at(partition.from).partitions;
+        if (1..=last).contains(&partition.from) && known.get(index) == Some(partition) {
+            let time_s = protocol::time::time_s(partition.from, scenario.tick_s);
+            let what = format!("the partition at {time_s} s");
+            planned.push((partition.from, what, Counterfactual::NoPartition { index }));
+        }
+    }
+    for (index, fault) in scenario.faults.iter().enumerate() {
+        let known = scenario.faults_at(fault.at);
+        if (1..=last).contains(&fault.at) && known.get(index) == Some(fault) {
+            let time_s = protocol::time::time_s(fault.at, scenario.tick_s);
+            let kind = match fault.kind {
+                FaultKind::Crash => "crash",
+                FaultKind::Hang => "hang",
+                FaultKind::Slow => "slow time",
+                FaultKind::Restart => "restart",
+            };
+            let what = format!("the {kind} of {} at {time_s} s", fault.robot);
+            planned.push((fault.at, what, Counterfactual::NoFault { index }));
+        }
+    }
+    if !scenario.network.lost.is_empty() {
+        for tick in 1..=last {
+            for event in trunk
+                .entry(tick)
+                .into_iter()
+                .flat_map(|entry| &entry.events)
+            {
+                if let Event::CommandDropped {
+                    because: Cause::Scripted,
+                    ..
+                } = event
+                    && let Some((_, what, instead)) = left_out(trunk, tick, event)
+                {
+                    planned.push((tick, what, instead));
+                }
+            }
+        }
+    }
+    planned.sort_by_key(|(tick, ..)| *tick);
+    planned.truncate(MAX_PLANNED);
+    planned
+}

@@ -1,0 +1,447 @@
+//! Plays the forks of a run on all cores, keeps their outcomes in a file, and answers a question with them.
+
+use std::collections::BTreeMap;
+use std::fs::{File, OpenOptions};
+use std::io::{ErrorKind, Write};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError, mpsc};
+use std::thread::Builder;
+use std::time::Instant;
+
+use export::draft::Draft;
+use lab::LabError;
+use lab::branch::{Branch, Trunk};
+use lab::run::RobotMaker;
+use protocol::{Event, RunName, Tick};
+use record::folder::check_no_links;
+use record::names::WHY;
+use record::{EpochFiles, RunFolder};
+use scenario::{ChanceKind, Scenario};
+use serde::{Deserialize, Serialize};
+use simulator::medium::{ForcedVerdict, NetworkVerdict};
+use xxhash_rust::xxh3::xxh3_128;
+
+use super::answer::WhyAnswer;
+use super::candidates;
+use super::plan::{Counterfactual, ForkPlan};
+use super::question::AskedRun;
+use super::search::{Forks, SearchedRun, search};
+use crate::plan::ProgramVersion;
+
+/// Most copies of the run at ticks of it that are kept.
+const MAX_RUNGS: usize = 64;
+/// Most characters of a file's name that come from the question.
+const MAX_NAME: usize = 60;
+
+/// How a question is answered.
+pub struct WhyOptions<'a> {
+    /// What is asked: the name of an expectation or of a measure, a condition, the path of a number of the summary; `None` for the
+    /// expectation that failed first.
+    pub what: Option<String>,
+    /// Most forks; `None` for as many as the answer needs. The same number gives the same answer.
+    pub forks: Option<u64>,
+    /// No fork is begun after this. The answer depends on it.
+    pub until: Option<Instant>,
+    /// Number of forks at the same time; the answer does not depend on it.
+    pub jobs: usize,
+    /// Makes the robots.
+    pub make: RobotMaker,
+    /// Ends it; what was played is kept.
+    pub stop: &'a AtomicBool,
+}
+
+/// How far an answer is.
+#[derive(Debug, Clone, Copy)]
+pub struct WhyProgress {
+    /// Forks that are known, of those that were asked for so far.
+    pub forks: u64,
+    /// The tick at which the present ones begin.
+    pub tick: Tick,
+}
+
+/// Answers a question about a recorded run, and writes the answer into the folder of the run. What was played before for the same
+/// question is not played again.
+///
+/// # Errors
+/// If the run has nothing of that kind, it cannot be executed again or branch in this process, a file cannot be written, or the
+/// caller ends it.
+pub fn why(
+    folder: &RunFolder,
+    run: &RunName,
+    files: &EpochFiles,
+    options: &WhyOptions<'_>,
+    progress: &mut dyn FnMut(WhyProgress),
+) -> Result<(WhyAnswer, PathBuf), LabError> {
+    let recorded = Scenario::load(&files.scenario, &config::Changes::default())?;
+    let asked = AskedRun::read(options.what.as_deref(), &recorded, files)?;
+    let make = options.make.clone();
+    let mut trunk = Trunk::open(files, asked.scenario.clone(), make, asked.sums_up())?;
+    let mut rungs = BTreeMap::from([(0, trunk.snapshot()?)]);
+
+    // As it is, or, if it was stopped, as it would have gone on.
+    trunk.go_to(trunk.last())?;
+    let whole = trunk.snapshot()?;
+    let digest = trunk.simulation().digest();
+    let is_share = asked.question.is_share();
+    let outcome = asked.outcome(&mut trunk.into_branch()?)?;
+    rungs.insert(whole.last(), whole);
+
+    let name = file_name(&asked.question);
+    let key = key(&asked, &digest)?;
+    let place = folder.file(WHY);
+    let (outcomes, kept) = Kept::open(&place, &name, &key)?;
+    let mut sampler = Sampler {
+        asked: &asked,
+        options,
+        rungs,
+        outcomes,
+        kept,
+        used: 0,
+        progress,
+    };
+    let trunk = sampler.rungs[&0].snapshot()?;
+    let searched = SearchedRun {
+        last: trunk.last(),
+        recorded: outcome,
+        is_share,
+        kinds: candidates::kinds(&asked.scenario),
+        planned: candidates::planned(&trunk, &asked.scenario),
+        candidates: &|tick| candidates::candidates(&trunk, tick),
+        events: &|tick| candidates::events(&trunk, tick),
+    };
+    let found = search(&searched, &mut sampler)?;
+
+    let mut answer = WhyAnswer {
+        version: ProgramVersion::this().to_string(),
+        run: run.clone(),
+        digest,
+        question: asked.question.clone(),
+        is_share,
+        recorded: outcome,
+        tick_s: asked.scenario.tick_s,
+        last: trunk.last(),
+        curve: found.curve,
+        jumps: found.jumps,
+        kinds: found.kinds,
+        planned: found.planned,
+        least_jump: found.least_jump,
+        forks: sampler.used,
+        is_complete: found.is_complete,
+        sentence: String::new(),
+    };
+    answer.sentence = answer.in_words();
+    let path = place.join(format!("{name}.json"));
+    let json = serde_json::to_string_pretty(&answer).map_err(LabError::failed)?;
+    write(&path, &format!("{json}\n"))?;
+    Ok((answer, path))
+}
+
+fn write(path: &Path, text: &str) -> Result<(), LabError> {
+    let mut draft = Draft::create(path)?;
+    draft
+        .write_all(text.as_bytes())
+        .map_err(|error| unwritable(path, &error))?;
+    draft.publish()?;
+    Ok(())
+}
+
+fn unwritable(path: &Path, error: &std::io::Error) -> LabError {
+    LabError::File(export::draft::unwritable(path, error))
+}
+
+/// The name of a question's files: its words.
+fn file_name(question: &super::question::Question) -> String {
+    let words = question.words();
+    let mut name = String::new();
+    for character in words.chars() {
+        if character.is_ascii_alphanumeric() {
+            name.push(character.to_ascii_lowercase());
+        } else if !name.is_empty() && !name.ends_with('-') {
+            name.push('-');
+        }
+    }
+    name.truncate(MAX_NAME);
+    let name = name.trim_end_matches('-');
+    // Different questions may have the same letters.
+    let digest = xxh3_128(words.as_bytes()) as u32;
+    format!("{name}-{digest:08x}")
+}
+
+/// What outcomes of forks depend on.
+fn key(asked: &AskedRun, digest: &str) -> Result<String, LabError> {
+    let question = serde_json::to_string(&asked.question).map_err(LabError::failed)?;
+    let program = ProgramVersion::this();
+    let scenario = asked.scenario.to_toml()?;
+    let text = format!("{program}\n{question}\n{digest}\n{scenario}");
+    Ok(format!("{:032x}", xxh3_128(text.as_bytes())))
+}
+
+/// Outcomes of forks, by their plans and numbers.
+type Outcomes = BTreeMap<ForkPlan, BTreeMap<u64, Option<f64>>>;
+
+/// The file of outcomes: a line with the key of the question, and one for each fork.
+struct Kept {
+    path: PathBuf,
+    file: File,
+}
+
+#[derive(Serialize, Deserialize)]
+struct KeptFork {
+    #[serde(flatten)]
+    plan: ForkPlan,
+    number: u64,
+    outcome: Option<f64>,
+}
+
+impl Kept {
+    /// Opens the file of a question, and reads what was played for it before. A file of another version is begun anew.
+    fn open(folder: &Path, name: &str, key: &str) -> Result<(Outcomes, Self), LabError> {
+        if let Err(error) = std::fs::create_dir(folder)
+            && error.kind() != ErrorKind::AlreadyExists
+        {
+            return Err(unwritable(folder, &error));
+        }
+        let path = folder.join(format!("{name}.jsonl"));
+        check_no_links(folder).map_err(LabError::Record)?;
+        let text = std::fs::read_to_string(&path).unwrap_or_default();
+        let head = format!("{{\"key\":\"{key}\"}}\n");
+
+        let mut outcomes = Outcomes::new();
+        let mut whole = head.clone();
+        if let Some(lines) = text.strip_prefix(&head) {
+            // A process that was killed leaves a line without an end.
+            for line in lines
+                .split_inclusive('\n')
+                .filter(|line| line.ends_with('\n'))
+            {
+                let Ok(kept) = serde_json::from_str::<KeptFork>(line) else {
+                    break;
+                };
+                whole += line;
+                let of_plan = outcomes.entry(kept.plan).or_default();
+                of_plan.insert(kept.number, kept.outcome);
+            }
+        }
+        if whole != text {
+            std::fs::write(&path, &whole).map_err(|error| unwritable(&path, &error))?;
+        }
+        let file = OpenOptions::new().append(true).open(&path);
+        let file = file.map_err(|error| unwritable(&path, &error))?;
+        Ok((outcomes, Self { path, file }))
+    }
+
+    fn add(&mut self, plan: &ForkPlan, number: u64, outcome: Option<f64>) -> Result<(), LabError> {
+        let kept = KeptFork {
+            plan: plan.clone(),
+            number,
+            outcome,
+        };
+        let line = serde_json::to_string(&kept).map_err(LabError::failed)?;
+        let written = self.file.write_all(format!("{line}\n").as_bytes());
+        written.map_err(|error| unwritable(&self.path, &error))
+    }
+}
+
+/// Plays the forks of a run.
+struct Sampler<'a> {
+    asked: &'a AskedRun,
+    options: &'a WhyOptions<'a>,
+    /// The run after some ticks.
+    rungs: BTreeMap<Tick, Trunk>,
+    outcomes: Outcomes,
+    kept: Kept,
+    /// Forks that were asked for, whether they were played now or before.
+    used: u64,
+    progress: &'a mut dyn FnMut(WhyProgress),
+}
+
+impl Forks for Sampler<'_> {
+    fn play(&mut self, plan: &ForkPlan, numbers: Range<u64>) -> Result<Vec<Option<f64>>, LabError> {
+        let known = self.outcomes.entry(plan.clone()).or_default();
+        let missing: Vec<u64> = numbers
+            .clone()
+            .filter(|number| !known.contains_key(number))
+            .collect();
+        self.used += numbers.end - numbers.start;
+        if !missing.is_empty() {
+            self.play_all(plan, &missing)?;
+        }
+
+        let known = &self.outcomes[plan];
+        Ok(numbers
+            .map(|number| known.get(&number).copied().flatten())
+            .collect())
+    }
+
+    fn has_budget(&self) -> bool {
+        let has_forks = self.options.forks.is_none_or(|forks| self.used < forks);
+        has_forks
+            && self
+                .options
+                .until
+                .is_none_or(|until| Instant::now() < until)
+    }
+}
+
+impl Sampler<'_> {
+    /// Plays forks that were not played yet.
+    fn play_all(&mut self, plan: &ForkPlan, numbers: &[u64]) -> Result<(), LabError> {
+        let shared = plan.shared();
+        let base = Mutex::new(self.branch(shared)?);
+        let next = AtomicUsize::new(0);
+        let stop = self.options.stop;
+        let asked = self.asked;
+        let (sender, receiver) = mpsc::channel();
+        let work = &|sender: mpsc::Sender<(u64, Result<Option<f64>, LabError>)>| {
+            while !stop.load(Ordering::Relaxed) {
+                let Some(number) = numbers.get(next.fetch_add(1, Ordering::Relaxed)) else {
+                    break;
+                };
+                let copy = base
+                    .lock()
+                    .unwrap_or_else(PoisonError::into_inner)
+                    .snapshot();
+                let outcome = copy.and_then(|branch| fork(asked, branch, plan, *number));
+                if sender.send((*number, outcome)).is_err() {
+                    break;
+                }
+            }
+        };
+
+        let mut first_error = None;
+        std::thread::scope(|scope| {
+            let jobs = self.options.jobs.clamp(1, numbers.len());
+            let mut workers = 0;
+            for _ in 0..jobs {
+                let sender = sender.clone();
+                let worker = Builder::new().spawn_scoped(scope, move || work(sender));
+                workers += usize::from(worker.is_ok());
+            }
+            if workers == 0 {
+                work(sender);
+            } else {
+                drop(sender);
+            }
+            for (number, outcome) in receiver {
+                let kept = outcome.and_then(|outcome| {
+                    self.kept.add(plan, number, outcome)?;
+                    let of_plan = self.outcomes.entry(plan.clone()).or_default();
+                    of_plan.insert(number, outcome);
+                    Ok(())
+                });
+                if let Err(error) = kept {
+                    next.store(numbers.len(), Ordering::Relaxed);
+                    first_error.get_or_insert(error);
+                }
+                (self.progress)(WhyProgress {
+                    forks: self.used,
+                    tick: shared,
+                });
+            }
+        });
+
+        match first_error {
+            Some(error) => Err(error),
+            None if stop.load(Ordering::Relaxed) => Err(LabError::Interrupted),
+            None => Ok(()),
+        }
+    }
+
+    /// The run after a tick, as a branch.
+    fn branch(&mut self, tick: Tick) -> Result<Branch, LabError> {
+        let before = self.rungs.range(..=tick).next_back();
+        let (_, rung) = before.ok_or_else(|| LabError::failed("a run begins with tick 0"))?;
+        let mut trunk = rung.snapshot()?;
+        if trunk.tick() < tick {
+            trunk.go_to(tick)?;
+            if self.rungs.len() < MAX_RUNGS {
+                self.rungs.insert(tick, trunk.snapshot()?);
+            }
+        }
+        trunk.into_branch()
+    }
+}
+
+/// Plays a fork; returns its outcome. A fork in which a robot fails has none.
+fn fork(
+    asked: &AskedRun,
+    mut branch: Branch,
+    plan: &ForkPlan,
+    number: u64,
+) -> Result<Option<f64>, LabError> {
+    let played = begin(&mut branch, plan, number + 1).and_then(|is_fork| {
+        if is_fork {
+            asked.outcome(&mut branch)
+        } else {
+            Ok(None)
+        }
+    });
+    match played {
+        Err(LabError::Robot(_)) => Ok(None),
+        played => played,
+    }
+}
+
+/// Begins a fork as its plan says. Returns whether it is one: what the plan is about may not come about by chance.
+fn begin(branch: &mut Branch, plan: &ForkPlan, seed: u64) -> Result<bool, LabError> {
+    match plan {
+        ForkPlan::After { .. } => branch.reseed(seed, &[]),
+        ForkPlan::KindAfter { kind, .. } => branch.reseed(seed, std::slice::from_ref(kind)),
+        ForkPlan::KindAt { kind, .. } => {
+            branch.reseed(seed, std::slice::from_ref(kind));
+            branch.step()?;
+            branch.reseed(seed, &[]);
+        }
+        ForkPlan::Without { event, .. } => {
+            leave_out(branch, event, seed)?;
+            let record = branch.step()?;
+            let events = record.iter().flat_map(|record| record.events.iter());
+            for happened in events {
+                if let (Event::Blocked { robot, .. }, Counterfactual::WayIsFree { robot: free }) =
+                    (happened, event)
+                    && robot == free
+                {
+                    return Ok(false);
+                }
+            }
+            branch.reseed(seed, &[]);
+        }
+    }
+    Ok(true)
+}
+
+/// Has an event not happen in the next tick.
+fn leave_out(branch: &mut Branch, event: &Counterfactual, seed: u64) -> Result<(), LabError> {
+    let tick = branch.tick() + 1;
+    let forced = |from: &protocol::RobotName, to: &protocol::RobotName, verdict| ForcedVerdict {
+        from: from.clone(),
+        to: to.clone(),
+        verdict,
+    };
+    let scenario = branch.simulation().scenario();
+    match event {
+        Counterfactual::Arrives { from, to, seq } => {
+            branch.force(forced(from, to, NetworkVerdict::Arrives(*seq)));
+        }
+        Counterfactual::IsLost { from, to, seq } => {
+            branch.force(forced(from, to, NetworkVerdict::IsLost(*seq)));
+        }
+        Counterfactual::IsAnswered { from, to } => {
+            branch.force(forced(from, to, NetworkVerdict::IsAnswered));
+        }
+        Counterfactual::WayIsFree { .. } => branch.reseed(seed, &[ChanceKind::Guests]),
+        // The branch repeats nothing that was done by hand after the ticks that it shares with the run.
+        Counterfactual::NothingByHand => {}
+        Counterfactual::NoPartition { index } => {
+            let set = scenario.words_without_partition(*index, tick);
+            branch.set(&[set.map_err(LabError::refused)?])?;
+        }
+        Counterfactual::NoFault { index } => {
+            let set = scenario.words_without_fault(*index, tick);
+            branch.set(&[set.map_err(LabError::refused)?])?;
+        }
+    }
+    Ok(())
+}
