@@ -155,6 +155,20 @@ export type Intervention =
     }
   | {
       /**
+       * By how much, simulated seconds.
+       */
+      by_s: number;
+      from: RobotName;
+      intervention: "delay";
+      to: RobotName;
+    }
+  | {
+      from: RobotName;
+      intervention: "duplicate";
+      to: RobotName;
+    }
+  | {
+      /**
        * After how long it ends by itself, seconds of wall clock; only where the clock waits for the robot.
        */
       for_s?: number | null;
@@ -355,7 +369,7 @@ export type DisplayUnit = "m" | "ft";
  * Whether a run has done what is expected of it. The worse is the greater: a run passes if one expectation does and no other one
  * fails or is undecided.
  */
-export type Verdict = "not_asked" | "pass" | "undecided" | "fail";
+export type Verdict = "unreached" | "not_asked" | "pass" | "undecided" | "fail";
 /**
  * What became of a command.
  */
