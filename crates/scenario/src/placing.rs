@@ -201,8 +201,7 @@ impl PlacingError {
         match error {
             HallError::RobotOffField { index, .. }
             | HallError::RobotOnObstacle { index, .. }
-            | HallError::RobotOnWall { index, .. }
-            | HallError::RobotSize { index, .. } => {
+            | HallError::RobotOnWall { index, .. } => {
                 robot = name(index);
             }
             HallError::RobotOnRobot {
@@ -310,12 +309,6 @@ impl std::fmt::Display for PlacingError {
             }
             (PlacingReason::Hall(HallError::RobotOnWall { at, wall, .. }), Some(robot), _) => {
                 write!(f, "robot {robot} at {at} m stands on wall {}", wall + 1)
-            }
-            (PlacingReason::Hall(HallError::RobotSize { value_m, .. }), Some(robot), _) => {
-                write!(
-                    f,
-                    "robot {robot} is {value_m} m wide or high: too small or too large"
-                )
             }
             (PlacingReason::NoFreePlace(region), ..) => {
                 let whose = match (&self.robot, self.obstacle) {

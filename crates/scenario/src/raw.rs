@@ -2,6 +2,7 @@
 
 mod bulk_name;
 pub(super) mod change;
+mod drawn;
 mod drive;
 mod expect;
 pub(super) mod fault;
@@ -35,6 +36,7 @@ use toml::Spanned;
 
 use bulk_name::BulkName;
 use change::{ChangeTable, ParentTable};
+use drawn::DrawnTable;
 use drive::DriveTable;
 use fault::FaultTable;
 use guests::GuestsTable;
@@ -99,6 +101,7 @@ pub(super) struct ScenarioFile {
     parent: Option<ParentTable>,
     #[serde(default, rename = "reseed", skip_serializing_if = "Vec::is_empty")]
     reseeds: Vec<Spanned<ReseedTable>>,
+    drawn: Option<Spanned<DrawnTable>>,
     #[serde(default, rename = "obstacle", skip_serializing_if = "Vec::is_empty")]
     obstacles: Vec<ObstacleTable>,
     #[serde(default, rename = "site", skip_serializing_if = "Vec::is_empty")]
@@ -171,6 +174,7 @@ impl ScenarioFile {
     /// Takes out the seed, and what follows from it.
     pub(super) fn without_seed(mut self) -> Self {
         self.seed = None;
+        self.drawn = None;
         for robot in &mut self.robots {
             robot.as_mut().at.forget();
         }
@@ -323,6 +327,10 @@ impl ScenarioFile {
         placing::place_peaks_at_random(&mut scenario).map_err(|(layer, reason)| {
             FileError::at(source, layer_spans.get(&layer).cloned(), &reason)
         })?;
+        if let Some(drawn) = &self.drawn {
+            let noted = drawn.get_ref().note(&mut scenario);
+            noted.map_err(|reason| FileError::at(source, Some(drawn.span()), &reason))?;
+        }
         if settled == 0 {
             placing::check(&scenario).map_err(refuse)?;
         }
@@ -652,6 +660,7 @@ impl From<&checked::Scenario> for ScenarioFile {
             end_when: scenario.end_when.clone().map(unplaced),
             parent: scenario.parent.as_ref().map(ParentTable::from),
             reseeds: reseeds.collect(),
+            drawn: DrawnTable::of(scenario).map(unplaced),
             obstacles: obstacles.collect(),
             sites: sites.map(unplaced).collect(),
             layers: layers.collect(),

@@ -122,11 +122,19 @@ fn places_are_drawn_within_their_region_and_anew_for_another_seed() {
             assert_eq!(without, other.to_toml_without_seed().unwrap());
         }
 
-        // One more moves none, and the record has places only.
+        // One more moves none, and the record has the places.
         let few = parse(&file).unwrap();
-        let written = parse(&few.to_toml().unwrap()).unwrap();
+        let text = few.to_toml().unwrap();
+        let written = parse(&text).unwrap();
         assert_eq!(places(&written), places(&few));
-        assert!(written.robots.values().all(|robot| robot.drawn.is_none()));
+        assert_eq!(written.to_toml().unwrap(), text);
+        // And where they were drawn, for other seeds.
+        let other = few.clone().with_seed(77).unwrap();
+        assert_eq!(
+            places(&written.with_seed(77).unwrap()),
+            places(&other),
+            "{text}"
+        );
         if at != jitter {
             let more = parse(&bulk(at, 7)).unwrap();
             assert_eq!(places(&more)[..6], places(&few)[..]);
@@ -533,5 +541,45 @@ fn what_else_is_in_a_scenario_changes_no_draw() {
         for (name, site) in &plain.sites {
             assert_eq!(scenario.sites[name].at, site.at, "{more}");
         }
+    }
+}
+
+#[test]
+fn a_record_says_of_all_places_where_they_were_drawn() {
+    let text = format!(
+        "{}[[site]]\nname = \"T\"\nat = \"random\"\n[[site]]\nname = \"U\"\nat = [\"1 m\", \"1 m\"]\n\
+         [[obstacle]]\nat = [\"14 m\", \"14 m\"]\n[[obstacle]]\nat = {REGION}\nradius = \"0.2 m\"\n\
+         [[layer]]\nname = \"dust\"\ncell = \"1 m\"\n\
+         peaks = [{{ at = [\"1 m\", \"1 m\"], radius = \"1 m\", height = 1 }}, {{ at = \"random\", radius = \"1 m\", height = 1 }}]\n",
+        bulk(CLUSTER, 2)
+    );
+    let scenario = parse(&text).unwrap();
+    let written = scenario.to_toml().unwrap();
+    let read = parse(&written).unwrap();
+    assert_eq!(read.to_toml().unwrap(), written);
+    assert_eq!(places(&read), places(&scenario));
+    assert_eq!(read.sites, scenario.sites);
+    assert_eq!(read.obstacles, scenario.obstacles);
+    assert_eq!(read.layers, scenario.layers);
+
+    let fresh = parse(&format!("seed = 5\n{text}")).unwrap();
+    let other = read.with_seed(5).unwrap();
+    assert_eq!(other.to_toml().unwrap(), fresh.to_toml().unwrap());
+    assert_ne!(places(&other), places(&scenario));
+
+    for (wrong, reason) in [
+        ("[drawn.robot]\nX = \"random\"\n", "there is no robot X"),
+        (
+            "[drawn.obstacle]\n0 = \"random\"\n",
+            "there is no obstacle 0",
+        ),
+        ("[drawn.layer.dust]\n3 = \"random\"\n", "there is no peak 3"),
+        (
+            "[drawn.site]\nT = [\"1 m\", \"1 m\"]\n",
+            "the place of site T is no region",
+        ),
+    ] {
+        let error = shown(&format!("{text}{wrong}"));
+        assert!(error.contains(reason), "{error}");
     }
 }

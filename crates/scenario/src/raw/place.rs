@@ -93,15 +93,18 @@ impl StartPlace {
 
     /// Makes a place that follows from the seed the region again that it was drawn from.
     pub(super) fn forget(&mut self) {
-        let Self::Given {
+        if let Self::Given {
             drawn: Some(region),
             ..
         } = *self
-        else {
-            return;
-        };
+        {
+            *self = Self::anew(region);
+        }
+    }
 
-        *self = match region {
+    /// Any place of a region, by the seed.
+    pub(super) fn anew(region: Region) -> Self {
+        match region {
             Region::Field => Self::Random,
             Region::Rectangle(from, to) => Self::pattern(PlacePattern {
                 random: Some(LinePlaces {
@@ -117,7 +120,7 @@ impl StartPlace {
                 }),
                 ..PlacePattern::none()
             }),
-        };
+        }
     }
 
     fn pattern(pattern: PlacePattern) -> Self {
