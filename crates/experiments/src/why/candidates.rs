@@ -151,7 +151,7 @@ fn left_out(trunk: &Trunk, tick: Tick, event: &Event) -> Option<(u8, String, Cou
             format!("{} was delayed", command(from, to, *seq)),
             arrives(from, to, *seq),
         )),
-        Event::CommandDuplicated { from, to, seq } => Some((
+        Event::CommandDuplicated { from, to, seq, .. } => Some((
             2,
             format!("{} came twice", command(from, to, *seq)),
             arrives(from, to, *seq),
@@ -236,17 +236,14 @@ pub(super) fn planned(trunk: &Trunk, scenario: &Scenario) -> Vec<(Tick, String, 
             planned.push((fault.at, what, Counterfactual::NoFault { index }));
         }
     }
-    if !scenario.network.lost.is_empty() {
+    if !scenario.network.named.is_empty() {
         for tick in 1..=last {
             for event in trunk
                 .entry(tick)
                 .into_iter()
                 .flat_map(|entry| &entry.events)
             {
-                if let Event::CommandDropped {
-                    because: Cause::Scripted,
-                    ..
-                } = event
+                if is_scripted(event)
                     && let Some((_, what, instead)) = left_out(trunk, tick, event)
                 {
                     planned.push((tick, what, instead));
@@ -257,4 +254,15 @@ pub(super) fn planned(trunk: &Trunk, scenario: &Scenario) -> Vec<(Tick, String, 
     planned.sort_by_key(|(tick, ..)| *tick);
     planned.truncate(MAX_PLANNED);
     planned
+}
+
+/// Whether the scenario names the command to which this happened.
+fn is_scripted(event: &Event) -> bool {
+    match event {
+        Event::CommandDropped { because, .. } => *because == Cause::Scripted,
+        Event::CommandDelayed { because, .. } | Event::CommandDuplicated { because, .. } => {
+            *because == Some(Cause::Scripted)
+        }
+        _ => false,
+    }
 }
