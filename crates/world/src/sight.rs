@@ -105,11 +105,15 @@ fn crossed(from: f64, to: f64, center: f64, half: f64) -> (f64, f64) {
     (one.min(other), one.max(other))
 }
 
-/// Whether one of these lies on the way from `from` to `to`.
+/// Whether one of these lies on the way from `from` to `to`. What is on the surface of one is seen from its side.
 #[must_use]
 pub fn is_hidden<'a>(from: Point, to: Point, opaque: impl IntoIterator<Item = &'a Opaque>) -> bool {
-    let mut opaque = opaque.into_iter();
-    opaque.any(|opaque| opaque.entered_after(from, to).is_some())
+    let length_m = from.distance_m(to);
+    opaque.into_iter().any(|opaque| {
+        let entered = opaque.entered_after(from, to);
+        // Rounding must not decide about a place on a surface.
+        entered.is_some_and(|share| (1.0 - share) * length_m > TOLERANCE_M)
+    })
 }
 
 impl<R> World<R> {

@@ -269,4 +269,34 @@ proptest! {
         let first = entered.fold(1.0, f64::min);
         prop_assert!((first - 1.0 / beyond).abs() < 1e-6, "{}", first);
     }
+
+    #[test]
+    fn what_is_on_a_surface_is_seen_from_its_side(
+        eye in (0.0..10.0, 0.0..10.0_f64),
+        ends in ((0.0..10.0, 0.0..10.0_f64), (0.0..10.0, 0.0..10.0_f64)),
+        half in (0.1..2.0, 0.1..2.0_f64),
+        share in 0.0..=1.0_f64,
+    ) {
+        let point = |(x, y): (f64, f64)| Point::new(x, y);
+        let (eye, one, other) = (point(eye), point(ends.0), point(ends.1));
+        let side = |from: Point, to: Point| {
+            let (along, offset) = (to - from, eye - from);
+            (along.x * offset.y - along.y * offset.x) / along.length_squared_m2().sqrt()
+        };
+        let on = one + (other - one) * share;
+        prop_assume!(side(one, other).abs() > 0.01);
+        let wall = [Opaque::Wall(Wall { from: one, to: other })];
+        prop_assert!(!is_hidden(eye, on, &wall));
+
+        // The face of a block that is to the right of the eye, and the rim of a disc around the same center.
+        let block = [block(one.x, one.y, half.0, half.1)];
+        let on = Point::new(one.x - half.0, one.y + half.1 * (2.0 * share - 1.0));
+        prop_assert!(eye.x > on.x - 0.01 || !is_hidden(eye, on, &block));
+        let disc = [disc(one.x, one.y, half.0)];
+        let away = eye - one;
+        let distance_m = eye.distance_m(one);
+        prop_assume!(distance_m > half.0 + 0.01);
+        let on = one + away * (half.0 / distance_m);
+        prop_assert!(!is_hidden(eye, on, &disc));
+    }
 }
