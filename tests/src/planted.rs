@@ -1,10 +1,11 @@
-//! A copy of Leguin with a defect that hunts must find.
+//! Robots with defects that hunts must find: a copy of Leguin, and one that needs two rare events.
 
-use robot::{Action, BadParameters, Cars, Panel, Robot, StateVariables};
+use protocol::random::unit;
+use robot::{Action, BadParameters, Cars, Panel, Robot, StateVariables, Tick};
 use robots::Leguin;
 
 /// Leguin, who stands still for ever after she has received a command twice in a tick for the second time.
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct Planted {
     leguin: Leguin,
     /// Number of ticks in which a command came twice.
@@ -12,11 +13,12 @@ struct Planted {
     last: Action,
 }
 
-/// Robots as those that ship with the project, but for Leguin, who has the defect.
+/// Robots as those that ship with the project, but for Leguin, who has the defect, and those of the other defects.
 #[must_use]
 pub fn make(class: &str) -> Option<Box<dyn Robot>> {
     match class {
         "Leguin" => Some(Box::new(Planted::default())),
+        "Gambler" => Some(Box::new(Gambler::default())),
         other => robots::make(other),
     }
 }
@@ -47,11 +49,53 @@ impl Robot for Planted {
         self.leguin.resume(cars, last);
     }
 
+    fn snapshot(&self) -> Option<Box<dyn Robot>> {
+        Some(Box::new(self.clone()))
+    }
+
+    fn reseed(&mut self, cars: &mut Cars<'_>) {
+        self.leguin.reseed(cars);
+    }
+
     fn senses_bodies(&self) -> bool {
         self.leguin.senses_bodies()
     }
 
     fn panel(&self) -> Panel {
         self.leguin.panel()
+    }
+}
+
+/// The ticks of the two draws of a gambler that count.
+const DRAWS: [Tick; 2] = [40, 80];
+/// Probability of each of the two draws of a gambler.
+const RARE: f64 = 1.0 / 300.0;
+
+/// Breaks if two draws, in two certain ticks, are both rare. The first one is seen in a variable only.
+#[derive(Clone, Default)]
+struct Gambler {
+    was_lucky: bool,
+    is_broken: bool,
+}
+
+impl Robot for Gambler {
+    fn init(&mut self, _: &mut Cars<'_>) -> Result<(), BadParameters> {
+        *self = Self::default();
+        Ok(())
+    }
+
+    fn tick(&mut self, cars: &mut Cars<'_>) -> Action {
+        let is_rare = unit(cars.random()) < RARE;
+        self.was_lucky |= cars.tick() == DRAWS[0] && is_rare;
+        self.is_broken |= cars.tick() == DRAWS[1] && self.was_lucky && is_rare;
+        let behavior = if self.is_broken { "BROKEN" } else { "WORK" };
+        Action::stay(cars)
+            .emotion("CALM")
+            .behavior(behavior)
+            .variable("was_lucky", self.was_lucky)
+    }
+
+    fn snapshot(&self) -> Option<Box<dyn Robot>> {
+        Some(Box::new(self.clone()))
     }
 }

@@ -423,8 +423,8 @@ fn conclude(results: &Results, folder: &Path, is_json: bool) -> Result<ExitCode>
 
     name_defects(results);
     name_failures(results, folder);
-    let verdict = name_verdicts(results);
     let place = shell::path(folder);
+    let verdict = name_verdicts(results, &place);
     terminal::note(format_args!(
         "results in {place}; `cars experiment replay {place} N` records the unit N as a run"
     ));
@@ -436,7 +436,7 @@ fn conclude(results: &Results, folder: &Path, is_json: bool) -> Result<ExitCode>
 }
 
 /// Names the expectations of the experiment that runs have not met, and returns the worst verdict.
-fn name_verdicts(results: &Results) -> Verdict {
+fn name_verdicts(results: &Results, place: &str) -> Verdict {
     let mut worst = Verdict::Unreached;
     for judged in results.judged() {
         let verdict = judged.verdict();
@@ -464,6 +464,14 @@ fn name_verdicts(results: &Results) -> Verdict {
             results.outcomes.len(),
             results.plan.unit(units[0]).describe()
         ));
+        if verdict == Verdict::Fail && *results.plan.robots() == Robots::InProcess {
+            let run = format!("{}-{}", results.plan.name(), units[0]);
+            let expectation = shell::word(judged.expectation);
+            terminal::note(format_args!(
+                "  cars experiment replay {place} {} --run {run}\n  cars why {run} {expectation}",
+                units[0]
+            ));
+        }
     }
 
     worst

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
-use std::process::ExitCode;
+use std::process::{Command, ExitCode, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -28,6 +28,8 @@ use crate::named;
 const DEFAULT_S: f64 = 60.0;
 /// Most texts of the commands of a link with one fate that are printed.
 const MAX_TEXTS: usize = 5;
+/// The exit status of a hunt that has found nothing, where no plan has reached what some run should.
+const NEVER_REACHED: u8 = 3;
 /// Set by Ctrl-C: the hunt ends with what it has found.
 static STOP: AtomicBool = AtomicBool::new(false);
 
@@ -49,8 +51,8 @@ pub(crate) struct HuntArgs {
     /// Number of runs at the same time; without it the number of processors. The result does not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1024))]
     jobs: Option<u64>,
-    /// Kinds of faults that are drawn, for example `lose,crash`; without it all: lose, loss, burst, delay, duplication,
-    /// partition, one-way, crash, hang, wall, crowd.
+    /// Kinds of faults that are drawn, for example `lose,crash`; without it all: lose, late, double, loss, burst, delay,
+    /// duplication, partition, one-way, crash, hang, wall, crowd, reseed.
     #[arg(long, value_name = "KINDS", value_delimiter = ',')]
     kinds: Vec<FaultClass>,
     /// Longest time of a fault, in simulated time. Walls and crowds are there for the whole run.
@@ -76,13 +78,18 @@ pub(crate) struct HuntArgs {
     /// Print JSON: findings and coverage.
     #[arg(long)]
     json: bool,
+    /// Record the run of each finding, and run `cars why` on it: when it was decided, and by what.
+    #[arg(long, conflicts_with_all = ["json", "processes"])]
+    explain: bool,
 }
 
-/// Hunts; the exit status is 1 if something was found, and 2 if the hunt cannot be made.
+/// Hunts; the exit status is 1 if something was found, 2 if the hunt cannot be made, and 3 if nothing was found and what some run
+/// should reach was never reached.
 pub(crate) fn hunt(args: &HuntArgs) -> ExitCode {
     match play(args) {
-        Ok(report) if report.findings.is_empty() => ExitCode::SUCCESS,
-        Ok(_) => ExitCode::FAILURE,
+        Ok(report) if !report.findings.is_empty() => ExitCode::FAILURE,
+        Ok(report) if report.never_reached().next().is_some() => ExitCode::from(NEVER_REACHED),
+        Ok(_) => ExitCode::SUCCESS,
         Err(error) => {
             terminal::note(format_args!("Error: {}", render(error.as_ref())));
             ExitCode::from(2)
@@ -156,6 +163,9 @@ fn play(args: &HuntArgs) -> Result<HuntReport> {
         terminal::print(in_words(&report))
     };
     OutputError::unless_closed(printed)?;
+    if args.explain {
+        explain(&report.findings)?;
+    }
     Ok(report)
 }
 
@@ -206,8 +216,8 @@ fn in_words(report: &HuntReport) -> String {
     let mut text = coverage_in_words(&report.coverage);
     let scenario = report.scenario.display();
     text += &format!(
-        "\n{} plans of seed {} in {scenario}, {} ticks.",
-        report.plans, report.seed, report.ticks
+        "\n{} plans of seed {} in {scenario}, {} ticks; {} of them went on from a state that an earlier one had reached.",
+        report.plans, report.seed, report.ticks, report.gone_on
     );
     if report.not_set_up > 0 {
         text += &format!(" {} of them could not be set up.", report.not_set_up);
@@ -221,6 +231,12 @@ fn in_words(report: &HuntReport) -> String {
         } else if !findings.any(|finding| finding.expectation == *expectation) {
             text += &format!("not seen to fail: {expectation}\n");
         }
+    }
+    for (goal, plans) in &report.goals {
+        text += &match plans {
+            0 => format!("never reached: {goal}\n"),
+            plans => format!("reached in {plans} of {} plans: {goal}\n", report.plans),
+        };
     }
     for finding in &report.findings {
         text += &finding_in_words(finding);
@@ -244,7 +260,33 @@ fn finding_in_words(finding: &Finding) -> String {
     if !finding.is_minimal {
         text += "  not minimal: more --shrink-runs may make it smaller\n";
     }
-    text + &format!("  cars run {}\n", shell::path(&finding.file))
+    let run = finding.run();
+    text += &format!("  cars run {} --run {run}\n", shell::path(&finding.file));
+    if finding.can_be_explained() {
+        let expectation = shell::word(&finding.expectation);
+        text += &format!("  cars why {run} {expectation}\n");
+    }
+    text
+}
+
+/// Records the run of each finding, and asks when and by what it was decided.
+fn explain(findings: &[Finding]) -> Result<()> {
+    let program = std::env::current_exe()?;
+    for finding in findings.iter().filter(|finding| finding.can_be_explained()) {
+        let run = finding.run();
+        // The verdict of the run is a failure; whether it was recorded is what `cars why` finds out.
+        Command::new(&program)
+            .arg("run")
+            .arg(&finding.file)
+            .args(["--run", &run, "--replace", "--quiet"])
+            .stdout(Stdio::null())
+            .status()?;
+        terminal::note(format_args!("cars why {run} {}", finding.expectation));
+        Command::new(&program)
+            .args(["why", &run, &finding.expectation])
+            .status()?;
+    }
+    Ok(())
 }
 
 fn coverage_in_words(coverage: &Coverage) -> String {
@@ -266,6 +308,8 @@ fn coverage_in_words(coverage: &Coverage) -> String {
             Feature::QueryLost { link } => format!("{} -> {}: query lost", link.from, link.to),
             Feature::Behavior { robot, from, to } => format!("{robot}: {from} -> {to}"),
             Feature::Emotion { robot, from, to } => format!("{robot} feels: {from} -> {to}"),
+            // In the lines of the goals.
+            Feature::Reached { .. } => continue,
         };
         others += &format!("{plans:>8}  {line}\n");
     }

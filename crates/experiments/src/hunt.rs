@@ -1,20 +1,25 @@
 //! Hunts: plans of faults are drawn from a seed and played, until an expectation fails; the plan is then shrunk to a minimal
 //! scenario file.
 //!
+//! Most plans go on from a state that an earlier one was the first to reach (`corpus`): a run in this process is copied there, any
+//! other one is played up to there again.
+//!
 //! The result depends on the scenario, the seed and the number of plans only: plans are drawn in batches of a fixed size, each
 //! from a stream of its own, and are guided by what the batches before have reached.
 
 mod case;
 mod cause;
+mod corpus;
 mod coverage;
 mod draw;
 mod fault;
 mod file;
 mod parallel;
+mod sent;
 mod shrink;
 mod trial;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -22,7 +27,7 @@ use std::time::{Duration, Instant};
 use config::FileError;
 use lab::LabError;
 use protocol::Tick;
-use protocol::random::{stream, unit};
+use protocol::random::{Stream, stream, unit};
 use protocol::time::time_s;
 use serde::Serialize;
 
@@ -31,13 +36,18 @@ pub use cause::{FailureSignature, Sign};
 pub use coverage::{CommandFate, Coverage, Feature};
 pub use draw::Ground;
 pub use fault::{Effect, FaultClass, Link, Messages, PlannedFault, TickSpan};
+pub use sent::{Moment, SentMessage};
 pub use shrink::{Bounds, ScenarioParts, Shrunk, shrink};
-pub use trial::{FailedExpectation, HuntRobots, RUNS, SentMessage, Subject, Trial, TrialResult};
+pub use trial::{FailedExpectation, HuntRobots, RUNS, Subject, Trial, TrialResult};
 
+use corpus::Corpus;
 use file::Heading;
+use trial::{Plan, PlayedPlan};
 
 /// Number of plans that are drawn at a time. What they reach guides the plans after them.
 const BATCH: u64 = 16;
+/// Share of the plans that go on from a state, once one is reached.
+const GOING_ON: f64 = 2.0 / 3.0;
 /// Most findings of a hunt. Further plans that fail are only counted.
 const MAX_FINDINGS: usize = 20;
 
@@ -113,6 +123,21 @@ pub struct Finding {
     pub file: PathBuf,
 }
 
+impl Finding {
+    /// The name under which its run is recorded: that of its file.
+    #[must_use]
+    pub fn run(&self) -> String {
+        let stem = self.file.file_stem().unwrap_or_default();
+        stem.to_string_lossy().into_owned()
+    }
+
+    /// Whether `cars why` can be asked about it: whether a run goes to its end is no expectation of its scenario.
+    #[must_use]
+    pub fn can_be_explained(&self) -> bool {
+        self.expectation != RUNS
+    }
+}
+
 /// The result of a hunt.
 #[derive(Debug, Serialize)]
 pub struct HuntReport {
@@ -122,6 +147,8 @@ pub struct HuntReport {
     pub seed: u64,
     /// Number of plans that were played.
     pub plans: u64,
+    /// Number of those that went on from a state that another one had reached.
+    pub gone_on: u64,
     /// Number of plans that could not be set up, because bodies did not fit into the hall.
     pub not_set_up: u64,
     /// Number of ticks of all plans, without those of shrinking.
@@ -130,12 +157,22 @@ pub struct HuntReport {
     pub expectations: BTreeSet<String>,
     /// Those of them that were asked in no run: what they are expected after did not happen.
     pub never_asked: BTreeSet<String>,
+    /// What some run should reach, with the number of plans in whose runs it was reached.
+    pub goals: BTreeMap<String, u64>,
     /// What was found, one for each cause for which an expectation fails.
     pub findings: Vec<Finding>,
     /// Number of plans that failed and were not shrunk, because there were too many findings already.
     pub not_shrunk: u64,
     /// What happened in the runs.
     pub coverage: Coverage,
+}
+
+impl HuntReport {
+    /// What some run should reach, and none has.
+    pub fn never_reached(&self) -> impl Iterator<Item = &str> {
+        let goals = self.goals.iter().filter(|(_, plans)| **plans == 0);
+        goals.map(|(name, _)| name.as_str())
+    }
 }
 
 /// A hunt in progress.
@@ -145,8 +182,7 @@ struct Hunt<'a> {
     ground: Ground,
     /// Expectations that are checked.
     wanted: BTreeSet<String>,
-    /// Plans that reached something new.
-    corpus: Vec<Vec<PlannedFault>>,
+    corpus: Corpus,
     report: HuntReport,
 }
 
@@ -159,8 +195,20 @@ pub fn hunt(
     options: &HuntOptions<'_>,
     progress: &mut dyn FnMut(HuntProgress<'_>),
 ) -> Result<HuntReport, LabError> {
-    let baseline = subject.play(&FaultCase::default(), &BTreeSet::new())?;
-    let wanted = wanted(subject, &baseline, &options.expect)?;
+    let mut corpus = Corpus::default();
+    let without = Plan::default();
+    let mut baseline = subject.play_plan(&without, &BTreeSet::new(), &|feature| {
+        corpus.is_new(feature)
+    })?;
+    corpus.add(&without, &mut baseline);
+    let baseline = baseline.result;
+    let mut wanted = wanted(subject, &baseline, &options.expect)?;
+    let mut goals = BTreeMap::new();
+    for expectation in &subject.scenario.expectations {
+        if expectation.is_goal() && wanted.remove(&expectation.name) {
+            goals.insert(expectation.name.clone(), 0);
+        }
+    }
     let ground = Ground::new(
         &subject.scenario,
         &baseline,
@@ -194,16 +242,18 @@ pub fn hunt(
             scenario: subject.file.clone(),
             seed: options.seed,
             plans: 0,
+            gone_on: 0,
             not_set_up: 0,
             ticks: 0,
             expectations: wanted.clone(),
             never_asked: wanted.clone(),
+            goals,
             findings: Vec::new(),
             not_shrunk: 0,
             coverage: Coverage::default(),
         },
         wanted,
-        corpus: Vec::new(),
+        corpus,
     };
     hunt.go(progress)?;
     Ok(hunt.report)
@@ -263,13 +313,14 @@ impl Hunt<'_> {
                 return Ok(());
             }
 
-            let cases = self.draw(first, count);
+            let plans = self.draw(first, count);
             let subject = self.subject;
             let wanted = &self.wanted;
-            let played = parallel::all(&cases, self.options.jobs, self.options.stop, |case| {
-                subject.play(case, wanted)
+            let corpus = &self.corpus;
+            let played = parallel::all(&plans, self.options.jobs, self.options.stop, |plan| {
+                subject.play_plan(plan, wanted, &|feature| corpus.is_new(feature))
             });
-            let failures = self.note(first, cases, played);
+            let failures = self.note(first, plans, played);
             let features = self.report.coverage.features().count();
             progress(HuntProgress::Played(self.report.plans, features));
             for (plan, case, played) in failures {
@@ -284,52 +335,72 @@ impl Hunt<'_> {
     }
 
     /// The plans after the first ones.
-    fn draw(&self, first: u64, count: u64) -> Vec<FaultCase> {
-        let mut cases = Vec::new();
+    fn draw(&mut self, first: u64, count: u64) -> Vec<Plan> {
+        let mut plans = Vec::new();
         for plan in first + 1..=first + count {
             let mut chance = stream(self.options.seed, &format!("hunt/{plan}"));
-            let is_mutated = !self.corpus.is_empty() && unit(&mut chance) < 0.5;
-            let faults = if is_mutated {
-                let place = draw::below(self.corpus.len(), &mut chance);
-                self.ground.mutate(&self.corpus[place], &mut chance)
-            } else {
-                self.ground.draw(&mut chance)
-            };
-            cases.push(FaultCase::of(faults));
+            let going_on = unit(&mut chance) < GOING_ON;
+            plans.push(
+                going_on
+                    .then(|| self.go_on(&mut chance))
+                    .flatten()
+                    .unwrap_or_else(|| Plan {
+                        case: FaultCase::of(self.ground.draw(&mut chance)),
+                        ..Plan::default()
+                    }),
+            );
         }
+        plans
+    }
 
-        cases
+    /// A plan that goes on from a state; `None` if there is none.
+    fn go_on(&mut self, chance: &mut Stream) -> Option<Plan> {
+        let state = self.corpus.choose()?;
+        if !self.ground.can_go_on(&state.faults) {
+            return None;
+        }
+        let faults = self.ground.go_on(&state.faults, &state.moment, chance);
+        Some(Plan {
+            case: FaultCase::of(faults),
+            after: state.moment.after,
+            saved: state.saved.clone(),
+        })
     }
 
     /// Adds the runs of a batch to the report; returns those in which an expectation failed, with the numbers of the plans.
     fn note(
         &mut self,
         first: u64,
-        cases: Vec<FaultCase>,
-        results: Vec<Option<Result<TrialResult, LabError>>>,
+        plans: Vec<Plan>,
+        results: Vec<Option<Result<PlayedPlan, LabError>>>,
     ) -> Vec<(u64, FaultCase, TrialResult)> {
         let mut failures = Vec::new();
-        for (index, (case, result)) in cases.into_iter().zip(results).enumerate() {
+        for (index, (plan, result)) in plans.into_iter().zip(results).enumerate() {
             let Some(result) = result else {
                 continue;
             };
             self.report.plans += 1;
+            self.report.gone_on += u64::from(plan.after > 0);
             let Ok(mut played) = result else {
                 self.report.not_set_up += 1;
                 continue;
             };
 
-            self.report.ticks += played.ticks;
+            self.corpus.add(&plan, &mut played);
+            let played = played.result;
+            self.report.ticks += played.ticks - plan.after;
             let not_asked = &played.not_asked;
             self.report
                 .never_asked
                 .retain(|name| not_asked.contains(name));
-            let features = std::mem::take(&mut played.features);
-            if self.report.coverage.add(features) > 0 {
-                self.corpus.push(case.faults.clone());
+            for (goal, plans) in &mut self.report.goals {
+                let expectation = goal.clone();
+                let reached = Feature::Reached { expectation };
+                *plans += u64::from(played.features.contains_key(&reached));
             }
+            self.report.coverage.add(played.features.keys());
             if !played.failed.is_empty() {
-                failures.push((first + index as u64 + 1, case, played));
+                failures.push((first + index as u64 + 1, plan.case, played));
             }
         }
         failures

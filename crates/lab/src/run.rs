@@ -204,6 +204,17 @@ impl Local {
         })
     }
 
+    /// Goes on from the last tick as a run of another scenario, which is the same up to then. Where it is re-seeded later, robots are
+    /// told.
+    pub fn go_on_as(&mut self, scenario: Scenario) {
+        for name in scenario.robots.keys() {
+            for reseed in scenario.stream_reseeds(name, self.simulation.tick()) {
+                self.robots.reseed(name, reseed);
+            }
+        }
+        self.simulation.go_on_as(scenario);
+    }
+
     /// Creates the simulation of an epoch with these robots.
     ///
     /// # Errors

@@ -342,6 +342,14 @@ impl Simulation {
         reseed
     }
 
+    /// Goes on from the last tick as a run of another scenario, which is the same up to then. Its robots must be told by themselves of
+    /// streams that are drawn anew later: [`Scenario::stream_reseeds`].
+    pub fn go_on_as(&mut self, scenario: Scenario) {
+        self.medium
+            .set_network(scenario.network_at(self.now).clone());
+        self.scenario = scenario;
+    }
+
     /// Has something done to the run from the next tick on that has not begun, as a person wants it.
     ///
     /// # Errors

@@ -333,3 +333,77 @@ fn a_hunt_of_processes_finds_the_same() {
     };
     assert_eq!(causes(&here), causes(&there));
 }
+
+/// The robot of the planted defect draws two rare numbers of its own: no fault leads to them, only other chance.
+#[test]
+fn two_rare_events_are_found_from_the_state_after_the_first() {
+    let lab = Lab::new();
+    let scenario = lab.write("gambler.toml", GAMBLER);
+    let mut reports = Vec::new();
+    for jobs in ["1", "2"] {
+        let mut hunt = Command::new(programs().join("planted-hunt"));
+        hunt.arg(&scenario).args(["1", "6000", jobs]);
+        hunt.arg(lab.out()).arg("reseed");
+        reports.push(found(&mut hunt));
+    }
+    assert_eq!(reports[0], reports[1]);
+
+    let report = &reports[0];
+    let finding = &report["findings"][0];
+    let faults = finding["case"]["faults"].as_array().unwrap();
+    assert_eq!(faults.len(), 2, "{finding}");
+    for fault in faults {
+        assert_eq!(fault["fault"], "reseed", "{finding}");
+        assert_eq!(fault["of"], serde_json::json!(["robot.G"]), "{finding}");
+    }
+    assert_eq!(finding["is_minimal"], true, "{finding}");
+    assert!(report["goals"]["it is lucky once"].as_u64().unwrap() > 0);
+    assert!(report["gone_on"].as_u64().unwrap() > 0);
+}
+
+/// Works, unless two rare draws come together.
+const GAMBLER: &str = r#"
+duration = "50 s"
+guests.count = 0
+
+[[robot]]
+name = "G"
+class = "Gambler"
+at = ["5 m", "5 m"]
+
+[[expect]]
+name = "it works"
+never = { robot = "G", behavior = "BROKEN" }
+
+[[expect]]
+name = "it is lucky once"
+reach = { robot = "G", variable = "was_lucky", is = true }
+"#;
+
+/// What no plan has reached is named, and the exit status tells it from a hunt that has reached all.
+#[test]
+fn what_was_never_reached_is_named() {
+    let lab = Lab::new();
+    let goal = |name: &str, behavior: &str| {
+        format!("{{ name = '{name}', reach = {{ robot = 'Butler', behavior = '{behavior}' }} }}")
+    };
+    let hunt = |goals: &[String]| {
+        let expect = format!("expect=[{}]", goals.join(", "));
+        let args = ["hunt", HALL, "--plans", "3", "--set", "duration=20 s"];
+        let output = lab.cars(&args).args(["--set", &expect]).output().unwrap();
+        let printed = String::from_utf8(output.stdout).unwrap();
+        (output.status.code(), printed)
+    };
+
+    let (status, printed) = hunt(&[goal("serves", "SERVE"), goal("flies", "FLY")]);
+    assert_eq!(status, Some(3), "{printed}");
+    assert!(
+        printed.contains("\nreached in 3 of 3 plans: serves\n"),
+        "{printed}"
+    );
+    assert!(printed.contains("\nnever reached: flies\n"), "{printed}");
+    assert!(!printed.contains("not seen to fail: flies"), "{printed}");
+
+    let (status, printed) = hunt(&[goal("serves", "SERVE")]);
+    assert_eq!(status, Some(0), "{printed}");
+}

@@ -87,6 +87,9 @@ impl FaultCase {
             ("obstacle", entries.obstacles),
             ("fault", entries.faults),
             ("network.lose", entries.lost),
+            ("network.delay", entries.late),
+            ("network.duplicate", entries.doubled),
+            ("reseed", entries.reseeds),
             ("network.partition", entries.partitions),
         ] {
             if !own.is_empty() {
@@ -114,6 +117,9 @@ impl FaultCase {
 #[derive(Default)]
 struct Entries {
     lost: Vec<Value>,
+    late: Vec<Value>,
+    doubled: Vec<Value>,
+    reseeds: Vec<Value>,
     partitions: Vec<Value>,
     faults: Vec<Value>,
     obstacles: Vec<Value>,
@@ -123,10 +129,21 @@ impl Entries {
     /// Adds the entries of a fault; those of the others are not in lists.
     fn add(&mut self, fault: &PlannedFault, tick_s: f64) {
         match fault {
-            PlannedFault::Lose { link, number } => self.lost.push(table([
-                ("from", link.from.to_string().into()),
-                ("to", link.to.to_string().into()),
-                ("number", integer(*number)),
+            PlannedFault::Lose { link, number } => {
+                self.lost.push(Value::Table(command(link, *number)));
+            }
+            PlannedFault::Late { link, number, by } => {
+                let mut late = command(link, *number);
+                late.insert("by".to_owned(), seconds(*by, tick_s).into());
+                self.late.push(Value::Table(late));
+            }
+            PlannedFault::Double { link, number } => {
+                self.doubled.push(Value::Table(command(link, *number)));
+            }
+            PlannedFault::Reseed { at, seed, of } => self.reseeds.push(table([
+                ("at", seconds(*at, tick_s).into()),
+                ("seed", integer(*seed)),
+                ("of", texts(of.iter().map(String::as_str))),
             ])),
             PlannedFault::Partition {
                 one,
@@ -157,6 +174,15 @@ impl Entries {
             PlannedFault::Channel { .. } | PlannedFault::Crowd { .. } => {}
         }
     }
+}
+
+/// The entry of a single command.
+fn command(link: &Link, number: u64) -> Table {
+    let mut entry = Table::new();
+    entry.insert("from".to_owned(), link.from.to_string().into());
+    entry.insert("to".to_owned(), link.to.to_string().into());
+    entry.insert("number".to_owned(), integer(number));
+    entry
 }
 
 /// A table of TOML.

@@ -7,7 +7,8 @@ use serde::Serialize;
 
 use super::case::FaultCase;
 use super::fault::{FaultClass, Link, PlannedFault};
-use super::trial::{SentMessage, TrialResult};
+use super::sent::SentMessage;
+use super::trial::TrialResult;
 
 /// What the faults of a case do.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -24,6 +25,20 @@ pub enum Sign {
         /// The text.
         text: String,
     },
+    /// A command with this text is late on this link.
+    Late {
+        /// The link.
+        link: Link,
+        /// The text.
+        text: String,
+    },
+    /// A command with this text arrives twice on this link.
+    Doubled {
+        /// The link.
+        link: Link,
+        /// The text.
+        text: String,
+    },
     /// This robot takes no part for a time.
     Absent(RobotName),
     /// There is a fault of this kind.
@@ -35,13 +50,17 @@ impl FailureSignature {
     pub(super) fn of_faults(case: &FaultCase, played: &TrialResult) -> Self {
         let mut signs = BTreeSet::new();
         for fault in &case.faults {
+            if let Some((link, number)) = fault.command() {
+                let mut sent = played.sent.iter();
+                let message = sent.find(|message| message.is(link, number));
+                signs.extend(message.map(|message| match fault {
+                    PlannedFault::Late { .. } => late(message),
+                    PlannedFault::Double { .. } => doubled(message),
+                    _ => lost(message),
+                }));
+                continue;
+            }
             match fault {
-                PlannedFault::Lose { link, number } => {
-                    let mut sent = played.sent.iter();
-                    let message =
-                        sent.find(|message| message.link == *link && message.number == *number);
-                    signs.extend(message.map(lost));
-                }
                 PlannedFault::Absence { robot, .. } => {
                     signs.insert(Sign::Absent(robot.clone()));
                 }
@@ -61,6 +80,12 @@ impl FailureSignature {
             if message.is_lost {
                 cause.0.insert(lost(message));
             }
+            if message.late > 0 {
+                cause.0.insert(late(message));
+            }
+            if message.is_doubled {
+                cause.0.insert(doubled(message));
+            }
         }
         cause
     }
@@ -73,6 +98,20 @@ impl FailureSignature {
 
 fn lost(message: &SentMessage) -> Sign {
     Sign::Lost {
+        link: message.link.clone(),
+        text: message.text.clone(),
+    }
+}
+
+fn late(message: &SentMessage) -> Sign {
+    Sign::Late {
+        link: message.link.clone(),
+        text: message.text.clone(),
+    }
+}
+
+fn doubled(message: &SentMessage) -> Sign {
+    Sign::Doubled {
         link: message.link.clone(),
         text: message.text.clone(),
     }

@@ -1,6 +1,6 @@
 //! What happened in the runs of a hunt, and in how many of them.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use protocol::RobotName;
 use protocol::event::Cause;
@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::fault::{FaultClass, Link};
 
 /// Most features that are told apart, because robots choose the texts of commands and states.
-const MAX_FEATURES: usize = 10_000;
+pub(super) const MAX_FEATURES: usize = 10_000;
 
 /// Something that can happen in a run.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -52,6 +52,23 @@ pub enum Feature {
         /// The emotion after.
         to: String,
     },
+    /// What some run should reach was seen.
+    Reached {
+        /// Name of the expectation.
+        expectation: String,
+    },
+}
+
+impl Feature {
+    /// Whether a run that shows it is in another state from then on, as far as its robots show: a transition, a command that
+    /// arrives, a goal. What the faults of a plan do by themselves is none.
+    pub(super) fn is_state(&self) -> bool {
+        match self {
+            Self::Behavior { .. } | Self::Emotion { .. } | Self::Reached { .. } => true,
+            Self::Message { fate, .. } => *fate == CommandFate::Delivered,
+            Self::Fault { .. } | Self::QueryLost { .. } => false,
+        }
+    }
 }
 
 /// What became of a command.
@@ -83,15 +100,13 @@ struct CoverageRow<'a> {
 }
 
 impl Coverage {
-    /// Adds the features of a run; returns how many of them are new.
-    pub(super) fn add(&mut self, features: BTreeSet<Feature>) -> usize {
-        let before = self.counts.len();
+    /// Adds the features of a run.
+    pub(super) fn add<'a>(&mut self, features: impl Iterator<Item = &'a Feature>) {
         for feature in features {
-            if self.counts.len() < MAX_FEATURES || self.counts.contains_key(&feature) {
-                *self.counts.entry(feature).or_default() += 1;
+            if self.counts.len() < MAX_FEATURES || self.counts.contains_key(feature) {
+                *self.counts.entry(feature.clone()).or_default() += 1;
             }
         }
-        self.counts.len() - before
     }
 
     /// The features, with the number of plans in whose runs each occurred.

@@ -1,7 +1,5 @@
 //! Draws plans of faults from a seed.
 
-use std::collections::BTreeMap;
-
 use protocol::messages::Point;
 use protocol::random::{Stream, unit};
 use protocol::{RobotName, Tick};
@@ -9,10 +7,19 @@ use scenario::MAX_GUESTS;
 use scenario::Scenario;
 
 use super::fault::{AbsenceReason, Effect, FaultClass, Link, Messages, PlannedFault, TickSpan};
+use super::sent::Moment;
 use super::trial::TrialResult;
 
-/// Most faults of a plan.
+/// Most faults of a plan that is drawn anew.
 const MAX_FAULTS: usize = 4;
+/// Most faults of a plan that goes on from a state, with those that led to it.
+const MAX_STEPS: usize = 8;
+/// How often the time after a state is halved at most, so that faults soon after it are as likely as later ones.
+const HALVINGS: usize = 6;
+/// Seeds of re-seeds are below this number, so that people can read them.
+const MAX_RESEED: usize = 1_000_000_000;
+/// Longest delay of a single command, ticks.
+const MAX_LATE_TICKS: usize = 256;
 /// Most obstacles of a wall.
 const MAX_WALL: usize = 8;
 /// Shortest time of a fault, ticks, unless the hunt draws shorter ones only.
@@ -27,9 +34,11 @@ const ATTEMPTS: usize = 10;
 pub struct Ground {
     scenario: Scenario,
     roster: Vec<RobotName>,
-    /// Number of commands on each link in the run without faults.
-    sent: BTreeMap<Link, u64>,
+    /// The beginning of the run without faults.
+    beginning: Moment,
     kinds: Vec<FaultClass>,
+    /// Those of them that can begin in the middle of a run.
+    later_kinds: Vec<FaultClass>,
     /// Longest time of a fault.
     longest_ticks: Tick,
 }
@@ -44,18 +53,12 @@ impl Ground {
         kinds: &[FaultClass],
         longest_s: f64,
     ) -> Self {
-        let mut sent = BTreeMap::new();
-        for message in &played.sent {
-            if scenario.robots.contains_key(&message.link.to) {
-                sent.insert(message.link.clone(), message.number);
-            }
-        }
-
         let mut ground = Self {
             scenario: scenario.clone(),
             roster: scenario.roster(),
-            sent,
+            beginning: Moment::of(&played.sent, 0),
             kinds: Vec::new(),
+            later_kinds: Vec::new(),
             longest_ticks: ((longest_s / scenario.tick_s).round() as Tick).max(1),
         };
         for kind in kinds {
@@ -63,6 +66,8 @@ impl Ground {
                 ground.kinds.push(*kind);
             }
         }
+        let later = ground.kinds.iter().copied();
+        ground.later_kinds = later.filter(|kind| kind.can_begin_later()).collect();
         ground
     }
 
@@ -74,7 +79,9 @@ impl Ground {
 
     fn has(&self, kind: FaultClass) -> bool {
         match kind {
-            FaultClass::Lose => !self.sent.is_empty(),
+            FaultClass::Lose | FaultClass::Late | FaultClass::Double => {
+                !self.links(&self.beginning).is_empty()
+            }
             FaultClass::Loss
             | FaultClass::Burst
             | FaultClass::Delay
@@ -82,60 +89,111 @@ impl Ground {
             | FaultClass::Partition
             | FaultClass::OneWay => self.roster.len() > 1,
             FaultClass::Crash | FaultClass::Hang => !self.roster.is_empty(),
-            FaultClass::Wall => true,
+            FaultClass::Wall | FaultClass::Reseed => true,
             FaultClass::Crowd => self.scenario.guests.count > 0,
         }
     }
 
     /// A new plan of one to four faults; fewer are more likely.
     pub fn draw(&self, chance: &mut Stream) -> Vec<PlannedFault> {
-        let mut faults = vec![self.fault(chance)];
+        let mut faults = Vec::new();
+        self.add(&mut faults, &self.kinds, &self.beginning, chance);
         while faults.len() < MAX_FAULTS && unit(chance) < 0.5 {
-            faults.push(self.fault(chance));
+            self.add(&mut faults, &self.kinds, &self.beginning, chance);
         }
         faults
     }
 
-    /// A plan that is like another one: a fault is replaced or added.
-    pub fn mutate(&self, plan: &[PlannedFault], chance: &mut Stream) -> Vec<PlannedFault> {
-        let mut faults = plan.to_vec();
-        let fault = self.fault(chance);
-        let is_full = faults.len() >= MAX_FAULTS;
-        if !faults.is_empty() && (is_full || unit(chance) < 0.5) {
-            let place = below(faults.len(), chance);
-            faults[place] = fault;
+    /// Whether something can be drawn for the time after a state to which these faults led.
+    pub(super) fn can_go_on(&self, faults: &[PlannedFault]) -> bool {
+        !self.later_kinds.is_empty() && faults.len() < MAX_STEPS
+    }
+
+    /// A plan that goes on from a moment to which these faults led: in every second one chance is another one from then on, and
+    /// further faults begin.
+    pub(super) fn go_on(
+        &self,
+        faults: &[PlannedFault],
+        moment: &Moment,
+        chance: &mut Stream,
+    ) -> Vec<PlannedFault> {
+        let mut faults = faults.to_vec();
+        let can_reseed = self.later_kinds.contains(&FaultClass::Reseed);
+        if can_reseed && unit(chance) < 0.5 {
+            self.add(&mut faults, &[FaultClass::Reseed], moment, chance);
         } else {
+            self.add(&mut faults, &self.later_kinds, moment, chance);
+        }
+        while faults.len() < MAX_STEPS && unit(chance) < 0.5 {
+            self.add(&mut faults, &self.later_kinds, moment, chance);
+        }
+        faults
+    }
+
+    /// Adds a fault of one of these kinds. Chance becomes another one once in a tick.
+    fn add(
+        &self,
+        faults: &mut Vec<PlannedFault>,
+        kinds: &[FaultClass],
+        moment: &Moment,
+        chance: &mut Stream,
+    ) {
+        let kind = kinds[below(kinds.len(), chance)];
+        let fault = self.fault(kind, moment, chance);
+        let is_twice = faults.iter().any(|other| match (other, &fault) {
+            (PlannedFault::Reseed { at: one, .. }, PlannedFault::Reseed { at: other, .. }) => {
+                one == other
+            }
+            _ => false,
+        });
+        if !is_twice {
             faults.push(fault);
         }
-        faults
     }
 
-    fn fault(&self, chance: &mut Stream) -> PlannedFault {
-        let kind = self.kinds[below(self.kinds.len(), chance)];
+    fn fault(&self, kind: FaultClass, moment: &Moment, chance: &mut Stream) -> PlannedFault {
         match kind {
-            FaultClass::Lose => self.lose(chance),
+            FaultClass::Lose => {
+                let (link, number) = self.command(moment, chance);
+                PlannedFault::Lose { link, number }
+            }
+            FaultClass::Late => {
+                let (link, number) = self.command(moment, chance);
+                let most = MAX_LATE_TICKS >> below(DOUBLINGS, chance);
+                let by = 1 + below(most, chance) as Tick;
+                PlannedFault::Late { link, number, by }
+            }
+            FaultClass::Double => {
+                let (link, number) = self.command(moment, chance);
+                PlannedFault::Double { link, number }
+            }
+            FaultClass::Reseed => PlannedFault::Reseed {
+                at: moment.after + 1,
+                seed: 1 + below(MAX_RESEED, chance) as u64,
+                of: Vec::new(),
+            },
             FaultClass::Loss => {
                 let effect = Effect::Loss(5 * (1 + below(20, chance) as u64));
-                self.channel(self.messages(chance), effect, chance)
+                self.channel(self.messages(chance), effect, moment, chance)
             }
             FaultClass::Burst => {
                 let enter = 1 + below(20, chance) as u64;
                 let leave = 5 * (1 + below(10, chance) as u64);
                 let effect = Effect::Burst(enter, leave);
-                self.channel(self.messages(chance), effect, chance)
+                self.channel(self.messages(chance), effect, moment, chance)
             }
             FaultClass::Delay => {
                 let effect = Effect::Delay(1 << below(6, chance));
-                self.channel(Messages::Commands, effect, chance)
+                self.channel(Messages::Commands, effect, moment, chance)
             }
             FaultClass::Duplication => {
                 let effect = Effect::Duplication(5 * (1 + below(20, chance) as u64));
-                self.channel(Messages::Commands, effect, chance)
+                self.channel(Messages::Commands, effect, moment, chance)
             }
-            FaultClass::Partition => self.partition(false, chance),
-            FaultClass::OneWay => self.partition(true, chance),
-            FaultClass::Crash => self.absence(AbsenceReason::Crash, chance),
-            FaultClass::Hang => self.absence(AbsenceReason::Hang, chance),
+            FaultClass::Partition => self.partition(false, moment, chance),
+            FaultClass::OneWay => self.partition(true, moment, chance),
+            FaultClass::Crash => self.absence(AbsenceReason::Crash, moment, chance),
+            FaultClass::Hang => self.absence(AbsenceReason::Hang, moment, chance),
             FaultClass::Wall => self.wall(chance),
             FaultClass::Crowd => {
                 let count = self.scenario.guests.count;
@@ -146,14 +204,25 @@ impl Ground {
         }
     }
 
-    fn lose(&self, chance: &mut Stream) -> PlannedFault {
-        let links: Vec<(&Link, u64)> = self.sent.iter().map(|(link, n)| (link, *n)).collect();
-        let (link, sent) = links[below(links.len(), chance)];
-        let number = 1 + below(usize::try_from(sent).unwrap_or(usize::MAX), chance) as u64;
-        PlannedFault::Lose {
-            link: link.clone(),
-            number,
+    /// The links to robots of the roster on which commands are sent.
+    fn links<'a>(&self, moment: &'a Moment) -> Vec<(&'a Link, (u64, u64))> {
+        let links = moment.links.iter().map(|(link, counts)| (link, *counts));
+        links
+            .filter(|(link, _)| self.scenario.robots.contains_key(&link.to))
+            .collect()
+    }
+
+    /// A command on which nothing is decided in a moment: its link and its number.
+    fn command(&self, moment: &Moment, chance: &mut Stream) -> (Link, u64) {
+        let mut links = self.links(moment);
+        if links.is_empty() {
+            links = self.links(&self.beginning);
         }
+        let (link, (decided, all)) = links[below(links.len(), chance)];
+        // At the end of a run there may be none. In another run there may be one.
+        let left = usize::try_from((all - decided).max(1)).unwrap_or(usize::MAX);
+        let number = decided + 1 + below(soon(left, moment, chance), chance) as u64;
+        (link.clone(), number)
     }
 
     fn messages(&self, chance: &mut Stream) -> Messages {
@@ -164,7 +233,13 @@ impl Ground {
         }
     }
 
-    fn channel(&self, of: Messages, effect: Effect, chance: &mut Stream) -> PlannedFault {
+    fn channel(
+        &self,
+        of: Messages,
+        effect: Effect,
+        moment: &Moment,
+        chance: &mut Stream,
+    ) -> PlannedFault {
         let mut link = None;
         if unit(chance) < 0.5 {
             let from = below(self.roster.len(), chance);
@@ -180,18 +255,18 @@ impl Ground {
             link,
             of,
             effect,
-            span: self.span(chance),
+            span: self.span(moment, chance),
         }
     }
 
-    fn absence(&self, why: AbsenceReason, chance: &mut Stream) -> PlannedFault {
+    fn absence(&self, why: AbsenceReason, moment: &Moment, chance: &mut Stream) -> PlannedFault {
         let robot = self.roster[below(self.roster.len(), chance)].clone();
-        let span = self.span(chance);
+        let span = self.span(moment, chance);
         PlannedFault::Absence { robot, why, span }
     }
 
     /// A partition of one robot from the others, or of two halves.
-    fn partition(&self, one_way: bool, chance: &mut Stream) -> PlannedFault {
+    fn partition(&self, one_way: bool, moment: &Moment, chance: &mut Stream) -> PlannedFault {
         let first = below(self.roster.len(), chance);
         let mut one = vec![self.roster[first].clone()];
         let mut other = Vec::new();
@@ -222,7 +297,7 @@ impl Ground {
             other,
             one_way,
             cuts,
-            span: self.span(chance),
+            span: self.span(moment, chance),
         }
     }
 
@@ -273,10 +348,11 @@ impl Ground {
         is_inside(place.x, width_m) && is_inside(place.y, height_m) && !is_on_robot
     }
 
-    /// A time that begins in the run.
-    fn span(&self, chance: &mut Stream) -> TickSpan {
-        let ticks = usize::try_from(self.scenario.ticks).unwrap_or(usize::MAX);
-        let from = 1 + below(ticks, chance) as Tick;
+    /// A time that begins in the run, after a moment.
+    fn span(&self, moment: &Moment, chance: &mut Stream) -> TickSpan {
+        let left = self.scenario.ticks.saturating_sub(moment.after).max(1);
+        let left = usize::try_from(left).unwrap_or(usize::MAX);
+        let from = moment.after + 1 + below(soon(left, moment, chance), chance) as Tick;
         let scale = SHORTEST_TICKS << below(DOUBLINGS, chance);
         let lasting = scale + below(scale as usize, chance) as Tick;
         TickSpan {
@@ -284,6 +360,15 @@ impl Ground {
             until: from + lasting.min(self.longest_ticks),
         }
     }
+}
+
+/// How many of the next things one is drawn from, of those that are left: all at the beginning of a run. After a state often only the
+/// first ones, because it may not last.
+fn soon(left: usize, moment: &Moment, chance: &mut Stream) -> usize {
+    if moment.after == 0 {
+        return left;
+    }
+    (left >> below(HALVINGS, chance)).max(1)
 }
 
 /// A number from 0 up to but not including `end`, which is not 0.

@@ -4,6 +4,8 @@ use protocol::messages::Point;
 use protocol::{RobotName, Tick};
 use serde::Serialize;
 
+use super::sent::SentMessage;
+
 /// Steps of a probability: files do not show digits that mean nothing.
 const CHANCE_STEPS: f64 = 100.0;
 
@@ -13,6 +15,10 @@ const CHANCE_STEPS: f64 = 100.0;
 pub enum FaultClass {
     /// One command is lost.
     Lose,
+    /// One command is late.
+    Late,
+    /// One command arrives twice.
+    Double,
     /// Messages are lost by chance.
     Loss,
     /// Messages are lost by chance in bursts.
@@ -33,12 +39,16 @@ pub enum FaultClass {
     Wall,
     /// There are more guests.
     Crowd,
+    /// Chance is another one.
+    Reseed,
 }
 
 impl FaultClass {
     /// All kinds.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 14] = [
         Self::Lose,
+        Self::Late,
+        Self::Double,
         Self::Loss,
         Self::Burst,
         Self::Delay,
@@ -49,6 +59,7 @@ impl FaultClass {
         Self::Hang,
         Self::Wall,
         Self::Crowd,
+        Self::Reseed,
     ];
 
     /// Its name on the command line.
@@ -56,6 +67,8 @@ impl FaultClass {
     pub fn name(self) -> &'static str {
         match self {
             Self::Lose => "lose",
+            Self::Late => "late",
+            Self::Double => "double",
             Self::Loss => "loss",
             Self::Burst => "burst",
             Self::Delay => "delay",
@@ -66,7 +79,13 @@ impl FaultClass {
             Self::Hang => "hang",
             Self::Wall => "wall",
             Self::Crowd => "crowd",
+            Self::Reseed => "reseed",
         }
+    }
+
+    /// Whether it can begin in the middle of a run.
+    pub(super) fn can_begin_later(self) -> bool {
+        !matches!(self, Self::Wall | Self::Crowd)
     }
 }
 
@@ -165,6 +184,22 @@ pub enum PlannedFault {
         /// Number of the command among those on the link, from 1.
         number: u64,
     },
+    /// One command is late.
+    Late {
+        /// The link.
+        link: Link,
+        /// Number of the command among those on the link, from 1.
+        number: u64,
+        /// How much later it arrives, ticks.
+        by: Tick,
+    },
+    /// One command arrives twice.
+    Double {
+        /// The link.
+        link: Link,
+        /// Number of the command among those on the link, from 1.
+        number: u64,
+    },
     /// The network does something by chance.
     Channel {
         /// Only on this link; `None` for all.
@@ -208,6 +243,15 @@ pub enum PlannedFault {
         /// The number.
         guests: usize,
     },
+    /// Chance is another one from a tick on.
+    Reseed {
+        /// The first tick that draws from the other streams.
+        at: Tick,
+        /// Their seed.
+        seed: u64,
+        /// The kinds of chance, as scenario files have them; empty for all.
+        of: Vec<String>,
+    },
 }
 
 impl PlannedFault {
@@ -216,6 +260,8 @@ impl PlannedFault {
     pub fn kind(&self) -> FaultClass {
         match self {
             Self::Lose { .. } => FaultClass::Lose,
+            Self::Late { .. } => FaultClass::Late,
+            Self::Double { .. } => FaultClass::Double,
             Self::Channel { effect, .. } => match effect {
                 Effect::Loss(_) => FaultClass::Loss,
                 Effect::Burst(..) => FaultClass::Burst,
@@ -230,6 +276,45 @@ impl PlannedFault {
             },
             Self::Wall { .. } => FaultClass::Wall,
             Self::Crowd { .. } => FaultClass::Crowd,
+            Self::Reseed { .. } => FaultClass::Reseed,
+        }
+    }
+
+    /// The link and the number of the command, if it concerns exactly one.
+    pub(super) fn command(&self) -> Option<(&Link, u64)> {
+        match self {
+            Self::Lose { link, number }
+            | Self::Late { link, number, .. }
+            | Self::Double { link, number } => Some((link, *number)),
+            _ => None,
+        }
+    }
+
+    /// The same for another command of the link, if it concerns exactly one.
+    pub(super) fn of_command(&self, other: u64) -> Self {
+        let mut fault = self.clone();
+        match &mut fault {
+            Self::Lose { number, .. } | Self::Late { number, .. } | Self::Double { number, .. } => {
+                *number = other;
+            }
+            _ => {}
+        }
+        fault
+    }
+
+    /// Whether it has begun by the end of a tick, in a run in which these commands were sent.
+    pub(super) fn has_begun(&self, tick: Tick, sent: &[SentMessage]) -> bool {
+        if let Some((link, number)) = self.command() {
+            // The network decides on a command in the tick after it was sent.
+            let mut sent = sent.iter();
+            return sent.any(|message| message.is(link, number) && message.tick < tick);
+        }
+        match self {
+            Self::Channel { span, .. }
+            | Self::Partition { span, .. }
+            | Self::Absence { span, .. } => span.from <= tick,
+            Self::Reseed { at, .. } => *at <= tick,
+            _ => true,
         }
     }
 
@@ -237,9 +322,12 @@ impl PlannedFault {
     pub(super) fn without(&self, robot: &RobotName) -> Option<Self> {
         let has = |link: &Link| link.from == *robot || link.to == *robot;
         let is_gone = match self {
-            Self::Lose { link, .. } => has(link),
+            Self::Lose { link, .. } | Self::Late { link, .. } | Self::Double { link, .. } => {
+                has(link)
+            }
             Self::Channel { link, .. } => link.as_ref().is_some_and(has),
             Self::Absence { robot: own, .. } => own == robot,
+            Self::Reseed { of, .. } => *of == [robot_chance(robot)],
             Self::Partition { .. } | Self::Wall { .. } | Self::Crowd { .. } => false,
         };
         if is_gone {
@@ -247,24 +335,28 @@ impl PlannedFault {
         }
 
         let mut fault = self.clone();
-        if let Self::Partition { one, other, .. } = &mut fault {
-            one.retain(|name| name != robot);
-            other.retain(|name| name != robot);
-            if one.is_empty() || other.is_empty() {
-                return None;
+        match &mut fault {
+            Self::Partition { one, other, .. } => {
+                one.retain(|name| name != robot);
+                other.retain(|name| name != robot);
+                if one.is_empty() || other.is_empty() {
+                    return None;
+                }
             }
+            Self::Reseed { of, .. } => of.retain(|kind| *kind != robot_chance(robot)),
+            _ => {}
         }
         Some(fault)
     }
 
-    /// The fault at another time. Walls and guests have none.
+    /// The fault at another time. Only what lasts for a time has one.
     pub(super) fn at(&self, time: TickSpan) -> Self {
         let mut fault = self.clone();
         match &mut fault {
             Self::Channel { span, .. }
             | Self::Partition { span, .. }
             | Self::Absence { span, .. } => *span = time,
-            Self::Lose { .. } | Self::Wall { .. } | Self::Crowd { .. } => {}
+            _ => {}
         }
         fault
     }
@@ -275,6 +367,15 @@ impl PlannedFault {
         match self {
             Self::Lose { link, number } => {
                 format!("command {number} from {} to {} is lost", link.from, link.to)
+            }
+            Self::Late { link, number, by } => {
+                let by = seconds(*by, tick_s);
+                let Link { from, to } = link;
+                format!("command {number} from {from} to {to} arrives {by} later")
+            }
+            Self::Double { link, number } => {
+                let Link { from, to } = link;
+                format!("command {number} from {from} to {to} arrives twice")
             }
             Self::Channel {
                 link,
@@ -320,6 +421,14 @@ impl PlannedFault {
                 format!("further obstacles stand at {}", places.join("; "))
             }
             Self::Crowd { guests } => format!("there are {guests} guests"),
+            Self::Reseed { at, seed, of } => {
+                let what = match &of[..] {
+                    [] => "chance".to_owned(),
+                    kinds => format!("chance of {}", kinds.join(" and ")),
+                };
+                let at = seconds(*at, tick_s);
+                format!("{what} is drawn anew from {at} on, with the seed {seed}")
+            }
         }
     }
 }
@@ -350,6 +459,11 @@ impl TickSpan {
             seconds(self.until, tick_s)
         )
     }
+}
+
+/// The chance of a robot, as scenario files have it.
+pub(super) fn robot_chance(robot: &RobotName) -> String {
+    format!("robot.{robot}")
 }
 
 fn names(robots: &[RobotName]) -> String {

@@ -13,7 +13,7 @@ use toml::Value;
 
 use super::case::FaultCase;
 use super::fault::PlannedFault;
-use super::trial::{Subject, TrialResult};
+use super::trial::{RUNS, Subject, TrialResult};
 use crate::shell;
 use export::draft::{Draft, unwritable};
 
@@ -143,6 +143,10 @@ fn comment(
     lines.push(format!(
         "    cars run {file} --run {stem}    # fails again, with exit status 1"
     ));
+    if heading.expectation != RUNS {
+        let expectation = shell::word(heading.expectation);
+        lines.push(format!("    cars why {stem} {expectation}"));
+    }
     lines.push(format!("    cars diagram runs/{stem} -o {stem}.svg"));
     lines.push(format!("    cars-console --recording runs/{stem}"));
 
@@ -154,15 +158,15 @@ fn comment(
     text + "\n"
 }
 
-/// A fault in words, with the text of the message that it loses.
+/// A fault in words, with the text of the command that it concerns.
 fn described(fault: &PlannedFault, played: &TrialResult, tick_s: f64) -> String {
     let words = fault.in_words(tick_s);
-    let PlannedFault::Lose { link, number } = fault else {
+    let Some((link, number)) = fault.command() else {
         return words;
     };
 
     let mut sent = played.sent.iter();
-    match sent.find(|message| message.link == *link && message.number == *number) {
+    match sent.find(|message| message.is(link, number)) {
         Some(message) => format!(
             "{words}: \"{}\", sent at {} s",
             message.text,

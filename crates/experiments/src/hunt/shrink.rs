@@ -1,7 +1,7 @@
 //! Shrinking: from a case in which an expectation fails to a smaller one in which the same expectation fails.
 //!
-//! Faults are replaced by the single messages that they lost, left out by delta debugging (Zeller and Hildebrandt 2002), and
-//! weakened and moved to earlier times; robots, guests and the end of the run are left out. Only a case that was played, and in which the expectation
+//! Faults are replaced by the single commands that they lost, delayed or doubled, left out by delta debugging (Zeller and Hildebrandt
+//! 2002), and weakened and moved to earlier times and commands; robots, guests and the end of the run are left out. Only a case that was played, and in which the expectation
 //! failed, is taken. A smaller scenario is taken only if the expectation does not fail in it without faults: otherwise what
 //! is missing in it would be the cause.
 
@@ -11,12 +11,18 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use protocol::{RobotName, Tick};
 
 use super::case::FaultCase;
-use super::fault::{Effect, Messages, PlannedFault, TickSpan};
+use super::fault::{Effect, Messages, PlannedFault, TickSpan, robot_chance};
 use super::parallel::first;
+use super::sent::SentMessage;
 use super::trial::{Trial, TrialResult};
 
 /// Least time of a fault, ticks.
 const MIN_TICKS: Tick = 2;
+
+/// How many of the first commands of a link are tried in the place of a later one, one by one.
+const FIRST_COMMANDS: u64 = 16;
+/// How many equal parts the numbers below a number are divided into, one of each being tried.
+const STEPS: u64 = 8;
 
 /// What bounds the shrinking of one case.
 #[derive(Debug, Clone, Copy)]
@@ -169,36 +175,34 @@ impl Shrinker<'_> {
         self.take_first(vec![case]);
     }
 
-    /// Replaces faults by the single messages that were lost in the run: all faults, or one of them.
+    /// Replaces faults by the single commands that were lost, late or doubled in the run: all faults, or one of them.
     fn make_concrete(&mut self) {
-        let mut lost = Vec::new();
+        let mut concrete = Vec::new();
         for message in &self.played.sent {
-            let fault = PlannedFault::Lose {
-                link: message.link.clone(),
-                number: message.number,
-            };
-            if message.is_lost && !self.best.faults.contains(&fault) {
-                lost.push(fault);
+            for fault in fates_as_faults(message) {
+                if !self.best.faults.contains(&fault) {
+                    concrete.push(fault);
+                }
             }
         }
-        if lost.is_empty() {
+        if concrete.is_empty() {
             return;
         }
 
         let mut named = Vec::new();
         for fault in &self.best.faults {
-            if matches!(fault, PlannedFault::Lose { .. }) {
+            if fault.command().is_some() {
                 named.push(fault.clone());
             }
         }
-        named.extend(lost.iter().cloned());
+        named.extend(concrete.iter().cloned());
         let mut cases = vec![self.best.with_faults(named)];
         for (index, fault) in self.best.faults.iter().enumerate() {
-            if matches!(fault, PlannedFault::Lose { .. }) {
+            if fault.command().is_some() {
                 continue;
             }
             let mut faults = self.best.faults.clone();
-            faults.splice(index..=index, lost.iter().cloned());
+            faults.splice(index..=index, concrete.iter().cloned());
             cases.push(self.best.with_faults(faults));
         }
         self.take_first(cases);
@@ -241,7 +245,7 @@ impl Shrinker<'_> {
         while index < self.best.faults.len() && !self.is_over() {
             let mut cases = Vec::new();
             let fault = &self.best.faults[index];
-            let mut instead = weaker(fault, self.world.guests);
+            let mut instead = weaker(fault, self.world);
             instead.extend(earlier(fault));
             instead.retain(|other| !self.best.faults.contains(other));
             for weaker in instead {
@@ -297,11 +301,57 @@ impl Shrinker<'_> {
     }
 }
 
+/// What became of a command, as faults that do exactly that.
+fn fates_as_faults(message: &SentMessage) -> Vec<PlannedFault> {
+    let link = || message.link.clone();
+    let number = message.number;
+    let mut faults = Vec::new();
+    if message.is_lost {
+        let link = link();
+        return vec![PlannedFault::Lose { link, number }];
+    }
+    if message.late > 0 {
+        faults.push(PlannedFault::Late {
+            link: link(),
+            number,
+            by: message.late,
+        });
+    }
+    if message.is_doubled {
+        let link = link();
+        faults.push(PlannedFault::Double { link, number });
+    }
+    faults
+}
+
 /// Weaker faults in the place of a fault, the weakest first. Each is smaller by a measure that cannot fall for ever.
-fn weaker(fault: &PlannedFault, guests: usize) -> Vec<PlannedFault> {
+fn weaker(fault: &PlannedFault, world: &ScenarioParts) -> Vec<PlannedFault> {
     let mut all = Vec::new();
     match fault {
-        PlannedFault::Lose { .. } => {}
+        PlannedFault::Lose { .. } | PlannedFault::Double { .. } => {}
+        PlannedFault::Late { link, number, by } => {
+            for by in before(*by, 1, 1) {
+                all.push(PlannedFault::Late {
+                    link: link.clone(),
+                    number: *number,
+                    by,
+                });
+            }
+        }
+        PlannedFault::Reseed { at, seed, of } => {
+            // One kind of chance in the place of all of it.
+            if of.is_empty() {
+                let kinds = ["network", "guests", "sensing"].map(str::to_owned);
+                let robots = world.roster.iter().map(robot_chance);
+                for kind in kinds.into_iter().chain(robots) {
+                    all.push(PlannedFault::Reseed {
+                        at: *at,
+                        seed: *seed,
+                        of: vec![kind],
+                    });
+                }
+            }
+        }
         PlannedFault::Channel {
             link,
             of,
@@ -342,6 +392,7 @@ fn weaker(fault: &PlannedFault, guests: usize) -> Vec<PlannedFault> {
             }
         }
         PlannedFault::Crowd { guests: count } => {
+            let guests = world.guests;
             for share in [4, 2] {
                 let fewer = guests + count.saturating_sub(guests) / share;
                 if fewer < *count && fewer > guests {
@@ -357,19 +408,16 @@ fn weaker(fault: &PlannedFault, guests: usize) -> Vec<PlannedFault> {
 /// The same fault at earlier times, the earliest first. A run in which it does the same is shorter.
 fn earlier(fault: &PlannedFault) -> Vec<PlannedFault> {
     let mut all = Vec::new();
-    match fault {
-        PlannedFault::Lose { link, number } => {
-            for number in before(*number, 1) {
-                all.push(PlannedFault::Lose {
-                    link: link.clone(),
-                    number,
-                });
-            }
+    if let Some((_, number)) = fault.command() {
+        for number in before(number, 1, FIRST_COMMANDS) {
+            all.push(fault.of_command(number));
         }
+    }
+    match fault {
         PlannedFault::Channel { span, .. }
         | PlannedFault::Partition { span, .. }
         | PlannedFault::Absence { span, .. } => {
-            for from in before(span.from, 0) {
+            for from in before(span.from, 0, 1) {
                 let span = TickSpan {
                     from,
                     until: from + (span.until - span.from),
@@ -377,25 +425,20 @@ fn earlier(fault: &PlannedFault) -> Vec<PlannedFault> {
                 all.push(fault.at(span));
             }
         }
-        PlannedFault::Wall { .. } | PlannedFault::Crowd { .. } => {}
+        _ => {}
     }
     all
 }
 
-/// Numbers from `least` on that are smaller than a number: the least one, one in the middle, and those a little smaller.
-fn before(number: u64, least: u64) -> Vec<u64> {
-    let mut all = Vec::new();
-    for other in [
-        least,
-        number / 2,
-        number.saturating_sub(8),
-        number.saturating_sub(1),
-    ] {
-        if (least..number).contains(&other) && !all.contains(&other) {
-            all.push(other);
-        }
-    }
-    all
+/// Numbers from `least` on that are smaller than a number, in their order: the `first` ones, some in equal steps, and those a little
+/// smaller. An expectation need not fail for all numbers between two for which it fails.
+fn before(number: u64, least: u64, first: u64) -> Vec<u64> {
+    let steps = 1..STEPS;
+    let mut all: BTreeSet<u64> = (least..least + first).collect();
+    all.extend(steps.map(|step| least + number.saturating_sub(least) * step / STEPS));
+    all.extend([8, 1].map(|less| number.saturating_sub(less)));
+    all.retain(|other| (least..number).contains(other));
+    all.into_iter().collect()
 }
 
 /// A shorter partition, one of a single direction, and one of a single kind of messages.
@@ -482,7 +525,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::super::fault::{AbsenceReason, Link};
-    use super::super::trial::{FailedExpectation, SentMessage};
+    use super::super::trial::FailedExpectation;
     use super::*;
     use lab::LabError;
 
@@ -551,6 +594,8 @@ mod tests {
                     number,
                     text: String::new(),
                     is_lost: lost.contains(&number),
+                    late: 0,
+                    is_doubled: false,
                 });
             }
             if self.fails(&lost) {

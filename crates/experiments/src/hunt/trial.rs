@@ -1,9 +1,10 @@
-//! Playing cases: what is asked of a run, and what came of it.
+//! Playing cases: what is asked of a run, and what came of it. A run in this process can be copied at a tick, and go on from there
+//! as another case that is the same up to it.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use config::{Changes, Source};
 use observe::Observation;
@@ -11,11 +12,12 @@ use protocol::messages::{End, Verdict};
 use protocol::{Event, RobotName, RunName, Tick};
 use scenario::Scenario;
 use simulator::Simulation;
-use timeline::{CommandSpan, Counts, Span, StateKind, Timeline};
+use timeline::{CommandSpan, Span, Timeline};
 
 use super::case::FaultCase;
 use super::coverage::{CommandFate, Feature};
 use super::fault::Link;
+use super::sent::SentMessage;
 use crate::follow::Follow;
 use crate::launches::Launches;
 use crate::own::{ByClass, RobotSource, RunRobots};
@@ -25,6 +27,9 @@ use lab::run::{Local, check_faults, make_robots_with};
 
 /// What is expected of every run beside the expectations of its scenario.
 pub const RUNS: &str = "the run goes to its end";
+
+/// Most copies of one run.
+const MAX_COPIES: usize = 8;
 
 /// What came of a run.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -39,8 +44,8 @@ pub struct TrialResult {
     pub ticks: Tick,
     /// Commands between robots, in the order in which they were sent.
     pub sent: Vec<SentMessage>,
-    /// What happened.
-    pub features: BTreeSet<Feature>,
+    /// What happened, with the tick in which it was seen first.
+    pub features: BTreeMap<Feature, Tick>,
 }
 
 /// An expectation that failed.
@@ -52,19 +57,65 @@ pub struct FailedExpectation {
     pub because: String,
 }
 
-/// A command that a robot sent.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct SentMessage {
-    /// When.
-    pub tick: Tick,
-    /// The link.
-    pub link: Link,
-    /// Its number on the link, from 1.
-    pub number: u64,
-    /// Its text.
-    pub text: String,
-    /// Whether it was lost, as a whole or in part.
-    pub is_lost: bool,
+/// A case, and the run that it goes on from.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Plan {
+    /// The case.
+    pub(super) case: FaultCase,
+    /// The tick up to which it is the same as the run from which it goes on; 0 for a plan that was drawn anew.
+    pub(super) after: Tick,
+    /// That run at that tick. Without it the case is played from its beginning, with the same result.
+    pub(super) saved: Option<Arc<SavedRun>>,
+}
+
+/// What came of a plan.
+#[derive(Debug)]
+pub(super) struct PlayedPlan {
+    /// What came of its run.
+    pub(super) result: TrialResult,
+    /// Copies of the run, by the tick in which it was in a new state.
+    pub(super) saved: BTreeMap<Tick, Arc<SavedRun>>,
+}
+
+/// A run in this process after a tick.
+pub(super) struct SavedRun {
+    /// A lock, because robots need not be usable by several threads at a time.
+    local: Mutex<Local>,
+    notes: TrialNotes,
+}
+
+impl std::fmt::Debug for SavedRun {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "SavedRun {{ tick: {} }}", self.notes.played.ticks)
+    }
+}
+
+/// Copies of a run where it is in a new state.
+struct Copies<'a> {
+    is_new: &'a (dyn Fn(&Feature) -> bool + Sync),
+    saved: BTreeMap<Tick, Arc<SavedRun>>,
+    /// Whether a robot cannot be copied, or there are enough.
+    is_over: bool,
+}
+
+impl Copies<'_> {
+    /// Copies the run if it was the first to reach something in the last tick.
+    fn note(&mut self, local: &Local, notes: &TrialNotes) {
+        if self.is_over || !notes.seen.iter().any(self.is_new) {
+            return;
+        }
+        match local.snapshot() {
+            Ok(copy) => {
+                let saved = SavedRun {
+                    local: Mutex::new(copy),
+                    notes: notes.clone(),
+                };
+                self.saved.insert(notes.played.ticks, Arc::new(saved));
+                self.is_over = self.saved.len() >= MAX_COPIES;
+            }
+            Err(_) => self.is_over = true,
+        }
+    }
 }
 
 /// Plays cases. The same case always has the same result.
@@ -170,46 +221,133 @@ impl Subject {
         Ok(Scenario::parse(&source, &self.folder)?)
     }
 
-    /// Plays a scenario in this process. Returns why it has not come to its end, if it has not.
-    fn play_here(
+    /// Plays a plan until one of the `wanted` expectations fails, or to its end. Where it reaches something that `is_new`, it is
+    /// copied, so that others can go on from there.
+    ///
+    /// # Errors
+    /// If it cannot be played.
+    pub(super) fn play_plan(
+        &self,
+        plan: &Plan,
+        wanted: &BTreeSet<String>,
+        is_new: &(dyn Fn(&Feature) -> bool + Sync),
+    ) -> Result<PlayedPlan, LabError> {
+        let scenario = self.scenario_of(&plan.case)?;
+        let mut copies = Copies {
+            is_new,
+            saved: BTreeMap::new(),
+            is_over: false,
+        };
+        let mut notes = TrialNotes::new(&scenario);
+
+        // A robot that panics or ends the run is what a hunt looks for.
+        let played = match &self.robots {
+            HuntRobots::InProcess(source) => {
+                let saved = plan.saved.as_deref();
+                if let Some(saved) = saved {
+                    notes = saved.notes.clone();
+                }
+                let robots = source.begin();
+                let mut local = self.local(scenario, robots.as_ref(), saved)?;
+                let is_begun = saved.is_some();
+                play_here(
+                    &mut local,
+                    is_begun,
+                    robots.as_ref(),
+                    wanted,
+                    &mut notes,
+                    &mut copies,
+                )
+            }
+            HuntRobots::Processes(launches, launch) => {
+                play_by_processes(scenario, launches, launch.as_ref(), wanted, &mut notes)?
+            }
+        };
+        if let Some(because) = played {
+            let tick = notes.played.ticks + 1;
+            let failure = FailedExpectation { tick, because };
+            notes.played.failed.insert(RUNS.to_owned(), failure);
+        }
+
+        let mut result = notes.finish();
+        for fault in &plan.case.faults {
+            let kind = fault.kind();
+            result.features.insert(Feature::Fault { kind }, 0);
+        }
+        Ok(PlayedPlan {
+            result,
+            saved: copies.saved,
+        })
+    }
+
+    /// A run of a scenario in this process: before its tick 0, or where a run is that was the same up to there.
+    fn local(
         &self,
         scenario: Scenario,
         robots: &dyn RunRobots,
-        wanted: &BTreeSet<String>,
-        notes: &mut TrialNotes,
-    ) -> Result<Option<String>, LabError> {
-        let run = RunName::unknown();
+        saved: Option<&SavedRun>,
+    ) -> Result<Local, LabError> {
+        if let Some(saved) = saved {
+            let copied = saved
+                .local
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .snapshot();
+            let mut local = copied.map_err(|robot| {
+                LabError::failed(format!("{robot} could be copied once, and not again"))
+            })?;
+            local.go_on_as(scenario);
+            return Ok(local);
+        }
+
         let make = |name: &_, class: &_| robots.make(name, class);
         let made = make_robots_with(&scenario, &self.file, &make)?;
-        let mut local = Local::with_robots(scenario, 1, &run, made)?;
-        let gone = catch_unwind(AssertUnwindSafe(|| {
-            go(&mut local, &run, robots, wanted, notes)
-        }));
-        Ok(match gone {
-            Ok(Ok(())) => None,
-            Ok(Err(error)) => Some(error.to_string()),
-            Err(_) => Some("a robot panicked".to_owned()),
-        })
+        Local::with_robots(scenario, 1, &RunName::unknown(), made)
+    }
+}
+
+/// Plays a run in this process. Returns why it has not come to its end, if it has not.
+fn play_here(
+    local: &mut Local,
+    is_begun: bool,
+    robots: &dyn RunRobots,
+    wanted: &BTreeSet<String>,
+    notes: &mut TrialNotes,
+    copies: &mut Copies<'_>,
+) -> Option<String> {
+    let gone = catch_unwind(AssertUnwindSafe(|| {
+        go(local, is_begun, robots, wanted, notes, copies)
+    }));
+    match gone {
+        Ok(Ok(())) => None,
+        Ok(Err(error)) => Some(error.to_string()),
+        Err(_) => Some("a robot panicked".to_owned()),
     }
 }
 
 /// Plays a run in this process until a wanted expectation fails, or to its end.
 fn go(
     local: &mut Local,
-    run: &RunName,
+    is_begun: bool,
     robots: &dyn RunRobots,
     wanted: &BTreeSet<String>,
     notes: &mut TrialNotes,
+    copies: &mut Copies<'_>,
 ) -> Result<(), LabError> {
-    let record = local.simulation.init(&mut local.robots)?;
-    notes.note(record.tick, &record.events);
+    let run = RunName::unknown();
+    if !is_begun {
+        let record = local.simulation.init(&mut local.robots)?;
+        notes.note(record.tick, &record.events);
+        copies.note(local, notes);
+    }
     while !local.simulation.is_over() {
         if notes.has_failed(wanted) {
             return Ok(());
         }
-        local.carry_out_faults_with(run, &|name, class| robots.make(name, class))?;
+        local.carry_out_faults_with(&run, &|name, class| robots.make(name, class))?;
         let record = local.simulation.step(&mut local.robots)?;
         notes.note(record.tick, &record.events);
+        copies.note(local, notes);
     }
 
     let end = local.simulation.end(End::Finished);
@@ -268,50 +406,41 @@ fn check_made(scenario: &Scenario, file: &Path, robots: &dyn RunRobots) -> Resul
 
 impl Trial for Subject {
     fn play(&self, case: &FaultCase, wanted: &BTreeSet<String>) -> Result<TrialResult, LabError> {
-        let scenario = self.scenario_of(case)?;
-        let mut notes = TrialNotes::default();
-        notes.played.expectations.insert(RUNS.to_owned());
-        for expectation in &scenario.expectations {
-            let name = expectation.name.clone();
-            notes.played.expectations.insert(name);
-        }
-        for fault in &case.faults {
-            let kind = fault.kind();
-            notes.played.features.insert(Feature::Fault { kind });
-        }
-
-        // A robot that panics or ends the run is what a hunt looks for.
-        let played = match &self.robots {
-            HuntRobots::InProcess(source) => {
-                self.play_here(scenario, source.begin().as_ref(), wanted, &mut notes)?
-            }
-            HuntRobots::Processes(launches, launch) => {
-                play_by_processes(scenario, launches, launch.as_ref(), wanted, &mut notes)?
-            }
+        let plan = Plan {
+            case: case.clone(),
+            ..Plan::default()
         };
-        let Some(because) = played else {
-            return Ok(notes.finish());
-        };
-        let failure = FailedExpectation {
-            tick: notes.played.ticks + 1,
-            because,
-        };
-        notes.played.failed.insert(RUNS.to_owned(), failure);
-        Ok(notes.finish())
+        Ok(self.play_plan(&plan, wanted, &|_| false)?.result)
     }
 }
 
 /// Notes on a run in progress.
-#[derive(Default)]
+#[derive(Debug, Clone, Default)]
 struct TrialNotes {
     played: TrialResult,
     timeline: Timeline,
-    counts: Counts,
     /// Commands between robots.
     commands: Vec<CommandSpan>,
+    /// Expectations that are goals.
+    goals: BTreeSet<String>,
+    /// What was seen for the first time in the last tick.
+    seen: Vec<Feature>,
 }
 
 impl TrialNotes {
+    fn new(scenario: &Scenario) -> Self {
+        let mut notes = Self::default();
+        notes.played.expectations.insert(RUNS.to_owned());
+        for expectation in &scenario.expectations {
+            let name = expectation.name.clone();
+            if expectation.is_goal() {
+                notes.goals.insert(name.clone());
+            }
+            notes.played.expectations.insert(name);
+        }
+        notes
+    }
+
     fn has_failed(&self, wanted: &BTreeSet<String>) -> bool {
         let mut failed = self.played.failed.keys();
         failed.any(|name| wanted.contains(name))
@@ -319,19 +448,50 @@ impl TrialNotes {
 
     fn note(&mut self, tick: Tick, events: &[Event]) {
         self.played.ticks = tick;
+        self.seen.clear();
         for event in events {
-            self.counts.add(event);
-            if let Event::Judged {
-                expectation,
-                verdict,
-                because,
-            } = event
-            {
-                self.note_verdict(tick, expectation, *verdict, because);
+            match event {
+                Event::Judged {
+                    expectation,
+                    verdict,
+                    because,
+                } => self.note_verdict(tick, expectation, *verdict, because),
+                Event::Emotion {
+                    robot,
+                    from: Some(from),
+                    to,
+                } => self.see(
+                    tick,
+                    Feature::Emotion {
+                        robot: robot.clone(),
+                        from: from.clone(),
+                        to: to.clone(),
+                    },
+                ),
+                Event::Behavior {
+                    robot,
+                    from: Some(from),
+                    to,
+                } => self.see(
+                    tick,
+                    Feature::Behavior {
+                        robot: robot.clone(),
+                        from: from.clone(),
+                        to: to.clone(),
+                    },
+                ),
+                _ => {}
             }
         }
         for span in self.timeline.tick(tick, events) {
-            self.note_span(span);
+            self.note_span(tick, span);
+        }
+    }
+
+    fn see(&mut self, tick: Tick, feature: Feature) {
+        if !self.played.features.contains_key(&feature) {
+            self.seen.push(feature.clone());
+            self.played.features.insert(feature, tick);
         }
     }
 
@@ -344,16 +504,29 @@ impl TrialNotes {
                 let failed = self.played.failed.entry(expectation);
                 failed.or_insert(FailedExpectation { tick, because });
             }
+            Verdict::Pass if self.goals.contains(&expectation) => {
+                self.see(tick, Feature::Reached { expectation });
+            }
             Verdict::Pass | Verdict::Undecided | Verdict::Unreached => {}
         }
     }
 
-    fn note_span(&mut self, span: Span) {
+    fn note_span(&mut self, tick: Tick, span: Span) {
         match span {
-            Span::Command(command) if !command.from.is_operator() => self.commands.push(command),
+            Span::Command(command) if !command.from.is_operator() => {
+                for fate in fates(&command) {
+                    let feature = Feature::Message {
+                        link: link(&command.from, &command.to),
+                        text: command.text.clone(),
+                        fate,
+                    };
+                    self.see(tick, feature);
+                }
+                self.commands.push(command);
+            }
             Span::QueriesLost(lost) => {
-                let link = link(lost.from, lost.to);
-                self.played.features.insert(Feature::QueryLost { link });
+                let link = link(&lost.from, &lost.to);
+                self.see(tick, Feature::QueryLost { link });
             }
             _ => {}
         }
@@ -361,53 +534,29 @@ impl TrialNotes {
 
     /// What came of the run, with what is in progress at its end.
     fn finish(mut self) -> TrialResult {
+        let last = self.played.ticks;
         for span in self.timeline.in_progress() {
-            self.note_span(span);
-        }
-        for (robot, counts) in &self.counts.robots {
-            for kind in [StateKind::Emotion, StateKind::Behavior] {
-                let transitions = counts.states(kind).transitions.keys();
-                let features = transitions.map(|change| transition(robot, kind, change));
-                self.played.features.extend(features);
-            }
+            self.note_span(last, span);
         }
 
         let mut numbers: BTreeMap<Link, u64> = BTreeMap::new();
         let mut commands = self.commands;
         commands.sort_by(|a, b| (a.sent, &a.from, a.seq).cmp(&(b.sent, &b.from, b.seq)));
         for command in commands {
-            let fates = fates(&command);
-            let is_lost = command.is_lost();
-            let link = link(command.from, command.to);
+            let link = link(&command.from, &command.to);
             let number = numbers.entry(link.clone()).or_default();
             *number += 1;
-
-            for fate in fates {
-                self.played.features.insert(Feature::Message {
-                    link: link.clone(),
-                    text: command.text.clone(),
-                    fate,
-                });
-            }
             self.played.sent.push(SentMessage {
                 tick: command.sent,
                 link,
                 number: *number,
+                is_lost: command.is_lost(),
+                late: command.until.map_or(0, |until| until - command.sent - 1),
+                is_doubled: command.is_doubled,
                 text: command.text,
-                is_lost,
             });
         }
         self.played
-    }
-}
-
-fn transition(robot: &RobotName, kind: StateKind, (from, to): &(String, String)) -> Feature {
-    let robot = robot.clone();
-    let from = from.clone();
-    let to = to.clone();
-    match kind {
-        StateKind::Emotion => Feature::Emotion { robot, from, to },
-        StateKind::Behavior => Feature::Behavior { robot, from, to },
     }
 }
 
@@ -425,6 +574,72 @@ fn fates(command: &CommandSpan) -> Vec<CommandFate> {
     fates
 }
 
-fn link(from: RobotName, to: RobotName) -> Link {
-    Link { from, to }
+fn link(from: &RobotName, to: &RobotName) -> Link {
+    Link {
+        from: from.clone(),
+        to: to.clone(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use protocol::random::stream;
+
+    use super::super::draw::Ground;
+    use super::super::fault::FaultClass;
+    use super::super::sent::Moment;
+    use super::*;
+
+    fn hall() -> Subject {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/hors_doeuvres.toml");
+        let set = ["duration=90 s", "network.commands.loss=0.1"];
+        let changes = Changes {
+            set: set.iter().map(|one| one.parse().unwrap()).collect(),
+            ..Changes::default()
+        };
+        Subject::load(&file, &changes).unwrap()
+    }
+
+    /// A plan that goes on from a copy of another run has the same result as one that is played from its beginning, and its copies
+    /// are made in the same ticks: whatever faults the two have.
+    #[test]
+    fn a_copy_goes_on_as_a_run_from_the_beginning() {
+        let subject = hall();
+        let wanted = BTreeSet::new();
+        let without = Plan::default();
+        let baseline = subject.play_plan(&without, &wanted, &|_| false).unwrap();
+        let ground = Ground::new(&subject.scenario, &baseline.result, &FaultClass::ALL, 30.0);
+
+        let mut gone_on = 0;
+        for number in 0..24 {
+            let mut chance = stream(1, &format!("test/{number}"));
+            let plan = Plan {
+                case: FaultCase::of(ground.draw(&mut chance)),
+                ..Plan::default()
+            };
+            // Bodies of a plan may not fit.
+            let Ok(played) = subject.play_plan(&plan, &wanted, &Feature::is_state) else {
+                continue;
+            };
+            for (after, saved) in played.saved.into_iter().filter(|(after, _)| *after > 0) {
+                let sent = &played.result.sent;
+                let mut faults = plan.case.faults.clone();
+                faults.retain(|fault| fault.has_begun(after, sent));
+                let moment = Moment::of(sent, after);
+                let case = FaultCase::of(ground.go_on(&faults, &moment, &mut chance));
+                let [copied, whole] = [Some(saved), None].map(|saved| {
+                    let plan = Plan {
+                        case: case.clone(),
+                        after,
+                        saved,
+                    };
+                    let played = subject.play_plan(&plan, &wanted, &Feature::is_state);
+                    played.unwrap()
+                });
+                assert_eq!(copied.result, whole.result, "after {after}: {case:?}");
+                gone_on += 1;
+            }
+        }
+        assert!(gone_on > 50, "{gone_on}");
+    }
 }

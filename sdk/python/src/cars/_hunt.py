@@ -62,6 +62,11 @@ class Hunt:
         """Expectations that were asked in no run: what they are expected after did not happen."""
         return list(self.report["never_asked"])
 
+    @property
+    def goals(self) -> dict[str, int]:
+        """What some run should ``reach``, with the number of plans in whose runs it was reached; 0 for what never was."""
+        return dict(self.report["goals"])
+
 
 def _texts(name: str, value: Union[str, Iterable[str], None]) -> list[str]:
     given = [] if value is None else [value] if isinstance(value, str) else value
