@@ -210,7 +210,18 @@ fn named(trunk: &Trunk, tick: Tick, by: &RobotName, target: &RobotName, number: 
     format!("command {number} from {by} to {target}")
 }
 
-/// What the scenario plans, in words, and what is without it: partitions, faults, and commands that are lost by their numbers.
+/// Whether it is the fate of a command that the scenario names by its number.
+fn is_named(event: &Event) -> bool {
+    match event {
+        Event::CommandDropped { because, .. } => *because == Cause::Scripted,
+        Event::CommandDelayed { because, .. } | Event::CommandDuplicated { because, .. } => {
+            *because == Some(Cause::Scripted)
+        }
+        _ => false,
+    }
+}
+
+/// What the scenario plans, in words, and what is without it: partitions, faults, and commands that it names by their numbers.
 pub(super) fn planned(trunk: &Trunk, scenario: &Scenario) -> Vec<(Tick, String, Counterfactual)> {
     let last = trunk.last();
     let mut planned = Vec::new();
@@ -243,7 +254,7 @@ pub(super) fn planned(trunk: &Trunk, scenario: &Scenario) -> Vec<(Tick, String, 
                 .into_iter()
                 .flat_map(|entry| &entry.events)
             {
-                if is_scripted(event)
+                if is_named(event)
                     && let Some((_, what, instead)) = left_out(trunk, tick, event)
                 {
                     planned.push((tick, what, instead));
@@ -254,15 +265,4 @@ pub(super) fn planned(trunk: &Trunk, scenario: &Scenario) -> Vec<(Tick, String, 
     planned.sort_by_key(|(tick, ..)| *tick);
     planned.truncate(MAX_PLANNED);
     planned
-}
-
-/// Whether the scenario names the command to which this happened.
-fn is_scripted(event: &Event) -> bool {
-    match event {
-        Event::CommandDropped { because, .. } => *because == Cause::Scripted,
-        Event::CommandDelayed { because, .. } | Event::CommandDuplicated { because, .. } => {
-            *because == Some(Cause::Scripted)
-        }
-        _ => false,
-    }
 }
