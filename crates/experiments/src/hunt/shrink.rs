@@ -185,7 +185,8 @@ impl Shrinker<'_> {
                 }
             }
         }
-        if concrete.is_empty() {
+        let are_commands = self.best.faults.iter().all(|one| one.command().is_some());
+        if concrete.is_empty() || are_commands {
             return;
         }
 
@@ -738,6 +739,95 @@ mod tests {
             assert_eq!(result.case.faults, [expected]);
             assert!(result.is_minimal);
         }
+    }
+
+    #[test]
+    fn all_first_commands_and_some_others_are_tried() {
+        assert_eq!(before(1, 1, 16), [] as [u64; 0]);
+        assert_eq!(before(2, 1, 16), [1]);
+        assert_eq!(before(17, 1, 16), (1..17).collect::<Vec<u64>>());
+        assert_eq!(before(18, 1, 16), (1..18).collect::<Vec<u64>>());
+        assert_eq!(before(81, 1, 1), [1, 11, 21, 31, 41, 51, 61, 71, 73, 80]);
+        assert_eq!(before(1, 0, 1), [0]);
+    }
+
+    /// The expectation fails for the commands 3 and 11 of a link, and for none between them.
+    #[test]
+    fn a_command_becomes_an_earlier_one_for_which_it_fails_too() {
+        let apart = FailsAt(60, |case: &FaultCase| {
+            case.faults.contains(&lose(3)) || case.faults.contains(&lose(11))
+        });
+        let result = shrunk(&apart, FaultCase::of(vec![lose(11)]), 10_000, 2);
+        assert_eq!(result.case.faults, [lose(3)]);
+    }
+
+    fn reseed(of: &[&str]) -> PlannedFault {
+        PlannedFault::Reseed {
+            at: 9,
+            seed: 5,
+            of: of.iter().map(|kind| (*kind).to_owned()).collect(),
+        }
+    }
+
+    #[test]
+    fn other_chance_is_left_out_or_becomes_chance_of_one_kind() {
+        let unneeded = FailsAt(60, |case: &FaultCase| case.faults.contains(&lose(3)));
+        let case = FaultCase::of(vec![reseed(&[]), lose(3)]);
+        let result = shrunk(&unneeded, case.clone(), 10_000, 2);
+        assert_eq!(result.case.faults, [lose(3)]);
+
+        let of_guests = FailsAt(60, |case: &FaultCase| {
+            let mut faults = case.faults.iter();
+            faults.any(|fault| *fault == reseed(&[]) || *fault == reseed(&["guests"]))
+        });
+        let result = shrunk(&of_guests, case, 10_000, 2);
+        assert_eq!(result.case.faults, [reseed(&["guests"])]);
+        assert!(result.is_minimal);
+    }
+
+    /// A run in which the command 7 is 5 ticks late, which is needed for 2 ticks, whatever delays it.
+    struct Delaying;
+
+    impl Trial for Delaying {
+        fn play(&self, case: &FaultCase, _: &BTreeSet<String>) -> Result<TrialResult, LabError> {
+            let mut played = TrialResult::default();
+            let late = case.faults.iter().map(|fault| match fault {
+                PlannedFault::Late { number: 7, by, .. } => *by,
+                PlannedFault::Channel { .. } => 5,
+                _ => 0,
+            });
+            let late = late.max().unwrap_or(0);
+            played.sent.push(SentMessage {
+                tick: 7,
+                link: link(),
+                number: 7,
+                text: String::new(),
+                is_lost: false,
+                late,
+                is_doubled: true,
+            });
+            if late >= 2 {
+                played.failed.insert(NAME.to_owned(), failure(20));
+            }
+            Ok(played)
+        }
+    }
+
+    #[test]
+    fn chance_becomes_the_command_that_it_delayed() {
+        let delay = PlannedFault::Channel {
+            link: None,
+            of: Messages::Commands,
+            effect: Effect::Delay(8),
+            span: TickSpan { from: 0, until: 90 },
+        };
+        let result = shrunk(&Delaying, FaultCase::of(vec![delay]), 10_000, 2);
+        let late = PlannedFault::Late {
+            link: link(),
+            number: 7,
+            by: 2,
+        };
+        assert_eq!(result.case.faults, [late]);
     }
 
     /// A scenario that fails without faults is no smaller case of one in which a fault is the cause.

@@ -189,7 +189,7 @@ impl AskedRun {
                 Ok(is_one(match verdict {
                     Some(Verdict::Fail) => true,
                     Some(Verdict::Undecided) | None => *or_undecided,
-                    Some(Verdict::Pass | Verdict::NotAsked) => false,
+                    Some(Verdict::Pass | Verdict::NotAsked | Verdict::Unreached) => false,
                 }))
             }
             Question::Condition { .. } => Ok(is_one(branch.judge(ASKED)? == Some(Verdict::Fail))),
