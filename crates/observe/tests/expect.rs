@@ -353,7 +353,7 @@ fn a_goal_is_reached_or_not_and_never_fails() {
     let judgment = run.tick(&[say("help")]).unwrap();
     assert_eq!(judgment.verdict, Verdict::Pass);
     assert!(
-        judgment.because.starts_with("tick 4 (2 s): "),
+        judgment.because.starts_with("tick 4 (2.0 s): "),
         "{judgment:?}"
     );
 
@@ -601,7 +601,7 @@ fn what_is_written_is_read_back() {
 #[test]
 fn what_cannot_be_checked_is_refused() {
     for (entry, reason) in [
-        ("", "one of `never`, `always` and `eventually`"),
+        ("", "one of `never`, `always`, `eventually` and `reach`"),
         (
             "never = { event = 'say' }\nalways = { robot = 'A', behavior = 'X' }",
             "one of `never`",
