@@ -12,6 +12,7 @@ pub(crate) mod course;
 pub(crate) mod floor;
 pub(crate) mod intervals;
 pub(crate) mod matrix;
+pub(crate) mod outcome;
 pub(crate) mod steps;
 pub(crate) mod trend;
 

@@ -6,6 +6,7 @@
 mod changes;
 mod commands;
 mod cuts;
+mod decisions;
 mod draw;
 mod items;
 mod lanes;

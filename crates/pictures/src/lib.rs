@@ -1,5 +1,5 @@
 //! Pictures of runs and experiments as text: the space-time diagram ([`diagram`]), charts ([`Bands`], [`Matrix`], [`Floor`],
-//! [`Intervals`], [`Trend`], [`Steps`]), and the page around them with its figures and tables ([`Page`]).
+//! [`Intervals`], [`Trend`], [`Steps`], [`OutcomeCurve`]), and the page around them with its figures and tables ([`Page`]).
 //!
 //! Pure: plain data in, SVG or HTML out. The same data give the same bytes. Every text is escaped.
 
@@ -25,6 +25,7 @@ pub use chart::course::{CourseLine, TimeCourse};
 pub use chart::floor::Floor;
 pub use chart::intervals::{IntervalRow, Intervals};
 pub use chart::matrix::{Matrix, MatrixCell, MatrixLabel};
+pub use chart::outcome::OutcomeCurve;
 pub use chart::steps::{Curve, CurveStep, Steps};
 pub use chart::trend::{Trend, TrendLine, TrendPoint};
 pub use labels::width_px;

@@ -90,6 +90,7 @@ impl ChartPanel {
             Chart::Floor(chart) => (chart.draw(), false),
             Chart::Intervals(chart) => (chart.draw(), false),
             Chart::Matrix(chart) => (chart.draw(), chart.is_wide()),
+            Chart::Outcome(chart) => (chart.draw(), true),
             Chart::Steps(chart) => (chart.draw(), false),
             Chart::Trend(chart) => (chart.draw(), false),
             // That of a diagram with too much is not drawn.

@@ -1,6 +1,7 @@
 //! Charts as data and as views of Vega-Lite (version 5), so that a figure can be drawn anew by others.
 
 use protocol::messages::BodyShape;
+use protocol::time::time_s;
 use serde_json::{Value, json};
 use timeline::StateKind;
 
@@ -10,6 +11,7 @@ use crate::chart::course::TimeCourse;
 use crate::chart::floor::Floor;
 use crate::chart::intervals::Intervals;
 use crate::chart::matrix::{Matrix, MatrixLabel};
+use crate::chart::outcome::OutcomeCurve;
 use crate::chart::steps::Steps;
 use crate::chart::trend::Trend;
 use crate::data::{DataRow, digits};
@@ -29,6 +31,8 @@ pub enum Chart {
     Intervals(Intervals),
     /// Shaded cells.
     Matrix(Matrix),
+    /// What decided a run.
+    Outcome(OutcomeCurve),
     /// Step functions.
     Steps(Steps),
     /// Estimates over a factor.
@@ -46,6 +50,7 @@ impl Chart {
             Self::Floor(chart) => floor(chart),
             Self::Intervals(chart) => intervals(chart),
             Self::Matrix(chart) => matrix(chart),
+            Self::Outcome(chart) => outcome(chart),
             Self::Steps(chart) => steps(chart),
             Self::Trend(chart) => trend(chart),
             Self::Diagram(chart) => chart.data(),
@@ -60,6 +65,7 @@ impl Chart {
             Self::Floor(chart) => floor_view(chart),
             Self::Intervals(chart) => intervals_view(chart),
             Self::Matrix(chart) => matrix_view(chart),
+            Self::Outcome(chart) => outcome_view(chart),
             Self::Steps(chart) => steps_view(chart),
             Self::Trend(chart) => trend_view(chart),
             Self::Diagram(chart) => diagram_view(chart),
@@ -362,6 +368,45 @@ fn course_view(chart: &TimeCourse) -> Value {
             "y": number("value", &chart.axis, chart.range),
             "color": arm_colors("robot", lines.map(|line| (&line.label, line.arm))),
         },
+    })
+}
+
+fn outcome(chart: &OutcomeCurve) -> Vec<DataRow> {
+    let decision = &chart.0;
+    let seconds = |tick| digits(time_s(tick, decision.tick_s));
+    let curve = decision.curve.iter().filter_map(|point| {
+        let (low, high) = point.outcome.ends()?;
+        Some(vec![
+            ("kind", "curve".to_owned()),
+            ("time_s", seconds(point.tick)),
+            ("value", digits(point.outcome.value?)),
+            ("low", digits(low)),
+            ("high", digits(high)),
+            ("n", point.outcome.n.to_string()),
+        ])
+    });
+    let jumps = decision.jumps.iter().map(|jump| {
+        vec![
+            ("kind", "jump".to_owned()),
+            ("time_s", seconds(jump.tick)),
+            ("text", decision.told(jump)),
+        ]
+    });
+    curve.chain(jumps).collect()
+}
+
+fn outcome_view(chart: &OutcomeCurve) -> Value {
+    let decision = &chart.0;
+    let (axis, range) = (decision.axis(), decision.range());
+    let y = number("value", &axis, range);
+    let low = number("low", &axis, range);
+    json!({
+        "encoding": { "x": number("time_s", "simulated time, s", (0.0, chart.end_s())) },
+        "layer": [
+            { "transform": filter("kind", "curve"), "mark": { "type": "area", "opacity": 0.15 }, "encoding": { "y": low, "y2": { "field": "high" } } },
+            { "transform": filter("kind", "curve"), "mark": "line", "encoding": { "y": y } },
+            { "transform": filter("kind", "jump"), "mark": { "type": "rule", "strokeDash": [2, 2] } },
+        ],
     })
 }
 

@@ -9,12 +9,15 @@ use std::collections::BTreeMap;
 
 use pictures::{
     Band, BandRow, Bands, Cell, Chart, ChartPanel, Curve, CurveStep, Figure, Floor, IntervalRow,
-    Intervals, Matrix, MatrixCell, MatrixLabel, Page, PlottedEstimate, Steps, Table, Text, Trend,
-    TrendLine, TrendPoint, state_look,
+    Intervals, Matrix, MatrixCell, MatrixLabel, OutcomeCurve, Page, PlottedEstimate, Steps, Table,
+    Text, Trend, TrendLine, TrendPoint, state_look,
 };
 use protocol::messages::{BodyShape, StaticWorld};
 use roxmltree::{Document, Node, ParsingOptions};
-use timeline::{StateKind, StateOrder};
+use timeline::{
+    DecisionCause, DecisionJump, DecisionPoint, DecisionQuestion, ForkOutcomes, RunDecision,
+    StateKind, StateOrder,
+};
 
 /// A text that would leave its place if it were not escaped.
 const HOSTILE: &str = "</svg><script>alert(\"1\")</script>&amp;'\u{1b}[31m\u{202e}\u{0}]]>";
@@ -430,6 +433,64 @@ fn curves_are_thinned_to_what_can_be_seen() {
     let svg = chart.draw();
     parsed(&svg);
     assert!(svg.len() < 100_000, "{}", svg.len());
+}
+
+#[test]
+fn what_decided_a_run_is_a_curve_with_its_jumps() {
+    let outcomes = |value: f64| ForkOutcomes {
+        n: 64,
+        value: Some(value),
+        low: Some(value - 0.1),
+        high: Some(value + 0.1),
+    };
+    let mut decision = RunDecision {
+        digest: String::new(),
+        question: DecisionQuestion {
+            kind: HOSTILE.to_owned(),
+            name: HOSTILE.to_owned(),
+        },
+        is_share: true,
+        tick_s: 0.5,
+        last: 100,
+        sentence: HOSTILE.to_owned(),
+        curve: Vec::new(),
+        jumps: Vec::new(),
+    };
+    for tick in 0..100 {
+        let value = if tick < 40 { 0.2 } else { 0.8 };
+        decision.curve.push(DecisionPoint {
+            tick,
+            outcome: outcomes(value),
+        });
+    }
+    for tick in [40, 41, 90] {
+        decision.jumps.push(DecisionJump {
+            tick,
+            before: outcomes(0.2),
+            after: outcomes(0.8),
+            events: vec![HOSTILE.to_owned()],
+            cause: Some(DecisionCause {
+                what: HOSTILE.to_owned(),
+                is_event: true,
+                without: outcomes(0.2),
+            }),
+        });
+    }
+
+    for is_share in [true, false] {
+        decision.is_share = is_share;
+        let svg = OutcomeCurve(decision.clone()).draw();
+        let document = parsed(&svg);
+        assert_eq!(of_class(&document, "ribbon").len(), 1);
+        let jumps = of_class(&document, "jump");
+        assert_eq!(jumps.len(), 3);
+        // Of two beside each other one has a label; the other has its words under the pointer.
+        let labels = jumps.iter().flat_map(|jump| jump.children());
+        assert_eq!(labels.filter(|node| node.has_tag_name("text")).count(), 2);
+    }
+    decision.curve.clear();
+    decision.jumps.clear();
+    parsed(&OutcomeCurve(decision).draw());
 }
 
 #[test]

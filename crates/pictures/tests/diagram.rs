@@ -11,7 +11,9 @@ use protocol::event::Cause;
 use protocol::messages::{Awaited, FaultKind, Performative, Point, Reason, SiteRefusal};
 use protocol::{Event, RobotName, Tick};
 use roxmltree::{Document, Node};
-use timeline::Timeline;
+use timeline::{
+    DecisionJump, DecisionPoint, DecisionQuestion, ForkOutcomes, RunDecision, Timeline,
+};
 
 fn name(text: &str) -> RobotName {
     RobotName::new(text).unwrap()
@@ -861,4 +863,81 @@ fn acts_on_sites_are_marked_and_named() {
         .collect();
     let svg = draw(&many, 0, 2100);
     assert!(svg.contains(", 100 more acts on sites"), "{}", &svg[..300]);
+}
+
+/// An answer of `cars why`: the outcome was decided in tick 60.
+fn decision() -> RunDecision {
+    let outcomes = |value: f64| ForkOutcomes {
+        n: 200,
+        value: Some(value),
+        low: Some(value - 0.05),
+        high: Some(value + 0.05),
+    };
+    let curve = [(0, 0.1), (59, 0.1), (60, 0.9), (100, 0.9)];
+    RunDecision {
+        digest: String::new(),
+        question: DecisionQuestion {
+            kind: "condition".to_owned(),
+            name: "<it> holds".to_owned(),
+        },
+        is_share: true,
+        tick_s: 0.5,
+        last: 100,
+        sentence: "It was decided at 30 s.".to_owned(),
+        curve: curve
+            .map(|(tick, value)| DecisionPoint {
+                tick,
+                outcome: outcomes(value),
+            })
+            .to_vec(),
+        jumps: vec![DecisionJump {
+            tick: 60,
+            before: outcomes(0.1),
+            after: outcomes(0.9),
+            events: Vec::new(),
+            cause: None,
+        }],
+    }
+}
+
+#[test]
+fn what_decided_the_run_is_a_curve_on_the_axis_of_time() {
+    let events = [(20, behavior("Leguin", "SERVE"))];
+    let options = DiagramOptions {
+        decisions: vec![decision()],
+        ..DiagramOptions::default()
+    };
+    for (from, to, jumps) in [(0, 100, 1), (50, 80, 1), (70, 100, 0)] {
+        let without = draw(&events, from, to);
+        let svg = draw_with(&events, from, to, options.clone()).unwrap();
+        let document = Document::parse(&svg).unwrap();
+        let sheet = |svg: &str| {
+            svg.split("</style>")
+                .next()
+                .unwrap()
+                .split_once("<style>")
+                .unwrap()
+                .1
+                .to_owned()
+        };
+        assert_eq!(
+            sheet(&svg),
+            sheet(&without),
+            "pictures without an answer have the same sheet"
+        );
+
+        let row = of_class(&document, "decision");
+        assert_eq!(row.len(), 1);
+        assert_eq!(row[0].attribute("data-question"), Some("<it> holds"));
+        let line = points(parts(row[0], "line")[0]);
+        let scale_begin = x_of(&document, from);
+        assert!((line[0].0 - scale_begin).abs() < 0.2, "{line:?}");
+        let found = of_class(&document, "jump");
+        assert_eq!(found.len(), jumps, "ticks {from} to {to}");
+        for jump in found {
+            assert_eq!(tick(jump), 60);
+            assert_eq!(title(jump), "30 s, tick 60: 10 % → 90 %");
+            assert!(is_at(&document, points(parts(jump, "break")[0])[0].0, 60));
+        }
+    }
 }

@@ -1,11 +1,12 @@
 //! The recording of an epoch of a run, `run.mcap`: what it contains ([`content`]), and how it is written ([`Writer`]) and
-//! read ([`Recording`]).
+//! read ([`Recording`]). Beside it may be answers of `cars why` ([`RunDecisions`]).
 //!
 //! The file is MCAP. Its times are simulated. Chunks end at the end of a tick, so a file that was cut off by a crash has
 //! complete ticks up to its last complete chunk.
 
 pub mod content;
 mod damage;
+mod decisions;
 mod encode;
 mod file;
 mod format;
@@ -24,6 +25,7 @@ pub use content::{
     Frame, Header, Json, PlacedRobot, RawTick, RecordedTick, TickEvents, TickView, WallTimes,
 };
 pub use damage::RecordingError;
+pub use decisions::RunDecisions;
 pub use read::Recording;
 pub use shown::LastReports;
 pub use ticks::Ticks;

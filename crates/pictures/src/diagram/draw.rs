@@ -3,10 +3,11 @@
 use std::collections::BTreeSet;
 
 use protocol::{RobotName, Tick};
-use timeline::{StateOrder, Timeline};
+use timeline::{RunDecision, StateOrder, Timeline};
 
 use crate::diagram::commands::{draw_commands, draw_queries, place_labels};
 use crate::diagram::cuts::draw_cuts;
+use crate::diagram::decisions::draw_decisions;
 use crate::diagram::items::Items;
 use crate::diagram::lanes::Lanes;
 use crate::diagram::legend::draw_legend;
@@ -21,6 +22,8 @@ use crate::style::style;
 const RIGHT_PX: f64 = 22.0;
 /// Space below the lanes for the axis, pixels.
 const AXIS_PX: f64 = 36.0;
+/// Distance of the first line of a legend from what is above it, pixels.
+const LEGEND_BELOW_PX: f64 = 14.0;
 /// Least width of a legend, pixels: its longest entries fit.
 const LEGEND_PX: f64 = 300.0;
 /// Most letters of the title.
@@ -47,6 +50,8 @@ pub struct DiagramOptions {
     pub names: StateOrder,
     /// Width of a picture of so many ticks, pixels, so that several pictures have the same scale; without it the window decides.
     pub width: Option<(f64, Tick)>,
+    /// What decided the run: curves below the axis of time. None leaves the picture as it is.
+    pub decisions: Vec<RunDecision>,
 }
 
 impl Default for DiagramOptions {
@@ -60,6 +65,7 @@ impl Default for DiagramOptions {
             has_legend: true,
             names: StateOrder::default(),
             width: None,
+            decisions: Vec::new(),
         }
     }
 }
@@ -84,11 +90,14 @@ pub(crate) fn draw(
     draw_processes(&mut picture, items);
     place_labels(&mut picture, &labels);
     draw_axis(&mut picture);
+    let axis_end = picture.lanes.bottom + AXIS_PX;
+    let below = draw_decisions(&mut picture, &options.decisions, axis_end);
     picture.draw_labels();
     let legend = legend.or(options.has_legend.then_some((items, window)));
     let height = match legend {
-        Some((items, window)) => draw_legend(&mut picture, items, window),
-        None => picture.lanes.bottom + AXIS_PX,
+        Some((items, window)) => draw_legend(&mut picture, items, window, below + LEGEND_BELOW_PX),
+        None if options.decisions.is_empty() => below,
+        None => below + LEGEND_BELOW_PX,
     };
 
     finish(picture, height, &heading, options.has_style)
@@ -117,7 +126,15 @@ fn begin(
     let most_px = (options.max_width_px - lanes.left_px - RIGHT_PX).max(100.0);
     let legend_px = if options.has_legend { LEGEND_PX } else { 0.0 };
     let least_px = width_px(heading, HEADING_PX).max(legend_px).min(most_px);
-    let busy = (!options.is_whole).then(|| busy_ticks(items));
+    let busy = (!options.is_whole).then(|| {
+        let jumps = options
+            .decisions
+            .iter()
+            .flat_map(|decision| &decision.jumps);
+        let mut busy = busy_ticks(items);
+        busy.extend(jumps.map(|jump| jump.tick));
+        busy
+    });
     let width = Width {
         least_px,
         most_px,

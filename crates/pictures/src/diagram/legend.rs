@@ -81,11 +81,15 @@ fn signs(window: VisibleTicks, items: &Items) -> Vec<(&'static str, Draw)> {
     occurring.map(|(_, name, draw)| (name, draw)).collect()
 }
 
-/// Draws the legend below the axis. Returns the lower end of the picture.
-pub(crate) fn draw_legend(picture: &mut Picture, items: &Items, window: VisibleTicks) -> f64 {
+/// Draws the legend, the first line of which has the base line `y`. Returns the lower end of the picture.
+pub(crate) fn draw_legend(
+    picture: &mut Picture,
+    items: &Items,
+    window: VisibleTicks,
+    y: f64,
+) -> f64 {
     let signs = signs(window, items);
     let names: Vec<&str> = signs.iter().map(|(name, _)| *name).collect();
-    let y = picture.lanes.bottom + 50.0;
     let y = draw_entries(
         picture,
         "sign",
