@@ -34,6 +34,7 @@ mod faults;
 mod files;
 mod folders;
 mod fork;
+mod forked_worlds;
 mod hunt;
 mod killed;
 mod names;
