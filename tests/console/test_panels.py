@@ -44,6 +44,33 @@ def test_a_robot_that_has_said_nothing_has_a_panel_too(launch, open_page):
     assert known["details"] == [], "there is nothing to unfold"
 
 
+def test_a_robot_without_emotions_has_no_badge_of_one(launch, open_page):
+    page = opened(open_page, launch())
+    known = page.evaluate(
+        """() => import('./assets/known.js').then(({generic}) => generic(
+            {...window.carsConsole.frame().robots[0], emotion_state: '', behavior_state: 'GO', state_variables: {}},
+            {className: '', commands: [], isBegun: true}))"""
+    )
+    badges = [(widget["label"], widget["text"]) for widget in known["widgets"] if widget["widget"] == "badge"]
+    assert badges == [("behavior", "GO")]
+
+
+def test_a_list_of_robots_without_emotions_has_no_columns_of_them(launch, open_page):
+    page = opened(open_page, launch())
+    lines = page.evaluate(
+        """() => import('./assets/robot-list.js').then(({RobotList}) => {
+            const list = new RobotList({choose() {}, changed() {}});
+            document.querySelector(".panels, #panels, body").append(list.place);
+            const line = (emotion) => ({name: "S1", emotion, intensity: null, behavior: "GO", held: "", badness: 0, isAbsent: false});
+            return ["", "HAPPY"].map((emotion) => {
+                list.render([line(emotion)], null);
+                return [...list.place.querySelectorAll(".list-head button")].filter((head) => head.offsetParent).length;
+            });
+        })"""
+    )
+    assert lines == [3, 5]
+
+
 def test_an_empty_panel_is_replaced_by_what_is_known(launch, open_page):
     run = launch()
     page = opened(open_page, run)

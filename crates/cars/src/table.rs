@@ -19,8 +19,9 @@ const ABSENT: &str = "(takes no part)";
 const ROUNDING_S: f64 = 1e-6;
 /// A robot is named if the clock waited this long for it at a time, seconds of wall clock.
 const NOTICED_S: f64 = 0.5;
-/// Heads of the columns of [`rows`].
-const HEAD: [&str; 5] = ["robot", "emotion", "behavior", "commands", "moves"];
+/// Heads of the columns.
+const HEAD: [&str; 5] = ["robot", EMOTION, "behavior", "commands", "moves"];
+const EMOTION: &str = "emotion";
 
 /// Prints the summary of a run.
 ///
@@ -28,7 +29,9 @@ const HEAD: [&str; 5] = ["robot", "emotion", "behavior", "commands", "moves"];
 /// [`OutputError`] if the standard output cannot be written.
 pub(crate) fn print(summary: &Summary, folder: &Path) -> Result<(), OutputError> {
     let heading = heading(summary);
-    let table = terminal::table(HEAD, rows(summary), 1, HEAD.len());
+    let (head, rows) = columns(summary);
+    let width = head.len();
+    let table = terminal::table(head, rows, 1, width);
     let mut text = format!("\n{heading}\n{table}");
     for line in verdicts(&summary.expectations) {
         text += &format!("\n{line}");
@@ -76,20 +79,41 @@ fn heading(summary: &Summary) -> String {
     text
 }
 
-/// One row for each robot; a cell may have several lines.
-fn rows(summary: &Summary) -> Vec<[String; 5]> {
+/// The heads of the columns, and one row for each robot; a cell may have several lines. Where no robot has emotions there is no column
+/// of them.
+fn columns(summary: &Summary) -> (Vec<&'static str>, Vec<Vec<String>>) {
+    let mut robots = summary.robots.values();
+    let have_emotions = robots.any(|robot| !robot.emotions_s.is_empty());
+    let mut head = HEAD.to_vec();
+    head.retain(|column| have_emotions || *column != EMOTION);
+
+    let total_s = summary.time_s;
     let mut rows = Vec::new();
     for (name, robot) in &summary.robots {
-        rows.push([
-            name.to_string(),
-            shares(&robot.emotions_s, summary.time_s, None),
-            shares(&robot.behaviors_s, summary.time_s, Some(&robot.entered)),
-            commands(robot),
-            moves(robot),
-        ]);
+        let absent_s = absent_s(robot, total_s);
+        let mut row = vec![name.to_string()];
+        if have_emotions {
+            row.push(shares(&robot.emotions_s, absent_s, total_s, None));
+        }
+        let entered = Some(&robot.entered);
+        row.push(shares(&robot.behaviors_s, absent_s, total_s, entered));
+        row.push(commands(robot));
+        row.push(moves(robot));
+        rows.push(row);
     }
+    (head, rows)
+}
 
-    rows
+/// The time in which a robot takes no part: it is in an emotion, or in a behavior, while it does, unless it reports neither.
+fn absent_s(robot: &RobotSummary, total_s: f64) -> f64 {
+    let times_s = [&robot.emotions_s, &robot.behaviors_s];
+    let [emotions_s, behaviors_s] = times_s.map(|times_s| times_s.values().sum::<f64>());
+    let present_s = emotions_s.max(behaviors_s);
+    if present_s > 0.0 {
+        total_s - present_s
+    } else {
+        0.0
+    }
 }
 
 /// A line for each expectation: its verdict, its name, and the reason unless it is met.
@@ -125,6 +149,7 @@ fn held_up(summary: &Summary) -> Vec<String> {
 /// that in which the robot took no part.
 fn shares(
     times_s: &BTreeMap<String, f64>,
+    absent_s: f64,
     total_s: f64,
     entered: Option<&BTreeMap<String, u64>>,
 ) -> String {
@@ -133,7 +158,6 @@ fn shares(
         sorted.push((state, *time_s));
     }
     sorted.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let absent_s = total_s - times_s.values().sum::<f64>();
     if absent_s > ROUNDING_S {
         sorted.push((ABSENT, absent_s));
     }
@@ -254,12 +278,21 @@ mod tests {
             lines.map(str::to_owned).collect::<Vec<_>>()
         };
 
-        let lost = shares(&times_s(&[("SERVE", 3.0), ("WAIT", 1.0)]), 10.0, None);
+        let lost = shares(&times_s(&[("SERVE", 3.0), ("WAIT", 1.0)]), 6.0, 10.0, None);
         assert_eq!(states(&lost), ["SERVE", "WAIT", "(takes no part) ██████"]);
         assert!(lost.ends_with(" 60 %"), "{lost}");
 
         // Sums of decimals are not exact.
-        let whole = shares(&times_s(&[("X", 0.1), ("Y", 0.2)]), 0.3, None);
-        assert!(!whole.contains(ABSENT), "{whole}");
+        let mut whole = robot(&[]);
+        whole.behaviors_s = times_s(&[("X", 0.1), ("Y", 0.2)]);
+        assert!(absent_s(&whole, 0.3).abs() < ROUNDING_S);
+        whole.emotions_s = times_s(&[("HAPPY", 0.1)]);
+        assert!(
+            absent_s(&whole, 0.3).abs() < ROUNDING_S,
+            "an emotion may come late"
+        );
+        whole.behaviors_s.clear();
+        whole.emotions_s.clear();
+        assert_eq!(absent_s(&whole, 0.3), 0.0, "it reports neither");
     }
 }

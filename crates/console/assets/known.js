@@ -83,15 +83,15 @@ export function generic(robot, { className, commands, isBegun }) {
   const { state_variables } = robot;
   const face = state_variables[FACE];
   const intensity = intensityOf(robot, undefined);
-  const none = isBegun ? "none" : "none yet";
+  // A robot that has none once the run has begun, such as one without emotions, has no badge of it.
+  const badge = (/** @type {string} */ label, /** @type {string} */ text) =>
+    /** @type {Widget[]} */ (text || !isBegun ? [{ widget: "badge", label, text: text || "none yet", tone: "neutral" }] : []);
   const heading = `${Math.round((((robot.direction_rad * 180) / Math.PI) % 360 + 360) % 360)}°`;
 
   /** @type {Widget[]} */
-  const widgets = [
-    { widget: "badge", label: "emotion", text: robot.emotion_state || none, tone: "neutral" },
-    { widget: "badge", label: "behavior", text: robot.behavior_state || none, tone: "neutral" },
-  ];
-  if (intensity !== null) widgets.splice(1, 0, { widget: "bar", label: "intensity", value: intensity, min: 0, max: 1 });
+  const widgets = badge("emotion", robot.emotion_state);
+  if (intensity !== null) widgets.push({ widget: "bar", label: "intensity", value: intensity, min: 0, max: 1 });
+  widgets.push(...badge("behavior", robot.behavior_state));
   if (typeof face === "string" && FACES.includes(face)) {
     widgets.unshift({ widget: "face", face: /** @type {import("./types/messages.js").Face} */ (face), intensity: intensity ?? 1 });
   }
@@ -100,7 +100,7 @@ export function generic(robot, { className, commands, isBegun }) {
   if (className) facts.unshift(["class", className]);
   widgets.push({ widget: "table", rows: facts });
   const words = commands.map(({ time_s, tick_s, source, text }) => `${seconds(time_s, tick_s)}  ${sentence(robot.name, source, text)}`);
-  widgets.push({ widget: "text", label: "last commands", text: words.join("\n") || none });
+  widgets.push({ widget: "text", label: "last commands", text: words.join("\n") || (isBegun ? "none" : "none yet") });
 
   const rows = Object.entries(state_variables).map(([name, value]) => [name, show(value)]);
   return { widgets, details: rows.length ? [{ widget: "table", rows }] : [] };

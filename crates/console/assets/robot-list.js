@@ -72,13 +72,16 @@ export class RobotList {
     const emotions = [...counts].filter(([name]) => name !== "").sort(([a], [b]) => NAMES.compare(a, b));
     // The choice stays although no robot feels so now.
     if (this.emotion && !counts.has(this.emotion)) emotions.push([this.emotion, 0]);
+    // Robots without emotions have no columns and no choice of them.
+    const haveEmotions = emotions.length > 0 || lines.some(({ intensity }) => intensity !== null);
+    this.place.classList.toggle("without-emotions", !haveEmotions);
 
     render(
       html`
         <div class="list-bar">
           <label class="field inline"><span>Find</span><input type="text" data-testid="list-find" placeholder="name, behavior …"
             .value=${this.text} @input=${(/** @type {Event} */ event) => this.filter("text", event)} /></label>
-          <label class="field inline"><span>Emotion</span>
+          <label class="field inline emotion"><span>Emotion</span>
             <select data-testid="list-emotion" @change=${(/** @type {Event} */ event) => this.filter("emotion", event)}>
               <option value="" ?selected=${this.emotion === ""}>all</option>
               ${emotions.map(([name, many]) => html`<option value=${name} ?selected=${name === this.emotion}>${name} (${many})</option>`)}

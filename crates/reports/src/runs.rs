@@ -75,6 +75,7 @@ pub fn of_runs(folders: &[RunFolder]) -> Result<Page, LabError> {
     };
     let mut page = Page::new(kind, &title);
     write_lead(&mut page, &runs);
+    write_measures(&mut page, &runs);
     if runs.len() == 1 {
         write_states(&mut page, &runs);
         write_summary(&mut page, &runs);
@@ -84,8 +85,11 @@ pub fn of_runs(folders: &[RunFolder]) -> Result<Page, LabError> {
     }
     write_diagrams(&mut page, &runs);
     let facts: Vec<&RunFacts> = runs.iter().map(|run| &run.facts).collect();
-    page.section("Transitions");
-    for figure in transitions(&facts) {
+    let transitions = transitions(&facts);
+    if !transitions.is_empty() {
+        page.section("Transitions");
+    }
+    for figure in transitions {
         page.figure(figure);
     }
     if let Some(figure) = occupancy(&facts) {
@@ -94,7 +98,6 @@ pub fn of_runs(folders: &[RunFolder]) -> Result<Page, LabError> {
     }
     write_disturbances(&mut page, &runs);
     write_expectations(&mut page, &runs);
-    write_measures(&mut page, &runs);
     write_reproduction(&mut page, &runs);
     Ok(page)
 }
@@ -300,11 +303,13 @@ fn write_states(page: &mut Page, runs: &[ReportedRun]) {
         _ => "Emotions and behaviors",
     });
 
+    let before = page.figures();
     for kind in [StateKind::Emotion, StateKind::Behavior] {
         let (row, (panels, sentence)) = match runs {
             [run] if kind == StateKind::Emotion => {
                 if let Some(mut figure) = course_figure(&run.facts) {
-                    figure.table = Some(states_table(runs, kind));
+                    let table = states_table(runs, kind);
+                    figure.table = (!table.rows.is_empty()).then_some(table);
                     page.figure(figure);
                 }
                 continue;
@@ -326,6 +331,9 @@ fn write_states(page: &mut Page, runs: &[ReportedRun]) {
             counted(runs.len(), "run")
         );
         page.figure(Figure::new(panels, caption, Some(states_table(runs, kind))));
+    }
+    if page.figures() == before {
+        page.remark("The robots report no emotions and no behaviors.");
     }
 }
 

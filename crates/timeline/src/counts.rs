@@ -156,8 +156,12 @@ impl RobotCounts {
 
 impl StateCounts {
     fn enter(&mut self, from: Option<&str>, to: &str) {
+        // An empty name is no state.
+        if to.is_empty() {
+            return;
+        }
         increment(&mut self.entered, to.to_owned());
-        if let Some(from) = from {
+        if let Some(from) = from.filter(|from| !from.is_empty()) {
             increment(&mut self.transitions, (from.to_owned(), to.to_owned()));
         }
     }

@@ -208,7 +208,7 @@ impl Timeline {
         self.robots.keys()
     }
 
-    /// The emotion or behavior that a robot has reported last, whether it takes part or not.
+    /// The emotion or behavior that a robot has reported last, whether it takes part or not; `None` if it has none.
     #[must_use]
     pub fn state(&self, robot: &RobotName, kind: StateKind) -> Option<&str> {
         let state = self.robots.get(robot)?.state(kind);
@@ -256,16 +256,21 @@ impl Timeline {
     }
 
     fn enter(&mut self, name: &RobotName, kind: StateKind, to: &str, tick: Tick) -> Vec<Span> {
-        self.names.add(kind, to);
+        let next = StateSince {
+            name: to.to_owned(),
+            begin: tick,
+        };
+        // A robot without emotions reports an empty one, which is none.
+        let next = (!to.is_empty()).then_some(next);
+        if next.is_some() {
+            self.names.add(kind, to);
+        }
         let robot = self.robot(name);
         let state = match kind {
             StateKind::Emotion => &mut robot.emotion,
             StateKind::Behavior => &mut robot.behavior,
         };
-        let before = state.replace(StateSince {
-            name: to.to_owned(),
-            begin: tick,
-        });
+        let before = std::mem::replace(state, next);
 
         // The stay of a robot that is lost has ended with its loss.
         let over = before.filter(|_| robot.lost.is_none());

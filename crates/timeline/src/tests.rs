@@ -347,3 +347,34 @@ fn counts_are_by_robot_and_by_link() {
     let link = &counts.links[&(a(), name("B"))];
     assert_eq!((link.sent, link.delivered, link.lost()), (2, 1, 1));
 }
+
+/// A robot without emotions reports an empty one.
+#[test]
+fn an_empty_state_is_none() {
+    let events = [
+        (0, feels("")),
+        (0, does(None, "WALK")),
+        (4, feels("HAPPY")),
+        (6, feels("")),
+    ];
+    let (timeline, over) = folded(&events);
+    assert_eq!(timeline.names().of(StateKind::Emotion), ["HAPPY"]);
+    assert_eq!(timeline.state(&a(), StateKind::Emotion), None);
+    let [Span::Stay(stay)] = &over[..] else {
+        panic!("{over:?}");
+    };
+    assert_eq!((stay.name.as_str(), stay.period.end), ("HAPPY", Some(6)));
+    assert_eq!(timeline.in_progress().len(), 1, "the behavior");
+
+    let mut counts = Counts::default();
+    for (from, to) in [(None, ""), (Some(""), "HAPPY"), (Some("HAPPY"), "")] {
+        counts.add(&Event::Emotion {
+            robot: a(),
+            from: from.map(str::to_owned),
+            to: to.to_owned(),
+        });
+    }
+    let emotions = &counts.robots[&a()].emotions;
+    assert_eq!(emotions.entered, [("HAPPY".to_owned(), 1)].into());
+    assert!(emotions.transitions.is_empty());
+}
