@@ -66,3 +66,24 @@ def is_still(run):
     """The status of a run whose clock has stopped; `None` while it goes on."""
     status = run.settled()
     return status if status and status["phase"] in ("ready", "paused", "ended") else None
+
+
+NAMED = """(flights) => import('./assets/flights.js').then(({Flights}) => {
+    const all = new Flights();
+    all.push(flights);
+    return all.at(6, 0.5).filter(({isNamed}) => isNamed).map(({to, text, fate}) => `${to} ${text} ${fate}`).sort();
+})"""
+
+
+def test_the_text_of_a_broadcast_is_written_once(launch, open_page):
+    page = open_page(launch().address)
+    until(page, "window.carsConsole.frame() !== null")
+
+    def flight(tick, to, seq, command, fate="sent"):
+        return {"tick": tick, "from": "A", "to": to, "seq": seq, "command": command, "fate": fate}
+
+    broadcasts = [flight(tick, to, 10 * tick + i, "table") for tick in (4, 5) for i, to in enumerate("BCD")]
+    received = [flight(5, to, 40 + i, None, "delivered") for i, to in enumerate("BCD")]
+    assert len(page.evaluate(NAMED, [*broadcasts, *received])) == 2, "one that is under way, and one that has arrived"
+    single = [flight(4, "B", 1, "refill"), flight(5, "B", 2, "hurry"), flight(5, "B", 1, None, "dropped")]
+    assert page.evaluate(NAMED, single) == ["B hurry sent", "B refill dropped"]

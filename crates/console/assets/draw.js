@@ -389,7 +389,7 @@ export function freeLine(taken, words, x, y, robots = []) {
  * @param {Place} to
  * @param {{words: Area[], robots: Area[]}} taken where words and robots are
  */
-export function flight({ context, camera, theme }, { text: words, fate, progress, faded }, from, to, taken) {
+export function flight({ context, camera, theme }, { text: words, fate, progress, faded, isNamed }, from, to, taken) {
   const x1 = camera.x(from.x);
   const y1 = camera.y(from.y);
   const x2 = camera.x(to.x);
@@ -416,7 +416,7 @@ export function flight({ context, camera, theme }, { text: words, fate, progress
   // Not beyond the edges.
   const half = widthOf(words) / 2 + 4;
   const middle_px = Math.max(half, Math.min(camera.width_px - half, x));
-  const line_px = words ? freeLine(taken.words, words, middle_px, y, taken.robots) : null;
+  const line_px = words && isNamed ? freeLine(taken.words, words, middle_px, y, taken.robots) : null;
   if (line_px !== null) text(context, theme, words, middle_px, line_px, color);
   context.globalAlpha = 1;
 }

@@ -10,6 +10,8 @@
  * @property {string} from
  * @property {string} to
  * @property {string} text of the command, empty if its sending is not known
+ * @property {boolean} isNamed whether its text is written beside it: once for commands with the same text of one sender to several robots,
+ *   as those of a broadcast are, and once for those to one robot that share a fate
  * @property {Fate} fate up to the tick that is shown
  * @property {number} progress part of the way that it has gone
  * @property {number} faded 0 in the tick that decided its fate, 1 when that is no longer shown
@@ -64,8 +66,23 @@ export class Flights {
       if (sent > tick || age_s === Infinity || (last && age_s >= TOLD_S)) continue;
 
       const progress = !last ? age_s / (age_s + HALF_WAY_S) : last.fate === "dropped" ? LOST_AT : 1;
-      shown.push({ from, to, text, fate: last?.fate ?? "sent", progress, faded: last ? age_s / TOLD_S : 0 });
+      shown.push({ from, to, text, fate: last?.fate ?? "sent", progress, faded: last ? age_s / TOLD_S : 0, isNamed: false });
     }
+    nameOnce(shown);
     return shown;
+  }
+}
+
+/** Has the newest of commands that would show the same text named. @param {Shown[]} shown the newest last */
+function nameOnce(shown) {
+  /** The robot to which the named command with this text of a sender goes, and the fates that are named. @type {Map<string, {to: string, fates: Set<Fate>}>} */
+  const named = new Map();
+  for (const flight of [...shown].reverse()) {
+    const { from, to, text, fate } = flight;
+    const key = JSON.stringify([from, text]);
+    const known = named.get(key) ?? { to, fates: new Set() };
+    named.set(key, known);
+    flight.isNamed = known.to === to && !known.fates.has(fate);
+    if (flight.isNamed) known.fates.add(fate);
   }
 }

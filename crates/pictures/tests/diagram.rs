@@ -941,3 +941,39 @@ fn what_decided_the_run_is_a_curve_on_the_axis_of_time() {
         }
     }
 }
+
+/// A broadcast is a command to each of the others, and its text and the reasons of its losses are there once, also if it is repeated soon.
+#[test]
+fn a_broadcast_has_one_label() {
+    let mut events = Vec::new();
+    let others = ["Leguin", "Vonda", "Zed", "Yan"];
+    for (seq, to) in (1..).zip([others, others].concat()) {
+        let tick = if seq <= 4 { 10 } else { 12 };
+        events.push((
+            tick,
+            Event::CommandSent {
+                from: name("Butler"),
+                to: name(to),
+                seq,
+                performative: Performative::Tell,
+                command: "table".to_owned(),
+                payload: None,
+                payload_of: (seq > 1).then_some(1),
+            },
+        ));
+        events.push((
+            tick + 1,
+            Event::CommandDropped {
+                from: name("Butler"),
+                to: name(to),
+                seq,
+                because: Cause::Loss,
+            },
+        ));
+    }
+    let svg = draw(&events, 0, 60);
+    let document = Document::parse(&svg).unwrap();
+    assert_eq!(of_class(&document, "break").len(), 2 * others.len());
+    let texts = |class: &str| of_class(&document, class).len();
+    assert_eq!((texts("text"), texts("reason")), (1, 1), "{svg}");
+}

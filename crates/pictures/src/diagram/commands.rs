@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use protocol::Tick;
 use protocol::event::Cause;
+use protocol::{RobotName, Tick};
 use timeline::{CommandEnd, CommandSpan, QueriesLost};
 
 use crate::diagram::items::Items;
@@ -20,8 +20,12 @@ const NEXT_WAIT_PX: f64 = 5.0;
 const MAX_WAITS: usize = 6;
 /// How far the two ends of a doubled command are from where it arrives, pixels.
 const FORK_PX: f64 = 4.0;
+/// Distance within which a label of a broadcast is not repeated, pixels.
+const REPEATED_PX: f64 = 240.0;
 /// Most letters of a command in a label.
 const LABEL_LETTERS: usize = 24;
+
+type Spoken<'a> = (&'a RobotName, Tick, &'a str);
 
 /// Where the waits at each lane end, by index of the lane and whether the commands come from above.
 type Waits = BTreeMap<(usize, bool), Vec<f64>>;
@@ -44,6 +48,8 @@ struct Route {
 /// A label that is placed after all lines are known.
 pub(crate) struct PendingLabel<'a> {
     command: &'a CommandSpan,
+    /// Whether it is one of several with the same text in the same tick.
+    is_broadcast: bool,
     /// The line beside which the text is put.
     beside: [Pixel; 2],
     breaks: Vec<(Pixel, Cause)>,
@@ -54,17 +60,30 @@ pub(crate) fn draw_commands<'a>(picture: &mut Picture, items: &'a Items) -> Vec<
     let mut commands: Vec<&CommandSpan> = items.commands.iter().collect();
     commands.sort_by_key(|command| (command.sent, &command.from, command.seq));
 
+    let mut targets: BTreeMap<Spoken<'_>, usize> = BTreeMap::new();
+    for command in &commands {
+        *targets.entry(spoken(command)).or_default() += 1;
+    }
     let mut waits = Waits::new();
     let mut wanted = Vec::new();
     for command in commands {
-        wanted.extend(draw_command(picture, command, &mut waits));
+        let is_broadcast = targets
+            .get(&spoken(command))
+            .is_some_and(|count| *count > 1);
+        wanted.extend(draw_command(picture, command, is_broadcast, &mut waits));
     }
     wanted
+}
+
+/// What a robot sends in a tick: sender, tick and text.
+fn spoken(command: &CommandSpan) -> Spoken<'_> {
+    (&command.from, command.sent, &command.text)
 }
 
 fn draw_command<'a>(
     picture: &mut Picture,
     command: &'a CommandSpan,
+    is_broadcast: bool,
     waits: &mut Waits,
 ) -> Option<PendingLabel<'a>> {
     let route = route(picture, command, waits)?;
@@ -80,6 +99,7 @@ fn draw_command<'a>(
     for (applies, word) in [
         (command.until.is_some(), " delayed"),
         (command.is_doubled, " doubled"),
+        (is_broadcast, " broadcast"),
         (comes_in, " enters"),
         (!is_over, " leaves"),
     ] {
@@ -107,6 +127,7 @@ fn draw_command<'a>(
     };
     Some(PendingLabel {
         command,
+        is_broadcast,
         beside,
         breaks: route.breaks,
     })
@@ -306,32 +327,51 @@ fn add_ends(route: &mut Route, command: &CommandSpan, turn: Pixel, end: Pixel, d
     }
 }
 
-/// Places the texts of commands, and why they were lost.
+/// Places the texts of commands, and why they were lost. A broadcast has its text once, and each reason once, and so do broadcasts with
+/// this text that follow within [`REPEATED_PX`].
 pub(crate) fn place_labels(picture: &mut Picture, wanted: &[PendingLabel<'_>]) {
+    // The ends of the areas in which a label of a broadcast, the text or a reason, is not repeated.
+    let mut said: BTreeMap<(&RobotName, &str, Option<Cause>), f64> = BTreeMap::new();
     for label in wanted {
-        place_label(picture, label);
+        let CommandSpan { from, text, .. } = label.command;
+        let x = label.beside[0].0;
+        let is_new = |end: Option<&f64>| !label.is_broadcast || end.is_none_or(|end| x >= *end);
+
+        let key = (from, text.as_str(), None);
+        if is_new(said.get(&key)) && place_text(picture, label) {
+            said.insert(key, x + REPEATED_PX);
+        }
+        for (place, because) in &label.breaks {
+            let key = (from, text.as_str(), Some(*because));
+            let is_placed = is_new(said.get(&key))
+                && place_reason(picture, label.command.sent, *place, *because);
+            if is_placed {
+                said.insert(key, x + REPEATED_PX);
+            }
+        }
     }
 }
 
-fn place_label(picture: &mut Picture, wanted: &PendingLabel<'_>) {
+/// Places the text of a command; returns whether there is space for it.
+fn place_text(picture: &mut Picture, wanted: &PendingLabel<'_>) -> bool {
     let tick = wanted.command.sent;
     let text = shortened(&wanted.command.text, LABEL_LETTERS);
     let performative = wanted.command.performative.name();
     let places = beside(wanted.beside);
     // With the performative if there is enough space.
-    let is_placed = picture.label_with_prefix("text", tick, performative, text.clone(), &places);
-    if !is_placed {
-        picture.label("text", tick, text, &places);
-    }
+    picture.label_with_prefix("text", tick, performative, text.clone(), &places)
+        || picture.label_with_prefix("text", tick, "", text, &places)
+}
 
-    for ((x, y), because) in &wanted.breaks {
-        let mut places = Vec::new();
-        for middle in [*y, *y + 12.0, *y - 12.0] {
-            places.push(LabelPosition::After(x + 8.0, middle));
-            places.push(LabelPosition::Before(x - 8.0, middle));
-        }
-        picture.label("reason", tick, words::cause(*because), &places);
+/// Places why a command was lost; returns whether there is space for it.
+fn place_reason(picture: &mut Picture, tick: Tick, (x, y): Pixel, because: Cause) -> bool {
+    let mut places = Vec::new();
+    for middle in [y, y + 12.0, y - 12.0] {
+        places.push(LabelPosition::After(x + 8.0, middle));
+        places.push(LabelPosition::Before(x - 8.0, middle));
     }
+    let text = words::cause(because).to_owned();
+    picture.label_with_prefix("reason", tick, "", text, &places)
 }
 
 /// Places for a label beside a line.
