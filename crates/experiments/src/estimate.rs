@@ -119,9 +119,15 @@ impl Estimated {
         }
 
         let numbers: Vec<f64> = measured.iter().filter_map(|one| one.value()).collect();
-        let quarter = |place: f64| quantile(&numbers, place / 4.0).unwrap_or(f64::NAN);
+        Self::of_numbers(&numbers)
+    }
+
+    /// The estimate of numbers, such as times that every run has reached.
+    #[must_use]
+    pub fn of_numbers(numbers: &[f64]) -> Self {
+        let quarter = |place: f64| quantile(numbers, place / 4.0).unwrap_or(f64::NAN);
         Self::Number {
-            mean: Estimate::mean(&numbers),
+            mean: Estimate::mean(numbers),
             quartiles: (!numbers.is_empty()).then(|| [0.0, 1.0, 2.0, 3.0, 4.0].map(quarter)),
         }
     }

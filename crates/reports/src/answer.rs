@@ -75,7 +75,7 @@ pub(super) fn answer(study: &Study<'_>, measure: &Measure) -> Text {
             "and",
         );
         let under = under(study, conditions);
-        text = text.text(format!(", {label} {}", how(measure, *is_more)));
+        text = text.text(format!(", {label} {}", how(study, measure, *is_more)));
         text = text.text(" ").strong(baseline).text(under);
     }
     if !others.is_empty() {
@@ -124,10 +124,12 @@ fn is_higher(contrast: &Contrast) -> bool {
 }
 
 /// What a difference is, before the name of the baseline.
-fn how(measure: &Measure, is_more: bool) -> &'static str {
+fn how(study: &Study<'_>, measure: &Measure, is_more: bool) -> &'static str {
     match (measure.is_time(), is_more) {
         (false, true) => "is higher than with",
         (false, false) => "is lower than with",
+        (true, true) if study.is_always_reached(measure) => "comes later than with",
+        (true, false) if study.is_always_reached(measure) => "comes earlier than with",
         (true, true) => "comes later or in fewer runs than with",
         (true, false) => "comes earlier or in more runs than with",
     }
@@ -217,7 +219,11 @@ fn sentence(study: &Study<'_>, measure: &Measure, contrasts: &[&Contrast], is_mo
     };
 
     let with_arm = Text::from("With ").strong(&first.arm);
-    let compared = with_arm.text(format!(", {} {} ", label(measure), how(measure, is_more)));
+    let compared = with_arm.text(format!(
+        ", {} {} ",
+        label(measure),
+        how(study, measure, is_more)
+    ));
 
     let mut named = Vec::new();
     for contrast in contrasts.iter().take(MAX_NAMED) {
@@ -227,7 +233,7 @@ fn sentence(study: &Study<'_>, measure: &Measure, contrasts: &[&Contrast], is_mo
         } else {
             format!("{} ", unbroken(&heading))
         };
-        named.push(format!("{under}({})", numbers(measure, contrast)));
+        named.push(format!("{under}({})", numbers(study, measure, contrast)));
     }
 
     let mut text = format!(": {}", named.join("; "));
@@ -244,11 +250,14 @@ fn unbroken(heading: &str) -> String {
 }
 
 /// The difference with its interval, n and p.
-fn numbers(measure: &Measure, contrast: &Contrast) -> String {
+fn numbers(study: &Study<'_>, measure: &Measure, contrast: &Contrast) -> String {
     let unit = measure.unit.as_ref();
     let unit = unit.map_or_else(String::new, |unit| format!("\u{a0}{unit}"));
     let difference = match &contrast.difference {
         ArmDifference::Number { mean, .. } => with_interval(mean, &unit),
+        ArmDifference::Time {
+            restricted_mean_s, ..
+        } if study.is_always_reached(measure) => with_interval(restricted_mean_s, "\u{a0}s"),
         ArmDifference::Time {
             share,
             restricted_mean_s,

@@ -88,7 +88,7 @@ fn first_measure<'a>(study: &Study<'a>) -> Option<&'a Measure> {
 
 /// The figure of the answer: differences to the baseline, and the estimates beside them where there are lines over a factor.
 fn answer_figure(study: &Study<'_>, measure: &Measure) -> (AnswerFigure, Figure) {
-    let first = Of::all(measure)[0];
+    let first = Of::all(study, measure)[0];
     let differences = lines(study)
         .is_empty()
         .then(|| differences(study, measure, first));
@@ -166,12 +166,19 @@ fn write_design(page: &mut Page, study: &Study<'_>) {
         experiment.duration_s
     ));
 
-    let mut arms = Table::new("Arm | what it is");
+    let are_explained = study.arms.iter().any(|arm| !arm.what.is_empty());
+    let mut arms = Table::new(match are_explained {
+        true => "Arm | what it is",
+        false => "Arm",
+    });
     for arm in study.arms {
         let is_baseline = experiment.baseline.as_ref() == Some(&arm.name);
         let baseline = if is_baseline { " (baseline)" } else { "" };
-        let name = format!("{}{baseline}", arm.name);
-        arms.row([name.into(), arm.what.as_str().into()]);
+        let mut row = vec![Cell::from(format!("{}{baseline}", arm.name))];
+        if are_explained {
+            row.push(arm.what.as_str().into());
+        }
+        arms.row(row);
     }
     let mut caption = "The arms.".to_owned();
     if study.arms.len() < experiment.arms.len() {
@@ -259,7 +266,7 @@ fn write_measure(
     if study.shows(Shown::Differences) {
         // That of the answer is the first one.
         let skipped = usize::from(before == Some(AnswerFigure::Differences));
-        let all = Of::all(measure).iter().skip(skipped);
+        let all = Of::all(study, measure).iter().skip(skipped);
         figures.extend(all.filter_map(|of| differences(study, measure, *of)));
     }
     let has_distributions = !is_time && study.shows(Shown::Distributions);

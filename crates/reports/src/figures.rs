@@ -22,7 +22,8 @@ const MAX_ROWS: usize = 500;
 /// Estimates of the arms under each condition.
 pub(super) fn estimates(study: &Study<'_>, measure: &Measure) -> Figure {
     let estimates = Quantity::estimates(study, measure);
-    let what = if measure.is_time() {
+    let of = Of::all(study, measure)[0];
+    let what = if of == Of::Share {
         format!(
             "Percentage of runs with {} by the end of the run, of those at risk, with 95 % intervals (score intervals);",
             label(measure)
@@ -31,7 +32,7 @@ pub(super) fn estimates(study: &Study<'_>, measure: &Measure) -> Figure {
         format!(
             "{}: means over the seeds with 95 % intervals (Student's t, and Hall's transformation where runs are skewed); small points \
              are runs;",
-            capitalized(&axis(measure))
+            capitalized(&axis(study, measure))
         )
     };
     let mut caption = format!("{what} {}.", sample_sizes(study, measure));
@@ -40,7 +41,6 @@ pub(super) fn estimates(study: &Study<'_>, measure: &Measure) -> Figure {
     let (panels, sentence) = if lines.is_empty() {
         estimates.intervals(study, measure)
     } else {
-        let of = Of::all(measure)[0];
         let differences = Quantity::differences(study, measure, of);
         let mut trends = Vec::new();
         for line in &lines {
@@ -72,10 +72,9 @@ pub(super) fn estimates(study: &Study<'_>, measure: &Measure) -> Figure {
 fn differences_in_words(study: &Study<'_>, measure: &Measure, of: Of) -> String {
     let contrasts = study.contrasts_of(measure);
     let baseline = contrasts.first().map_or("", |one| &one.baseline);
-    let points = if measure.is_time() {
-        ", in percentage points"
-    } else {
-        ""
+    let points = match of {
+        Of::Share => ", in percentage points",
+        Of::Mean | Of::Time => "",
     };
     format!(
         " Differences to {baseline} are paired by seed{points}, with 95 % intervals ({}), and filled where p < 0.05 after {}.",
@@ -117,7 +116,7 @@ fn sample_sizes(study: &Study<'_>, measure: &Measure) -> String {
 }
 
 fn estimates_table(study: &Study<'_>, measure: &Measure) -> Table {
-    let mut table = Table::new(if measure.is_time() {
+    let mut table = Table::new(if Of::all(study, measure)[0] == Of::Share {
         "Condition | arm | n | with it | with it, % | 95 % from | to | median time, s | 95 % from | to | runs without a number"
     } else {
         "Condition | arm | n | mean | 95 % from | to | least | quartile | median | quartile | most | runs without a number"
@@ -128,8 +127,8 @@ fn estimates_table(study: &Study<'_>, measure: &Measure) -> Table {
         };
         let mut row = study.place_cells(place).to_vec();
         row.push(cell.estimate.n().into());
-        match &cell.estimate {
-            Estimated::Time { share, survival } => {
+        match study.estimated(measure, place).as_ref() {
+            Some(Estimated::Time { share, survival }) => {
                 row.push(survival.events.into());
                 row.extend(estimate_cells(&share.scaled(100.0)));
                 let median_s = [
@@ -143,12 +142,13 @@ fn estimates_table(study: &Study<'_>, measure: &Measure) -> Table {
                     None => "not reached".into(),
                 }));
             }
-            Estimated::Number { mean, quartiles } => {
+            Some(Estimated::Number { mean, quartiles }) => {
                 let number = |value| Cell::Number(value, mean.decimals());
                 let quartiles = quartiles.map(|quartiles| quartiles.map(number));
                 row.extend(estimate_cells(mean));
                 row.extend(quartiles.unwrap_or([const { Cell::Empty }; 5]));
             }
+            None => {}
         }
         row.push(cell.excluded.to_string().into());
         table.row(row);
@@ -178,7 +178,7 @@ pub(super) fn differences(study: &Study<'_>, measure: &Measure, of: Of) -> Optio
     let (panels, sentence) = Quantity::differences(study, measure, of)?.intervals(study, measure);
 
     let what = match of {
-        Of::Mean => axis(measure),
+        Of::Mean => axis(study, measure),
         Of::Share => format!(
             "the percentage of runs with {} by the end of the run, in percentage points",
             label(measure)
@@ -194,9 +194,10 @@ pub(super) fn differences(study: &Study<'_>, measure: &Measure, of: Of) -> Optio
         (Some(least), Some(most)) if least < most => format!("{least} to {most} pairs"),
         (_, most) => format!("{} pairs each", most.unwrap_or(&0)),
     };
-    let points = match of {
-        Of::Mean => " Small points are pairs of runs.",
-        Of::Share | Of::Time => "",
+    let has_pairs = of == Of::all(study, measure)[0] && of != Of::Share;
+    let points = match has_pairs {
+        true => " Small points are pairs of runs.",
+        false => "",
     };
     let caption = format!(
         "Differences to {} in {what}, paired by seed, with 95 % intervals ({}).{points} Filled markers: p < 0.05 after {}. n = {n}.{sentence}",
@@ -352,7 +353,7 @@ pub(super) fn distributions(study: &Study<'_>, measure: &Measure) -> Figure {
     );
     curves(study, measure, caption, curve, |heading, curves| Steps {
         title: format!("Distribution of {label} {heading}"),
-        x_axis: axis(measure),
+        x_axis: axis(study, measure),
         y_axis: "share of runs with at most this".to_owned(),
         range,
         at_risk: None,
@@ -404,7 +405,7 @@ pub(super) fn heat_maps(study: &Study<'_>, measure: &Measure) -> Option<Figure> 
             });
         }
         let chart = Matrix {
-            title: format!("{} of {}", axis(measure), of.name),
+            title: format!("{} of {}", axis(study, measure), of.name),
             rows_title: rows.to_owned(),
             columns_title: columns.to_owned(),
             rows: labels(&row_levels),
@@ -415,7 +416,7 @@ pub(super) fn heat_maps(study: &Study<'_>, measure: &Measure) -> Option<Figure> 
     });
     let caption = format!(
         "{} by {rows} and {columns}, a map for each arm; darker is more. {}.{sentence}",
-        capitalized(&axis(measure)),
+        capitalized(&axis(study, measure)),
         sample_sizes(study, measure)
     );
     Some(Figure::new(panels, caption, None))

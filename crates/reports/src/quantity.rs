@@ -25,8 +25,10 @@ pub(super) enum Of {
 
 impl Of {
     /// The differences in a measure; the first one is that of its estimates.
-    pub(super) fn all(measure: &Measure) -> &'static [Self] {
-        if measure.is_time() {
+    pub(super) fn all(study: &Study<'_>, measure: &Measure) -> &'static [Self] {
+        if study.is_always_reached(measure) {
+            &[Self::Time]
+        } else if measure.is_time() {
             &[Self::Share, Self::Time]
         } else {
             &[Self::Mean]
@@ -71,10 +73,11 @@ struct QuantityCell {
 impl Quantity {
     /// The estimates of a measure.
     pub(super) fn estimates(study: &Study<'_>, measure: &Measure) -> Self {
+        let is_share = Of::all(study, measure)[0] == Of::Share;
         let mut cells = BTreeMap::new();
         for place in study.places() {
             let mut runs = Vec::new();
-            if !measure.is_time() {
+            if !is_share {
                 runs = study.numbers(measure, place);
                 runs.retain(|number| number.is_finite());
             }
@@ -82,13 +85,13 @@ impl Quantity {
             let cell = QuantityCell { estimate, runs };
             cells.insert(place, cell);
         }
-        let range = match measure.is_time() {
+        let range = match is_share {
             true => (0.0, 100.0),
             false => widened(&ends(&cells), true),
         };
         Self {
-            title: axis(measure),
-            axis: axis(measure),
+            title: axis(study, measure),
+            axis: axis(study, measure),
             name: None,
             range,
             reference: None,
@@ -99,22 +102,23 @@ impl Quantity {
     /// The differences of the arms to the baseline; `None` if there are none.
     pub(super) fn differences(study: &Study<'_>, measure: &Measure, of: Of) -> Option<Self> {
         let mut cells = BTreeMap::new();
+        let is_of_runs = of == Of::all(study, measure)[0] && of != Of::Share;
         for place in study.places() {
             if let Some(contrast) = study.contrast(measure, place) {
                 let estimate = difference(contrast, of).map(|estimate| PlottedEstimate {
                     is_filled: is_shown(contrast),
                     ..drawn(&estimate)
                 });
-                let runs = match of {
-                    Of::Mean => study.paired_numbers(measure, place),
-                    Of::Share | Of::Time => Vec::new(),
+                let runs = match is_of_runs {
+                    true => study.paired_numbers(measure, place),
+                    false => Vec::new(),
                 };
                 cells.insert(place, QuantityCell { estimate, runs });
             }
         }
         let baseline = &study.contrasts_of(measure).first()?.baseline;
         let axis = match of {
-            Of::Mean => format!("{} minus {baseline}", axis(measure)),
+            Of::Mean => format!("{} minus {baseline}", axis(study, measure)),
             Of::Share => format!("{}, points, minus {baseline}", label(measure)),
             Of::Time => format!("mean time to {}, s, minus {baseline}", label(measure)),
         };

@@ -256,11 +256,30 @@ impl<'a> Study<'a> {
         self.estimates.get(&[measure.name.clone(), condition, arm])
     }
 
+    /// Whether a measure is a time that every run at risk has reached: then the times are numbers, and the percentage of runs with its
+    /// event is 100 everywhere.
+    pub(super) fn is_always_reached(&self, measure: &Measure) -> bool {
+        let measured = self.results.outcomes.iter();
+        let mut times = measured
+            .filter_map(|outcome| outcome.measures.get(&measure.name)?.time())
+            .peekable();
+        measure.is_time() && times.peek().is_some() && times.all(|(_, is_event)| is_event)
+    }
+
+    /// What is estimated of a measure: that of numbers where every run has a time.
+    pub(super) fn estimated(&self, measure: &Measure, place: CellPlace) -> Option<Estimated> {
+        let cell = self.cell(measure, place)?;
+        if self.is_always_reached(measure) {
+            return Some(Estimated::of_numbers(&self.numbers(measure, place)));
+        }
+        Some(cell.estimate.clone())
+    }
+
     /// The mean of a measure, or the percentage of runs at risk with its event by their end; `None` where there is no
     /// finite number.
     pub(super) fn estimate(&self, measure: &Measure, place: CellPlace) -> Option<PlottedEstimate> {
-        let estimate = match &self.cell(measure, place)?.estimate {
-            Estimated::Number { mean, .. } => *mean,
+        let estimate = match self.estimated(measure, place)? {
+            Estimated::Number { mean, .. } => mean,
             Estimated::Time { share, .. } => share.scaled(100.0),
         };
         estimate.value.is_finite().then(|| drawn(&estimate))
@@ -394,7 +413,10 @@ pub(super) fn label(measure: &Measure) -> &str {
 }
 
 /// Name and unit of the axis of a measure.
-pub(super) fn axis(measure: &Measure) -> String {
+pub(super) fn axis(study: &Study<'_>, measure: &Measure) -> String {
+    if study.is_always_reached(measure) {
+        return format!("time to {}, s", label(measure));
+    }
     if measure.is_time() {
         return format!("runs with {}, %", label(measure));
     }

@@ -738,3 +738,69 @@ fn figures_are_files_of_their_own_and_replace_nothing_unasked() {
     let (_, text) = lab.fails(&["report", "hall", "--figures", run.to_str().unwrap()]);
     assert!(text.contains("is not empty"), "{text}");
 }
+
+/// A run of robots without emotions.
+#[test]
+fn the_first_figure_of_robots_without_emotions_is_of_their_behaviors() {
+    let lab = Lab::new();
+    lab.ok(&["run", "auction", "--run", "auction"]);
+    let html = lab.ok(&["report", "auction"]);
+    let document = parsed(&html);
+    let figure = document
+        .descendants()
+        .find(|node| node.attribute("id") == Some("figure-1"));
+    let text = text_of(figure.unwrap());
+    assert!(
+        text.contains("Behaviors over time") && text.contains("WORK"),
+        "{text}"
+    );
+    let states = table(&document, &["Robot", "state", "time, s"]);
+    assert!(states.iter().all(|row| !row[1].is_empty()), "{states:?}");
+    let summary = lab.summary("auction");
+    assert_eq!(summary["robots"]["B1"]["emotions_s"], serde_json::json!({}));
+}
+
+/// Where every run reaches a time, the percentage of the runs that do says nothing.
+#[test]
+fn a_time_that_every_run_reaches_is_shown_as_a_number() {
+    let lab = Lab::new();
+    let scenario = system_tests::root().join("configs/auction.toml");
+    let text = r#"question = "When are all tasks done?"
+duration = "120 s"
+seeds = 4
+baseline = "much"
+[[arm]]
+name = "much"
+[[arm]]
+name = "never"
+set = ["robot.B*.params.sends=never"]
+[[measure]]
+name = "finished"
+contrast = true
+time = { to = { sites = "T*", by = "all", variable = "done" } }
+"#;
+    let file = lab.write("reached.toml", &format!("scenario = {scenario:?}\n{text}"));
+    let folder = play_experiment(&lab, file.to_str().unwrap(), &[]);
+    let html = lab.ok(&["report", &folder]);
+    let figure = parsed(&html)
+        .descendants()
+        .find(|node| node.attribute("id") == Some("figure-1"))
+        .map(text_of)
+        .unwrap();
+    assert!(
+        figure.contains("mean time to finished, in seconds"),
+        "{figure}"
+    );
+    assert!(!html.contains("runs with finished, %"));
+
+    let document = parsed(&html);
+    let rows = table(&document, &["Condition", "arm", "n", "mean"]);
+    let of_much = runs_csv(&folder)
+        .into_iter()
+        .filter(|run| run["arm"] == "much");
+    let times: Vec<f64> = of_much
+        .map(|run| run["finished"].parse().unwrap())
+        .collect();
+    assert_eq!(times.len(), 4);
+    assert_close(&rows[0][3], mean(times.into_iter()));
+}
