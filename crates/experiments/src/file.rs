@@ -9,7 +9,7 @@ use config::{FileError, Source, shipped};
 use observe::expect::check_all;
 use observe::measure::MeasureSource;
 use observe::measure::check_name;
-use observe::{Expectation, Measure};
+use observe::{Expectation, Measure, MeasureError};
 use protocol::RobotName;
 use protocol::pattern::matches;
 use record::Summary;
@@ -237,9 +237,11 @@ impl Experiment {
     /// [`FileError`] at a measure or an expectation that names a robot which the scenario does not have, or at an expectation
     /// with the name of another one.
     pub fn complete(&self, mut scenario: Scenario) -> Result<Scenario, FileError> {
-        self.check_robots(&scenario)?;
-        self.check_expectations(&scenario)?;
-        self.check_summaries()?;
+        let mut experiment = self.clone();
+        experiment.take_measures(&scenario)?;
+        experiment.check_robots(&scenario)?;
+        experiment.check_expectations(&scenario)?;
+        experiment.check_summaries()?;
 
         let own = scenario.expectations.len();
         scenario.expectations.extend_from_slice(&self.expectations);
@@ -329,6 +331,45 @@ impl Experiment {
                     return Err(FileError::at(&self.source, Some(measure.span()), &reason));
                 }
             }
+        }
+        Ok(())
+    }
+
+    /// Takes the sources of the scenario's measures for those that have none of their own, or name one by `summary`.
+    ///
+    /// # Errors
+    /// [`FileError`] at a measure that the scenario does not have, or that is made of others which the experiment does not have.
+    pub fn take_measures(&mut self, scenario: &Scenario) -> Result<(), FileError> {
+        for index in 0..self.measures.len() {
+            let (before, rest) = self.measures.split_at_mut(index);
+            let Some(measure) = rest.first_mut() else {
+                break;
+            };
+            let (name, is_optional) = match &measure.kind {
+                MeasureSource::OfScenario(name) => (name, false),
+                MeasureSource::Summary(name) => (name, true),
+                _ => continue,
+            };
+            let mut named = scenario.measures.iter();
+            let Some(of_scenario) = named.find(|one| one.name == *name) else {
+                if is_optional {
+                    continue;
+                }
+                let known: Vec<&str> = scenario.measures.iter().map(|one| &*one.name).collect();
+                let known = match known.is_empty() {
+                    true => "none".to_owned(),
+                    false => known.join(", "),
+                };
+                let reason = format!(
+                    "{}; that has {known}, and not \"{name}\"",
+                    MeasureError::NotOne
+                );
+                return Err(refuse(&self.source, measure.span(), reason));
+            };
+            measure.take_source(of_scenario);
+            measure
+                .check_after(before)
+                .map_err(|error| refuse(&self.source, measure.span(), error))?;
         }
         Ok(())
     }

@@ -264,9 +264,9 @@ impl Plan {
     /// # Errors
     /// If a condition cannot be played, two of the changes set the same value, or a scenario cannot be used.
     pub fn new(request: &Request) -> Result<Self, LabError> {
-        let experiment = &request.experiment;
+        let mut experiment = request.experiment.clone();
         check_own_options(&request.set)?;
-        let conditions = list_conditions(experiment)?;
+        let conditions = list_conditions(&experiment)?;
 
         let mut cells = Vec::new();
         for condition in &conditions {
@@ -278,6 +278,8 @@ impl Plan {
                 });
             }
         }
+
+        take_measures(&mut experiment, &cells)?;
 
         let mut set = Vec::new();
         for change in &request.set {
@@ -292,7 +294,7 @@ impl Plan {
             duration_s: experiment.duration_s,
             seeds: experiment.seeds.clone(),
             set,
-            measures: digest_of_measures(experiment),
+            measures: digest_of_measures(&experiment),
             file: experiment.source().text.clone(),
             origin: origin_of(experiment.source()),
             robots: request.robots.clone(),
@@ -302,7 +304,7 @@ impl Plan {
                 .map_or_else(BTreeMap::new, |own| own.digests.clone()),
             cells,
         };
-        let mut plan = Self::of(written, experiment.clone())?;
+        let mut plan = Self::of(written, experiment)?;
         plan.own = request.own.as_ref().map(|own| own.source.clone());
         Ok(plan)
     }
@@ -332,7 +334,8 @@ impl Plan {
         let mut experiment = Experiment::parse(&source, Path::new(""))?;
         experiment.duration_s = written.duration_s;
         experiment.seeds.clone_from(&written.seeds);
-        Self::of(written, experiment)
+        take_measures(&mut experiment, &written.cells)
+            .and_then(|()| Self::of(written, experiment))
             .map_err(|error| LabError::record(format!("{}: {error}", path.display())))
     }
 
@@ -925,6 +928,19 @@ fn describe_seeds(seeds: &[u64]) -> String {
 
     let seeds: Vec<String> = seeds.iter().map(u64::to_string).collect();
     format!("seeds {}", seeds.join(", "))
+}
+
+/// Takes the sources of the scenario's measures, which are the same in all cells, for those that have none of their own.
+fn take_measures(experiment: &mut Experiment, cells: &[WrittenCell]) -> Result<(), LabError> {
+    let Some(cell) = cells.first() else {
+        return Ok(());
+    };
+    let source = Source {
+        name: "the scenario of the experiment".to_owned(),
+        text: cell.scenario.clone(),
+    };
+    let scenario = Scenario::parse(&source, Path::new(""))?;
+    Ok(experiment.take_measures(&scenario)?)
 }
 
 /// Digest of what is measured, without what is only shown.

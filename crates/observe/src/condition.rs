@@ -10,6 +10,7 @@ use serde_json::Value;
 
 use crate::combine::By;
 use crate::comparison::{TestError, TestTable, ValueList, ValueTest};
+use crate::counter::{self, Counter};
 use crate::pattern::{Pattern, PatternError};
 use crate::quantity::{
     OfRobot, PlaceKind, PlaceTable, QuantityError, QuantityGauge, RunQuantity, StateNames, Team,
@@ -95,7 +96,9 @@ pub enum TickConditionError {
     #[error("`{0}` names at least one")]
     NoName(&'static str),
     /// Fewer than two robots that could overlap.
-    #[error("`overlap` is \"any\", or a list of at least two robots")]
+    #[error(
+        "`overlap` is \"any\", a pattern such as \"S*\", or a list of names and patterns, of at least two robots"
+    )]
     Overlap,
     /// A robot that the run does not have.
     #[error("no robot of this scenario is called {0}")]
@@ -104,7 +107,9 @@ pub enum TickConditionError {
     #[error("`end_when` cannot name the event \"{0}\": the end of the run is decided before it")]
     TooLate(String),
     /// No variable of progress, or one without its robot.
-    #[error("`progress` is a list of state variables, each with its robot: \"Butler.served\"")]
+    #[error(
+        "`progress` is a list of state variables, each with its robot or a pattern of robots: \"Butler.served\", \"S*.served\""
+    )]
     Progress,
 }
 
@@ -114,7 +119,7 @@ enum Alternative {
     State(LastingState),
     Number(LastingNumber),
     All(LastingAll),
-    Overlap(Option<Vec<RobotName>>),
+    Overlap(Option<Vec<RobotPattern>>),
     Stalled(StalledCondition),
 }
 
@@ -151,15 +156,8 @@ enum Is {
 /// That no state variable of progress has risen for a time.
 #[derive(Debug, Clone, PartialEq)]
 struct StalledCondition {
-    progress: Vec<VariableOfRobot>,
+    progress: Vec<Counter>,
     lasting: Time,
-}
-
-/// A state variable and its robot.
-#[derive(Debug, Clone, PartialEq)]
-struct VariableOfRobot {
-    robot: RobotName,
-    variable: String,
 }
 
 /// A condition on a state as written.
@@ -511,18 +509,18 @@ fn at_least_one(key: &'static str, names: Names) -> Result<Vec<String>, TickCond
 fn check_overlap(names: Names) -> Result<Alternative, TickConditionError> {
     let names = match names {
         Names::One(any) if any == "any" => return Ok(Alternative::Overlap(None)),
-        Names::One(_) => return Err(TickConditionError::Overlap),
-        Names::Several(names) => names,
+        names => Vec::from(names),
     };
 
     let mut robots = Vec::new();
     for name in names {
-        let robot = RobotName::new(&name);
+        let robot = RobotPattern::new(&name);
         robots.push(robot.map_err(|error| TickConditionError::Fields(error.to_string()))?);
     }
     robots.sort();
     robots.dedup();
-    if robots.len() < 2 {
+    // How many robots a pattern matches is known with the roster.
+    if robots.len() < 2 && !robots.iter().any(RobotPattern::is_open) {
         return Err(TickConditionError::Overlap);
     }
     Ok(Alternative::Overlap(Some(robots)))
@@ -538,12 +536,8 @@ fn check_stalled(table: &StalledTable) -> Result<Alternative, TickConditionError
 
     let mut progress = Vec::new();
     for text in &table.progress {
-        let (robot, variable) = text.split_once('.').ok_or(TickConditionError::Progress)?;
-        let robot = RobotName::new(robot).map_err(|_| TickConditionError::Progress)?;
-        progress.push(VariableOfRobot {
-            robot,
-            variable: variable.to_owned(),
-        });
+        let counter = Counter::try_from(text.clone());
+        progress.push(counter.map_err(|_| TickConditionError::Progress)?);
     }
     Ok(Alternative::Stalled(StalledCondition {
         progress,
@@ -575,11 +569,11 @@ impl Alternative {
             }
             Self::Overlap(None) => table.overlap = Some(Names::One("any".to_owned())),
             Self::Overlap(Some(robots)) => {
-                let names = robots.iter().map(RobotName::to_string);
-                table.overlap = Some(Names::Several(names.collect()));
+                let names: Vec<String> = robots.iter().map(RobotPattern::to_string).collect();
+                table.overlap = Some(Names::from(&names));
             }
             Self::Stalled(stalled) => {
-                let progress = stalled.progress.iter().map(VariableOfRobot::to_string);
+                let progress = stalled.progress.iter().map(Counter::to_string);
                 table.stalled = Some(StalledTable {
                     progress: progress.collect(),
                     lasting: stalled.lasting,
@@ -664,12 +658,6 @@ impl ConditionTable {
     }
 }
 
-impl std::fmt::Display for VariableOfRobot {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}.{}", self.robot, self.variable)
-    }
-}
-
 impl TickCondition {
     /// Checks that a run can end when it holds.
     ///
@@ -706,7 +694,16 @@ impl TickCondition {
                 return Err(TickConditionError::UnknownRobot(name.to_owned()));
             }
         }
-        Ok(())
+        let mut can_overlap = true;
+        self.visit(&mut |alternative| {
+            if let Alternative::Overlap(Some(named)) = alternative {
+                can_overlap &= matching(named, &setting.roster).len() >= 2;
+            }
+        });
+        if can_overlap {
+            return Ok(());
+        }
+        Err(TickConditionError::Overlap)
     }
 
     /// The patterns of its events.
@@ -757,11 +754,11 @@ impl TickCondition {
             }
             Alternative::All(_) => {}
             Alternative::Overlap(named) => {
-                robots.extend(named.iter().flatten().map(RobotName::as_str));
+                robots.extend(named.iter().flatten().map(RobotPattern::as_str));
             }
             Alternative::Stalled(stalled) => {
                 let progress = stalled.progress.iter();
-                robots.extend(progress.map(|counter| counter.robot.as_str()));
+                robots.extend(progress.map(|counter| counter.robots.as_str()));
             }
         });
         robots
@@ -778,8 +775,8 @@ impl TickCondition {
             }
             Alternative::Number(number) => variables.extend(number.quantity.variables()),
             Alternative::Stalled(stalled) => {
-                for VariableOfRobot { robot, variable } in &stalled.progress {
-                    variables.push((robot.as_str(), variable.as_str()));
+                for Counter { robots, variable } in &stalled.progress {
+                    variables.push((robots.as_str(), variable.as_str()));
                 }
             }
             Alternative::Event(_) | Alternative::All(_) | Alternative::Overlap(_) => {}
@@ -826,6 +823,12 @@ pub(crate) fn is_known(name: &str, roster: &[RobotName]) -> bool {
     is_operator || roster.iter().any(|robot| matches(name, robot.as_str()))
 }
 
+/// The robots that match one of the patterns.
+fn matching(patterns: &[RobotPattern], roster: &[RobotName]) -> Vec<RobotName> {
+    let is_named = |robot: &&RobotName| patterns.iter().any(|pattern| pattern.matches(robot));
+    roster.iter().filter(is_named).cloned().collect()
+}
+
 impl LastingState {
     fn words(&self) -> Vec<Word> {
         let (kind, states) = match &self.is {
@@ -852,7 +855,6 @@ pub struct Evaluation {
     alternatives: Vec<Tracked>,
     tick_s: f64,
     body_m: f64,
-    roster: Vec<RobotName>,
 }
 
 /// An alternative, and what is remembered of it from tick to tick.
@@ -861,8 +863,10 @@ struct Tracked {
     alternative: Alternative,
     /// The first tick of those up to now in which a state has held without a break, or in which there was no progress.
     since: Option<Tick>,
-    /// The last values of the variables of progress.
-    before: Vec<Option<f64>>,
+    /// The robots that could overlap.
+    overlapping: Vec<RobotName>,
+    /// The variables of progress, each with its robot and its last value.
+    progress: Vec<(RobotName, String, Option<f64>)>,
     /// What a robot would have to publish so that the alternative can hold, and has not published yet.
     unknown: Option<String>,
     /// The number that it compares.
@@ -880,7 +884,19 @@ impl Evaluation {
             alternatives.push(Tracked {
                 alternative: alternative.clone(),
                 since: None,
-                before: Vec::new(),
+                overlapping: match alternative {
+                    Alternative::Overlap(None) => setting.roster.clone(),
+                    Alternative::Overlap(Some(named)) => matching(named, &setting.roster),
+                    _ => Vec::new(),
+                },
+                progress: match alternative {
+                    Alternative::Stalled(stalled) => {
+                        let each = counter::each(&stalled.progress, &setting.roster).into_iter();
+                        each.map(|(robot, variable)| (robot, variable, None))
+                            .collect()
+                    }
+                    _ => Vec::new(),
+                },
                 unknown: None,
                 gauge: match alternative {
                     Alternative::Number(number) => {
@@ -902,7 +918,6 @@ impl Evaluation {
             alternatives,
             tick_s: setting.tick_s,
             body_m: setting.body_m,
-            roster: setting.roster.clone(),
         }
     }
 
@@ -913,10 +928,7 @@ impl Evaluation {
             // All of them, because some depend on the ticks before.
             let held = match &tracked.alternative {
                 Alternative::Event(pattern) => first_event(std::slice::from_ref(pattern), seen),
-                Alternative::Overlap(named) => {
-                    let robots = named.as_deref().unwrap_or(&self.roster);
-                    overlap(robots, self.body_m, seen)
-                }
+                Alternative::Overlap(_) => overlap(&tracked.overlapping, self.body_m, seen),
                 Alternative::State(_) => tracked.state(self.tick_s, seen),
                 Alternative::Number(_) => tracked.number(self.tick_s, seen),
                 Alternative::All(_) => tracked.all(self.tick_s, seen),
@@ -1076,20 +1088,18 @@ impl Tracked {
         let mut missing = None;
         // A counter that is lower than before, because its robot began anew, is no progress; the next
         // rise is.
-        self.before.resize(stalled.progress.len(), None);
-        for (counter, before) in stalled.progress.iter().zip(&mut self.before) {
-            let state = (seen.state)(&counter.robot);
-            let value = state.and_then(|state| number(state, &counter.variable));
+        for (robot, variable, before) in &mut self.progress {
+            let state = (seen.state)(robot);
+            let value = state.and_then(|state| number(state, variable));
             if let (Some(before), Some(value)) = (*before, value) {
                 has_risen |= value > before;
             }
-            if value.is_none() {
-                missing = missing.or(Some(counter));
+            if value.is_none() && missing.is_none() {
+                missing = Some(unpublished(robot, variable));
             }
             *before = value;
         }
-        self.unknown =
-            missing.map(|VariableOfRobot { robot, variable }| unpublished(robot, variable));
+        self.unknown = missing;
 
         if has_risen {
             self.since = Some(seen.tick);
@@ -1098,11 +1108,7 @@ impl Tracked {
         if seen.tick - since < ticks_in(stalled.lasting, tick_s) {
             return None;
         }
-        let names: Vec<String> = stalled
-            .progress
-            .iter()
-            .map(VariableOfRobot::to_string)
-            .collect();
+        let names: Vec<String> = stalled.progress.iter().map(Counter::to_string).collect();
         Some(format!(
             "no progress ({}) for {} s, since {}",
             names.join(", "),

@@ -88,6 +88,7 @@ fn check(
     for source in measure.sources() {
         match source {
             MeasureSource::Summary(_) => return Err(MeasureError::NotLive("summary")),
+            MeasureSource::OfScenario(_) => return Err(MeasureError::NotOne),
             MeasureSource::Count(Count { when: Some(_), .. }) => {
                 return Err(MeasureError::NotLive("when"));
             }

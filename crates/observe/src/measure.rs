@@ -12,6 +12,7 @@ use toml::Spanned;
 use crate::combine::By;
 use crate::comparison::{TestError, TestTable};
 use crate::condition::TickCondition;
+use crate::counter::{Counter, path_parts};
 use crate::expression::Expression;
 use crate::pattern::{Pattern, PatternError};
 use crate::quantity::{
@@ -69,6 +70,8 @@ pub enum MeasureSource {
     Ratio(Box<Ratio>),
     /// A number that is made of those of earlier measures.
     Expression(Expression),
+    /// That of the scenario's measure of this name, for which an experiment puts its source.
+    OfScenario(String),
 }
 
 /// A count of events.
@@ -205,16 +208,6 @@ impl<'de> Visitor<'de> for PartsVisitor {
 #[serde(try_from = "RawRatioTerm")]
 struct RatioTerm(MeasureSource);
 
-/// A state variable of a robot, in a file `ROBOT.VARIABLE`.
-#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
-#[serde(try_from = "String")]
-pub struct Counter {
-    /// The robot.
-    pub robot: RobotName,
-    /// Name of the variable.
-    pub variable: String,
-}
-
 /// What a measure gives for one run: a number, or why there is none.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "state", rename_all = "snake_case")]
@@ -318,7 +311,8 @@ pub enum MeasureError {
     /// It has no kind, or several.
     #[error(
         "a measure has exactly one of `summary`, `count`, `time`, `between`, `share`, `variable`, `walked`, `distance`, `inside`, \
-         `covered`, `components`, `layer`, `stalled`, `jain`, `ratio` and `expression`; a part of a ratio is neither ratio nor expression"
+         `covered`, `components`, `layer`, `stalled`, `jain`, `ratio` and `expression`; a part of a ratio is neither ratio nor expression, \
+         and in an experiment a measure without any of them is the scenario's one of its name"
     )]
     NotOne,
     /// It names a part of the run and counts no events.
@@ -338,9 +332,6 @@ pub enum MeasureError {
          write `{2} = \"*\"` for every robot"
     )]
     Open(&'static str, &'static str, &'static str),
-    /// A variable of a robot that is not `ROBOT.VARIABLE`.
-    #[error("\"{0}\" is not a state variable of a robot, such as \"Butler.served\"")]
-    NoVariable(String),
     /// A number of robots, places or sites that cannot be taken.
     #[error(transparent)]
     RunQuantity(#[from] QuantityError),
@@ -384,7 +375,7 @@ pub enum MeasureError {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawMeasure {
-    name: String,
+    name: Spanned<String>,
     column: Option<String>,
     unit: Option<String>,
     what: Option<String>,
@@ -483,7 +474,7 @@ impl TryFrom<RawMeasure> for Measure {
     type Error = MeasureError;
 
     fn try_from(raw: RawMeasure) -> Result<Self, MeasureError> {
-        check_name(&raw.name)?;
+        check_name(raw.name.get_ref())?;
         let part = RawRatioTerm {
             when: raw.when,
             summary: raw.summary,
@@ -507,11 +498,12 @@ impl TryFrom<RawMeasure> for Measure {
                 spanned(ratio, |ratio| MeasureSource::Ratio(Box::new(ratio)))
             }
             (None, Some(expression), None) => spanned(expression, MeasureSource::Expression),
+            (None, None, None) => spanned(raw.name.clone(), MeasureSource::OfScenario),
             _ => return Err(MeasureError::NotOne),
         };
 
         Ok(Self {
-            name: raw.name,
+            name: raw.name.into_inner(),
             column: raw.column,
             unit: raw.unit,
             what: raw.what,
@@ -648,26 +640,28 @@ pub fn check_name(name: &str) -> Result<(), MeasureError> {
 
 /// The word that the path of a number in the summary of a robot ends with.
 fn word_of(path: &str) -> Option<Word> {
-    let parts: Vec<&str> = path.splitn(4, '.').collect();
-    let ["robots", robot, table, word] = parts[..] else {
+    let parts = path_parts(path);
+    let ["robots", robot, table, word @ ..] = &parts[..] else {
         return None;
     };
-    let kind = match table {
+    // A word may have dots.
+    let word = word.join(".");
+    let kind = match *table {
         "emotions_s" => words::WordKind::Emotion,
         "behaviors_s" | "entered" => words::WordKind::Behavior,
         "sent" => words::WordKind::Command,
         _ => return None,
     };
 
-    let is_any = robot == "*";
-    (word != "*").then(|| Word {
+    let is_any = *robot == "*";
+    (word != "*" && !word.is_empty()).then(|| Word {
         kind,
         robots: if is_any {
             Vec::new()
         } else {
-            vec![robot.to_owned()]
+            vec![(*robot).to_owned()]
         },
-        word: word.to_owned(),
+        word,
     })
 }
 
@@ -740,28 +734,6 @@ impl TryFrom<RawStalled> for Stalled {
     }
 }
 
-impl TryFrom<String> for Counter {
-    type Error = MeasureError;
-
-    fn try_from(text: String) -> Result<Self, MeasureError> {
-        let parts = text.split_once('.');
-        let counter = parts.and_then(|(robot, variable)| {
-            Some(Self {
-                robot: robot.parse().ok()?,
-                variable: variable.to_owned(),
-            })
-        });
-
-        counter.ok_or(MeasureError::NoVariable(text))
-    }
-}
-
-impl std::fmt::Display for Counter {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}.{}", self.robot, self.variable)
-    }
-}
-
 impl Measure {
     /// Whether it is a time to an event, which does not come in every run.
     #[must_use]
@@ -800,6 +772,13 @@ impl Measure {
             variables.join(", "),
             stalled.lasting_s
         ))
+    }
+
+    /// Takes the source of a scenario's measure, and what is said of that one and not of it.
+    pub fn take_source(&mut self, of_scenario: &Self) {
+        self.kind = of_scenario.kind.clone();
+        self.unit = self.unit.take().or_else(|| of_scenario.unit.clone());
+        self.what = self.what.take().or_else(|| of_scenario.what.clone());
     }
 
     /// Place in the file of what it measures, bytes.
@@ -914,7 +893,11 @@ impl MeasureSource {
             }
             Self::Share(quantity) => quantity.words(),
             Self::Summary(path) => word_of(path).into_iter().collect(),
-            Self::Number(_) | Self::Stalled(_) | Self::Ratio(_) | Self::Expression(_) => Vec::new(),
+            Self::Number(_)
+            | Self::Stalled(_)
+            | Self::Ratio(_)
+            | Self::Expression(_)
+            | Self::OfScenario(_) => Vec::new(),
         }
     }
 
@@ -931,7 +914,8 @@ impl MeasureSource {
             | Self::Number(_)
             | Self::Stalled(_)
             | Self::Ratio(_)
-            | Self::Expression(_) => Vec::new(),
+            | Self::Expression(_)
+            | Self::OfScenario(_) => Vec::new(),
         };
         let named = patterns.into_iter().flat_map(Pattern::expectations);
         named.collect()
@@ -947,7 +931,7 @@ impl MeasureSource {
             Self::Stalled(stalled) => {
                 let progress = stalled.progress.iter();
                 progress
-                    .map(|counter| (counter.robot.as_str(), counter.variable.as_str()))
+                    .map(|counter| (counter.robots.as_str(), counter.variable.as_str()))
                     .collect()
             }
             _ => Vec::new(),
@@ -956,12 +940,10 @@ impl MeasureSource {
 
     fn robots(&self) -> Vec<&str> {
         match self {
-            Self::Summary(path) => path
-                .strip_prefix("robots.")
-                .and_then(|rest| rest.split('.').next())
-                .filter(|robot| *robot != "*")
-                .into_iter()
-                .collect(),
+            Self::Summary(path) => match path_parts(path)[..] {
+                ["robots", robot, ..] if robot != "*" => vec![robot],
+                _ => Vec::new(),
+            },
             Self::Count(count) => count.pattern.robots().collect(),
             Self::Time(time) => {
                 let mut named = time.to.robots();
@@ -978,9 +960,9 @@ impl MeasureSource {
             }
             Self::Stalled(stalled) => {
                 let progress = stalled.progress.iter();
-                progress.map(|counter| counter.robot.as_str()).collect()
+                progress.map(|counter| counter.robots.as_str()).collect()
             }
-            Self::Ratio(_) | Self::Expression(_) => Vec::new(),
+            Self::Ratio(_) | Self::Expression(_) | Self::OfScenario(_) => Vec::new(),
         }
     }
 }
@@ -1022,6 +1004,11 @@ mod tests {
                 &["A", "B"],
             ),
             ("jain = { robot = 'S*', name = 'trips' }", &["S*"]),
+            ("summary = 'robots.S{1..20}.sent.*'", &["S{1..20}"]),
+            (
+                "stalled = { progress = ['S*.x', 'S{1..2}.y'], for = '1 s' }",
+                &["S*", "S{1..2}"],
+            ),
             (
                 "ratio = { of = { summary = 'robots.A.missed' }, by = { jain = { robot = 'S*', name = 'x' } } }",
                 &["A", "S*"],
@@ -1063,7 +1050,6 @@ mod tests {
                  end = { event = 'behavior', robot = 'A', from = 'X' }, as = 'sum' }",
                 "name `robot` in both",
             ),
-            ("", "exactly one of"),
             (
                 "summary = 'a'\nstalled = { progress = ['A.x'], for = '1 s' }",
                 "exactly one of",

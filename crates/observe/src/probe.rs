@@ -2,15 +2,17 @@
 
 use std::collections::BTreeMap;
 
+use protocol::pattern::matches;
 use protocol::time::time_s;
 use protocol::{Event, RobotName, Tick};
 use serde_json::Value;
 
 use crate::combine::{By, truth};
 use crate::condition::Evaluation;
+use crate::counter::{self, path_parts};
 use crate::expression::Expression;
 use crate::measure::{
-    Between, Count, Measure, MeasureSource, Measured, Number, OfDurations, Parts, Stalled, When,
+    Between, Count, Measure, MeasureSource, Measured, Number, OfDurations, Parts, When,
 };
 use crate::quantity::{
     OfRobot, OfValues, QuantityGauge, RunQuantity, StateNames, Undefined, number as number_of_state,
@@ -110,6 +112,7 @@ impl Tally {
     fn new(source: &MeasureSource, setting: &RunSetting, condition_s: (f64, f64)) -> Self {
         match source {
             MeasureSource::Summary(path) => Self::Summary(path.clone()),
+            MeasureSource::OfScenario(name) => Self::Summary(format!("measures.{name}.value")),
             MeasureSource::Count(count) => Self::Count(CountTally {
                 definition: count.clone(),
                 condition_s,
@@ -137,8 +140,11 @@ impl Tally {
                 undefined: None,
             })),
             MeasureSource::Stalled(stalled) => Self::Stalled(StalledTally {
-                definition: stalled.clone(),
-                values: vec![None; stalled.progress.len()],
+                lasting_s: stalled.lasting_s,
+                values: counter::each(&stalled.progress, &setting.roster)
+                    .into_iter()
+                    .map(|(robot, variable)| (robot, variable, None))
+                    .collect(),
                 progress: 0,
             }),
             MeasureSource::Ratio(ratio) => {
@@ -240,8 +246,7 @@ fn total(measured: Vec<Measured>) -> Result<f64, Measured> {
 }
 
 fn summary_number(summary: &Value, path: &str) -> Measured {
-    let parts: Vec<&str> = path.split('.').collect();
-    match sum(summary, &parts) {
+    match sum(summary, &path_parts(path)) {
         Some(number) => Measured::from(number),
         None => Measured::Missing {
             reason: format!("the summary of the run has no number `{path}`"),
@@ -255,7 +260,7 @@ fn no_variable(robot: &RobotName, variable: &str) -> Measured {
     }
 }
 
-/// The number at a path, or the sum over all entries where a part is `*`.
+/// The number at a path, or the sum over all entries that match where a part is a pattern.
 fn sum(value: &Value, path: &[&str]) -> Option<f64> {
     let Some((first, rest)) = path.split_first() else {
         return value.as_f64();
@@ -263,8 +268,8 @@ fn sum(value: &Value, path: &[&str]) -> Option<f64> {
 
     let table = value.as_object()?;
 
-    if *first != "*" {
-        return match (table.get(*first)?, rest) {
+    if let Some(next) = table.get(*first) {
+        return match (next, rest) {
             // What did not occur has no entry.
             (Value::Object(occurred), [word]) if OCCURRED.contains(first) && *word != "*" => {
                 occurred.get(*word).map_or(Some(0.0), Value::as_f64)
@@ -272,12 +277,16 @@ fn sum(value: &Value, path: &[&str]) -> Option<f64> {
             (next, rest) => sum(next, rest),
         };
     }
-
-    let mut total = 0.0;
-    for entry in table.values() {
-        total += sum(entry, rest)?;
+    if !first.contains(['*', '{']) {
+        return None;
     }
 
+    let mut total = 0.0;
+    for (name, entry) in table {
+        if matches(first, name) {
+            total += sum(entry, rest)?;
+        }
+    }
     Some(total)
 }
 
@@ -619,17 +628,18 @@ impl NumberTally {
 
 #[derive(Debug, Clone)]
 struct StalledTally {
-    definition: Stalled,
-    /// Last values of the variables of progress. A robot that is lost makes no progress.
-    values: Vec<Option<f64>>,
+    /// Shortest time without progress that counts, seconds.
+    lasting_s: f64,
+    /// The variables of progress, each with its robot and its last value. A robot that is lost makes no progress.
+    values: Vec<(RobotName, String, Option<f64>)>,
     /// The tick of the last progress.
     progress: Tick,
 }
 
 impl StalledTally {
     fn observe(&mut self, observation: &Observation<'_>) {
-        for (counter, before) in self.definition.progress.iter().zip(&mut self.values) {
-            let Some(now) = number_of(observation, &counter.robot, &counter.variable) else {
+        for (robot, variable, before) in &mut self.values {
+            let Some(now) = number_of(observation, robot, variable) else {
                 continue;
             };
             if before.is_some_and(|before| now > before) {
@@ -640,13 +650,13 @@ impl StalledTally {
     }
 
     fn measured(&self, end: RunEnding) -> Measured {
-        for (counter, value) in self.definition.progress.iter().zip(&self.values) {
+        for (robot, variable, value) in &self.values {
             if value.is_none() {
-                return no_variable(&counter.robot, &counter.variable);
+                return no_variable(robot, variable);
             }
         }
 
-        if time_s(end.now - self.progress, end.tick_s) < self.definition.lasting_s {
+        if time_s(end.now - self.progress, end.tick_s) < self.lasting_s {
             return Measured::NotReached {
                 waited_s: time_s(end.horizon, end.tick_s),
             };
@@ -871,6 +881,8 @@ mod tests {
         assert_eq!(at("robots.B.sent.x"), Measured::from(0.0));
         assert_eq!(at("robots.*.sent.y"), Measured::from(3.0));
         assert_eq!(at("robots.*.sent.z"), Measured::from(0.0));
+        assert_eq!(at("robots.A*.sent.*"), Measured::from(5.0));
+        assert_eq!(at("robots.{1..2}.sent.*"), Measured::from(0.0));
         for missing in ["robots.A.sent", "robots.A.x", "robots.C.sent.x"] {
             let error = reason_of(at(missing));
             assert!(error.contains(missing), "{error}");

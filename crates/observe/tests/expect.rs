@@ -497,12 +497,31 @@ fn progress_is_a_variable_that_rises() {
     );
 }
 
+#[test]
+fn progress_of_a_pattern_is_that_of_any_of_its_robots() {
+    let mut run = Run::of("never = { stalled = { progress = ['*.served'], for = '2 s' } }");
+    for robot in ["A", "B"] {
+        let variables = &mut run.robot(robot).variables;
+        variables.insert("served", 0.0.into());
+    }
+    run.quiet_until(4);
+    run.robot("B").variables.insert("served", 1.0.into());
+    run.quiet_until(8);
+    let judgment = run.tick(&[]).unwrap();
+    assert_eq!(
+        judgment.because,
+        "tick 8 (4.0 s): no progress (*.served) for 2 s, since tick 4 (2.0 s)"
+    );
+}
+
 /// The simulator refuses moves that overlap another body, so no scenario shows this expectation to fire.
 #[test]
 fn bodies_that_overlap_are_noticed() {
     for entry in [
         "never = { overlap = 'any' }",
         "never = { overlap = ['B', 'A'] }",
+        "never = { overlap = '*' }",
+        "never = { overlap = ['B*', 'A'] }",
     ] {
         let mut run = Run::of(entry);
         run.robot("A").location = Point::new(1.0, 1.0);
@@ -585,6 +604,8 @@ fn what_is_written_is_read_back() {
         "never = { overlap = 'any' }",
         "never = { overlap = ['A', 'B'] }",
         "never = { stalled = { progress = ['A.served', 'B.trips'], for = '2 min' } }",
+        "never = { overlap = 'S*' }",
+        "never = { stalled = { progress = ['S{1..20}.served'], for = '2 min' } }",
         "eventually = [{ event = 'say' }, { robot = 'A', behavior = ['X', 'Y'], for = '1 s' }]\nwithin = '1 min'",
         AFTER_HEALING,
         "after = [{ event = 'lost' }, { event = 'missed', robot = 'A' }]\neventually = { event = 'joined' }\nwithin = '0 s'",
@@ -759,6 +780,9 @@ fn robots_that_the_run_does_not_have_are_refused() {
         let error = read(entry).unwrap().check(&setting()).unwrap_err();
         assert_eq!(error.to_string(), "no robot of this scenario is called C");
     }
+    let alone = read("never = { overlap = 'A*' }").unwrap();
+    let error = alone.check(&setting()).unwrap_err();
+    assert!(error.to_string().contains("at least two robots"), "{error}");
     let of_operator = read("never = { event = 'command_sent', from = 'operator' }").unwrap();
     of_operator.check(&setting()).unwrap();
 }

@@ -774,3 +774,53 @@ fn an_empty_file_is_no_experiment() {
         assert!(error.contains("no blanks before or after"), "{error}");
     }
 }
+
+/// A measure of the scenario is taken by its name, with the states that it has there.
+#[test]
+fn measures_of_the_scenario_are_taken_by_their_names() {
+    let source = |text: &str| Source {
+        name: "scenario.toml".to_owned(),
+        text: text.to_owned(),
+    };
+    let text = "[[robot]]\nname = \"Butler\"\nat = [\"5 m\", \"5 m\"]\n\
+                [[robot]]\nname = \"Leguin\"\nat = [\"9 m\", \"5 m\"]\n\
+                [[measure]]\nname = \"served\"\nunit = \"treats\"\nvariable = { robot = \"Butler\", name = \"served\", as = \"max\" }\n\
+                [[measure]]\nname = \"met\"\ntime = { to = { distance = { robot = \"Butler\", to = \"Leguin\" }, below = 1 } }\n";
+    let scenario = Scenario::parse(&source(text), Path::new("")).unwrap();
+    let variable = "variable = { robot = \"Butler\", name = \"served\", as = \"end\" }\n";
+    let good = GOOD.replacen(
+        variable,
+        "[[measure]]\nname = \"meeting\"\nsummary = \"met\"\n",
+        1,
+    );
+
+    let mut experiment = parse(&good).unwrap();
+    experiment.take_measures(&scenario).unwrap();
+    let [served, meeting, _] = &experiment.measures[..] else {
+        panic!("{:?}", experiment.measures);
+    };
+    assert_eq!(served.kind, scenario.measures[0].kind);
+    assert_eq!(served.title(), "served, treats");
+    assert!(meeting.is_time(), "a time may be censored");
+    parse(&good).unwrap().complete(scenario.clone()).unwrap();
+
+    for (text, reason) in [
+        (
+            good.replacen("name = \"served\"", "name = \"seved\"", 1),
+            "that has served, met, and not \"seved\"",
+        ),
+        (
+            good.replacen("summary = \"met\"", "summary = \"mett\"", 1),
+            "a summary has no number `mett`",
+        ),
+    ] {
+        // The report names measures, too.
+        let text = text.replace("\"exchanges\", \"served\"", "\"exchanges\"");
+        let error = parse(&text)
+            .unwrap()
+            .complete(scenario.clone())
+            .unwrap_err();
+        let error = error.in_words();
+        assert!(error.contains(reason), "{error}");
+    }
+}
