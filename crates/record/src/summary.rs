@@ -14,7 +14,7 @@ use scenario::Scenario;
 use serde::{Deserialize, Serialize};
 use timeline::{Counts, Timeline};
 
-pub use network::{CutSummary, LinkSummary, NetworkSummary};
+pub use network::{CutSummary, LinkSummary, NetworkSummary, QueryReach};
 
 use crate::seal;
 
@@ -222,15 +222,9 @@ impl Summary {
         }
     }
 
-    /// Counts an event of a tick of this duration, in seconds, in which robots could not query these others.
-    pub fn count(
-        &mut self,
-        tick_s: f64,
-        unreachable: &BTreeMap<RobotName, Vec<RobotName>>,
-        tick: Tick,
-        event: &Event,
-    ) {
-        self.network.count(tick_s, unreachable, tick, event);
+    /// Counts an event of a tick of this duration, in seconds, in which robots could query others as `reach` has it.
+    pub fn count(&mut self, tick_s: f64, reach: QueryReach<'_>, tick: Tick, event: &Event) {
+        self.network.count(tick_s, reach, tick, event);
         self.counts.add(event);
         // A span is counted when it ends, by the tick in which that happens.
         for span in self.timeline.apply(tick, event) {
@@ -331,7 +325,7 @@ impl Summary {
             robot.missed = counts.missed;
             robot.returns = counts.returns;
         }
-        self.network.add_counts(counts.links);
+        self.network.add_counts(counts.links, tick_s);
         for (name, robot) in &mut self.robots {
             robot.state_variables = state_variables(name).unwrap_or_default();
         }

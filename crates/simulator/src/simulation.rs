@@ -1481,6 +1481,12 @@ impl Simulation {
         &self.unreachable
     }
 
+    /// The robots within the range of the radio of each robot in the tick in progress; `None` where distance does not matter.
+    #[must_use]
+    pub fn in_range(&self) -> Option<&BTreeMap<RobotName, Vec<RobotName>>> {
+        self.in_range.as_ref()
+    }
+
     /// Digest of the run so far.
     #[must_use]
     pub fn digest(&self) -> String {

@@ -2,6 +2,7 @@
 
 use protocol::{Event, RunName, Tick};
 use record::Summary;
+use record::summary::QueryReach;
 
 use crate::simulation::Simulation;
 
@@ -14,7 +15,11 @@ impl Simulation {
 
     /// Counts an event of a tick.
     pub fn count(&self, summary: &mut Summary, tick: Tick, event: &Event) {
-        summary.count(self.scenario().tick_s, self.unreachable(), tick, event);
+        let reach = QueryReach {
+            unreachable: self.unreachable(),
+            in_range: self.in_range(),
+        };
+        summary.count(self.scenario().tick_s, reach, tick, event);
     }
 
     /// Completes the summary at the end of the epoch.
