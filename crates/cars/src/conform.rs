@@ -5,7 +5,8 @@ use std::process::{Command, ExitCode};
 
 use clap::Args;
 use config::Changes;
-use conform::{CheckReport, CheckSetting, ProtocolRule, RosterRobot};
+use conform::{CheckReport, CheckSetting, PlayedLayer, ProtocolRule, RosterRobot};
+use protocol::messages::KnownSite;
 use protocol::{RobotName, Tick};
 use scenario::Scenario;
 use terminal::OutputError;
@@ -113,6 +114,36 @@ fn setting(args: &ConformArgs) -> Result<CheckSetting> {
     Ok(setting)
 }
 
+/// The sites that every robot knows of.
+fn known_sites(scenario: &Scenario) -> Vec<KnownSite> {
+    let mut known = Vec::new();
+    for (name, site) in &scenario.sites {
+        if site.is_known {
+            known.push(KnownSite {
+                name: name.clone(),
+                kind: site.kind.clone(),
+                location: site.at,
+            });
+        }
+    }
+    known
+}
+
+/// The layers that robots sense, with their numbers at the start.
+fn sensed_layers(scenario: &Scenario) -> Vec<PlayedLayer> {
+    let mut sensed = Vec::new();
+    for (name, layer) in &scenario.layers {
+        if layer.range_m.is_some() {
+            sensed.push(PlayedLayer {
+                name: name.clone(),
+                cell_m: layer.cell_m,
+                value: layer.value,
+            });
+        }
+    }
+    sensed
+}
+
 /// Takes field, roster and parameters from a scenario. The states and commands of the other robots are those of a run of
 /// the scenario in this process; if a class cannot run here, the other robots stand still.
 fn take_scenario(setting: &mut CheckSetting, file: &Path) -> Result<()> {
@@ -122,12 +153,19 @@ fn take_scenario(setting: &mut CheckSetting, file: &Path) -> Result<()> {
     setting.field_m = scenario.field_m;
     setting.body_m = scenario.body_m;
     setting.sensing_range_m = scenario.sensing.range_m;
+    setting.rays = scenario.sensing.rays;
+    setting.known_sites = known_sites(&scenario);
+    setting.layers = sensed_layers(&scenario);
 
     setting.fake_peers.clear();
     for (name, spec) in &scenario.robots {
         let role = RosterRobot {
             location: spec.at,
             parameters: spec.parameters.clone(),
+            drive: spec
+                .wheels
+                .map(|wheels| simulator::drive_limits(&wheels, scenario.max_speed_mps)),
+            heading_rad: spec.wheels.map_or(0.0, |wheels| wheels.heading_rad),
             ..RosterRobot::default()
         };
         setting.fake_peers.insert(name.clone(), role);

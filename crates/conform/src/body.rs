@@ -1,7 +1,9 @@
 //! The robot's body: where it stands, and where it wants to be.
 
-use protocol::Tick;
-use protocol::messages::{Correction, Point, Welcome};
+use std::f64::consts::{PI, TAU};
+
+use protocol::messages::{Correction, Point, Pose, Report, Velocity, Welcome};
+use protocol::{Tick, published_angle};
 
 /// Every so many ticks the same happens to a body again.
 pub(crate) const ROUND: Tick = 16;
@@ -16,14 +18,49 @@ const SHIFT: (f64, f64) = (0.25, 0.125);
 pub(crate) struct RobotBody {
     pub(crate) stands: Point,
     pub(crate) proposal: Point,
+    /// Of a robot that drives.
+    heading_rad: f64,
+    velocity: Velocity,
 }
 
 impl RobotBody {
     /// A body that stands and stays.
-    pub(crate) fn at(location: Point) -> Self {
+    pub(crate) fn at(location: Point, heading_rad: f64) -> Self {
         Self {
             stands: location,
             proposal: location,
+            heading_rad: published_angle(heading_rad),
+            velocity: Velocity::default(),
+        }
+    }
+
+    /// Where the robot wants to be, by its report. One that drives moves straight along its heading, and then turns: how exactly it
+    /// moves is the simulator's affair.
+    pub(crate) fn propose(&mut self, report: &Report, welcome: &Welcome) {
+        let Some(limits) = welcome.drive else {
+            self.proposal = report.proposal;
+            return;
+        };
+
+        let wanted = report.velocity.unwrap_or_default();
+        let most_mps = limits.max_speed_mps;
+        self.velocity.linear_mps = wanted.linear_mps.clamp(-most_mps, most_mps);
+        let most_radps = limits.max_turn_radps.unwrap_or(PI);
+        self.velocity.angular_radps = wanted.angular_radps.clamp(-most_radps, most_radps);
+
+        let step_m = self.velocity.linear_mps * welcome.tick_s;
+        let (sin, cos) = libm::sincos(self.heading_rad);
+        self.proposal = Point::new(self.stands.x + step_m * cos, self.stands.y + step_m * sin);
+        let turned_rad = self.heading_rad + self.velocity.angular_radps * welcome.tick_s;
+        self.heading_rad = published_angle(libm::remainder(turned_rad, TAU));
+    }
+
+    /// Its pose.
+    pub(crate) fn pose(&self) -> Pose {
+        Pose {
+            location: self.stands,
+            heading_rad: self.heading_rad,
+            velocity: self.velocity,
         }
     }
 
@@ -43,6 +80,7 @@ impl RobotBody {
         }
 
         if tick % ROUND == REFUSED || !is_free(self.proposal, welcome) {
+            self.velocity.linear_mps = 0.0;
             return Some(Correction {
                 location: self.stands,
                 blocked: true,

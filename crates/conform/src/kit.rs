@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use bus::{Bus, BusError, Declared, Role as BusRole};
-use protocol::messages::{JoinRequest, Welcome};
+use protocol::messages::{JoinRequest, Point, SensedLayer, SensedRow, Welcome};
 use protocol::{PROTOCOL_VERSION, RobotName, RunName};
 
 use crate::process;
@@ -164,6 +164,40 @@ impl Kit {
         self.learned().request.bodies
     }
 
+    /// Its heading at the start, if it drives.
+    pub(crate) fn heading_rad(&self) -> f64 {
+        let Some(learned) = self.learned.get() else {
+            return 0.0;
+        };
+        let own = learned.fake_peers.get(&learned.request.name);
+        own.map_or(0.0, |role| role.heading_rad)
+    }
+
+    /// The distances along its rays, if it asks for them and there are any: nothing is within their range.
+    pub(crate) fn ranges_m(&self) -> Vec<f64> {
+        match self.setting.rays {
+            Some(rays) if self.learned().request.ranges => vec![rays.range_m; rays.count as usize],
+            _ => Vec::new(),
+        }
+    }
+
+    /// What it senses of layers where it stands.
+    pub(crate) fn layers_at(&self, place: Point) -> Vec<SensedLayer> {
+        let mut sensed = Vec::new();
+        for layer in &self.setting.layers {
+            sensed.push(SensedLayer {
+                name: layer.name.clone(),
+                cell_m: layer.cell_m,
+                rows: vec![SensedRow {
+                    row: (place.y / layer.cell_m) as u32,
+                    column: (place.x / layer.cell_m) as u32,
+                    values: vec![layer.value],
+                }],
+            });
+        }
+        sensed
+    }
+
     /// What the robot is welcomed with at tick 0.
     pub(crate) fn template(&self, run: &RunName) -> Welcome {
         let learned = self.learned.get();
@@ -187,10 +221,11 @@ impl Kit {
             field_m: setting.field_m,
             body_m: setting.body_m,
             sensing_range_m: setting.sensing_range_m,
-            rays: None,
+            rays: setting.rays,
+            drive: role.drive,
             location: role.location,
             roster: fake_peers.into_keys().collect(),
-            known_sites: Vec::new(),
+            known_sites: setting.known_sites.clone(),
             parameters: role.parameters,
             earlier_parameters: Vec::new(),
             reseeds: Vec::new(),

@@ -39,4 +39,4 @@ pub use flushing::unflushed;
 pub use kit::CannotRun;
 pub use report::{AnswerTimes, CheckReport, RuleFailure, RuleOutcome, RuleVerdict};
 pub use rules::{PAGE, ProtocolRule, RULES};
-pub use setting::{CheckSetting, RosterRobot};
+pub use setting::{CheckSetting, PlayedLayer, RosterRobot};

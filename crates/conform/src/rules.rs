@@ -31,12 +31,13 @@ const fn rule(name: &'static str, section: &'static str) -> ProtocolRule {
 }
 
 /// All rules, in the order of the page.
-pub const RULES: [ProtocolRule; 35] = [
+pub const RULES: [ProtocolRule; 36] = [
     rule("join.request", "joining"),
     rule("join.ready-last", "joining"),
     rule("join.refused", "joining"),
     rule("tick.answer", "a-tick"),
     rule("tick.correction", "a-tick"),
+    rule("tick.velocity", "a-tick"),
     rule("tick.initial", "a-tick"),
     rule("tick.state-first", "a-tick"),
     rule("command.order", "commands"),

@@ -166,7 +166,7 @@ pub(crate) fn step(
     disturbance.during(harness, tick)?;
 
     let done = harness.complete()?;
-    harness.body.proposal = done.report.proposal;
+    harness.body.propose(&done.report, &harness.template);
     let entry = PlayedTick {
         epoch,
         tick,
@@ -193,16 +193,25 @@ fn news_of(harness: &mut Harness<'_>, script: &PlayScript, tick: Tick) -> TickUp
         news.bodies = harness.fake_peers.bodies(epoch, tick);
     }
 
+    let drives = harness.template.drive.is_some();
+    let start = RobotBody::at(harness.template.location, harness.kit.heading_rad());
     if harness.takes_over() {
-        harness.body = RobotBody::at(harness.template.location);
+        harness.body = start;
         news.correction = Some(Correction {
             location: harness.body.stands,
             blocked: false,
         });
     } else if tick == 0 {
-        harness.body = RobotBody::at(harness.template.location);
+        harness.body = start;
     } else {
         news.correction = harness.body.advance(tick, &harness.template);
+        // What it proposed is not where it drove.
+        if drives && news.correction.is_none() {
+            news.correction = Some(Correction {
+                location: harness.body.stands,
+                blocked: false,
+            });
+        }
         if tick % ROUND == SENSES {
             news.sensed = harness.fake_peers.sensed(epoch, tick).into_iter().collect();
         }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use protocol::messages::{Parameters, Point, PublicState};
+use protocol::messages::{DriveLimits, KnownSite, Parameters, Point, PublicState, Rays};
 use protocol::{RobotName, Tick};
 
 /// What a conformance check plays.
@@ -20,12 +20,29 @@ pub struct CheckSetting {
     pub body_m: f64,
     /// Distance within which the robot senses other bodies, meters.
     pub sensing_range_m: f64,
+    /// The fan of rays, if there is one. Nothing is within their range.
+    pub rays: Option<Rays>,
+    /// The sites that every robot knows of. The robot is within the range of none.
+    pub known_sites: Vec<KnownSite>,
+    /// The layers that robots sense.
+    pub layers: Vec<PlayedLayer>,
     /// The robots of the roster. Empty: the robot itself, without parameters, and one other.
     pub fake_peers: BTreeMap<RobotName, RosterRobot>,
     /// Texts of commands that the robot understands, if its [`RosterRobot::understands`] has none.
     pub commands: Vec<String>,
     /// Ticks of the longer checks.
     pub ticks: Tick,
+}
+
+/// A layer, of which the robot senses the cell in which it stands.
+#[derive(Debug, Clone)]
+pub struct PlayedLayer {
+    /// Its name.
+    pub name: String,
+    /// Side of a cell, meters.
+    pub cell_m: f64,
+    /// The number of each cell.
+    pub value: f64,
 }
 
 /// A robot of the roster.
@@ -35,6 +52,10 @@ pub struct RosterRobot {
     pub location: Point,
     /// Its parameters, if it is the one that is checked.
     pub parameters: Parameters,
+    /// Its limits, if it is the one that is checked and drives like wheels.
+    pub drive: Option<DriveLimits>,
+    /// Its heading at the start, if it drives, radians counter-clockwise from +x.
+    pub heading_rad: f64,
     /// Its states by tick, if it is not; after the last one it stays as it is.
     pub states: Vec<PublicState>,
     /// Texts of the commands that it understands.
@@ -59,6 +80,9 @@ impl Default for CheckSetting {
             field_m: [10.0, 10.0],
             body_m: 0.5,
             sensing_range_m: 2.0,
+            rays: None,
+            known_sites: Vec::new(),
+            layers: Vec::new(),
             fake_peers: BTreeMap::new(),
             commands: Vec::new(),
             ticks: TICKS,

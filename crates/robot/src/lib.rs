@@ -55,10 +55,11 @@ pub use host::{Host, HostError, HostOptions, Stopper};
 pub use local::LocalHost;
 pub use network::{PeerNetwork, Undelivered};
 pub use protocol::messages::{
-    Clock, Command, CommandText, Correction, End, Face, KnownSite, LayerAction, LayerRefusal,
-    LayerResult, Panel, Parameters, Payload, Point, Pose, PublicState, Rays, Report, SensedBody,
-    SensedCell, SensedKind, SensedLayer, SensedRobot, SensedRow, SensedSite, SiteAction,
-    SiteRefusal, SiteResult, StateVariables, TickUpdate, Tone, Variable, Velocity, Welcome, Widget,
+    Clock, Command, CommandText, Correction, DriveLimits, End, Face, KnownSite, LayerAction,
+    LayerRefusal, LayerResult, Panel, Parameters, Payload, Point, Pose, PublicState, Rays, Report,
+    SensedBody, SensedCell, SensedKind, SensedLayer, SensedRobot, SensedRow, SensedSite,
+    SiteAction, SiteRefusal, SiteResult, StateVariables, TickUpdate, Tone, Variable, Velocity,
+    Welcome, Widget,
 };
 pub use protocol::random::Stream;
 pub use protocol::{RobotName, RobotPattern, RunName, Tick, published_angle};

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use protocol::messages::{Pose, Report, Velocity};
+use protocol::messages::{DriveLimits, Pose, Report, Velocity};
 use protocol::{Event, RobotName, published_angle};
 use scenario::to_wire;
-use world::World;
+use world::{Wheels, World};
 
 /// Robots that propose what does not count.
 #[derive(Debug, Clone, Default)]
@@ -54,6 +54,18 @@ impl Driving {
             robot: name.clone(),
             text: because.to_owned(),
         })
+    }
+}
+
+/// The limits of a robot in a field with this limit of speed, as it is told them.
+#[must_use]
+pub fn drive_limits(wheels: &Wheels, max_speed_mps: f64) -> DriveLimits {
+    let limit = |number: f64| number.is_finite().then_some(number);
+    DriveLimits {
+        max_speed_mps: wheels.max_speed_mps.min(max_speed_mps),
+        max_turn_radps: limit(wheels.max_turn_radps),
+        max_acceleration_mps2: limit(wheels.max_acceleration_mps2),
+        max_turn_acceleration_radps2: limit(wheels.max_turn_acceleration_radps2),
     }
 }
 

@@ -18,6 +18,7 @@ pub mod sites;
 mod static_world;
 mod summarized;
 
+pub use driving::drive_limits;
 pub use protocol::{Event, Line};
 pub use recorder::Recorder;
 pub use simulation::{Reports, Simulation, TickRecord};

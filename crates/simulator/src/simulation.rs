@@ -8,10 +8,10 @@ use observe::{Evaluation, Measurements, Monitors, Observation, RobotState};
 use protocol::codec::MAX_MESSAGE_BYTES;
 use protocol::event::{Blocker, Cause, WaitedFor};
 use protocol::messages::{
-    CommandText, Correction, Cut, Delivery, End, FaultKind, GuestMood, HeldProcess, Intervention,
-    NEWS_FLAGS, OnLate, Parameters, ParametersOffer, Point, Pose, ProcessOrder, PublicState,
-    Report, SensedBody, SensedKind, SensedRobot, SensedSite, Standing, StateVariables, Target,
-    TickUpdate, Welcome,
+    CommandText, Correction, Cut, Delivery, DriveLimits, End, FaultKind, GuestMood, HeldProcess,
+    Intervention, NEWS_FLAGS, OnLate, Parameters, ParametersOffer, Point, Pose, ProcessOrder,
+    PublicState, Report, SensedBody, SensedKind, SensedRobot, SensedSite, Standing, StateVariables,
+    Target, TickUpdate, Welcome,
 };
 use protocol::random::{Stream, stream};
 use protocol::{
@@ -20,7 +20,7 @@ use protocol::{
 use world::{Body, HallError, MoveOutcome, Reaction, World};
 
 use crate::digest::{Digest, TickDigest};
-use crate::driving::{Driving, pose};
+use crate::driving::{Driving, drive_limits, pose};
 use crate::guests::GuestState;
 use crate::layers::Layers;
 use crate::medium::{Arrival, ForcedVerdict, Medium, SentCommand};
@@ -1194,6 +1194,7 @@ impl Simulation {
             body_m: self.scenario.body_m,
             sensing_range_m: self.scenario.sensing.range_m,
             rays: self.scenario.sensing.rays,
+            drive: self.drive_limits(name),
             location,
             roster: self.names.clone(),
             known_sites: self.sites.known(),
@@ -1207,6 +1208,12 @@ impl Simulation {
             state_before: open_state.as_ref().and(last_state.clone()),
             last_state: open_state.or(last_state),
         })
+    }
+
+    /// The limits of a robot that drives like wheels; `None` for any other one.
+    fn drive_limits(&self, name: &RobotName) -> Option<DriveLimits> {
+        let wheels = self.scenario.robots.get(name)?.wheels?;
+        Some(drive_limits(&wheels, self.scenario.max_speed_mps))
     }
 
     /// The state of a robot as of the last complete tick, if it has reported.

@@ -17,7 +17,7 @@ type Passing = (
     &'static [&'static str],
 );
 
-const ROBOTS: [Passing; 4] = [
+const ROBOTS: [Passing; 5] = [
     ("a robot by hand", &[], &["wrong-robot"]),
     (
         "Butler in the hall",
@@ -33,6 +33,11 @@ const ROBOTS: [Passing; 4] = [
         "Vonda in the hall",
         &["--scenario", "configs/three_robots.toml", "--name", "Vonda"],
         &["cars-vonda"],
+    ),
+    (
+        "a robot that drives",
+        &["--scenario", "tests/tests/system/conform/rover.toml"],
+        &["rover"],
     ),
 ];
 

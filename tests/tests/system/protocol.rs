@@ -106,7 +106,7 @@ fn the_sections_have_the_names_that_others_link_to() {
 /// `cars conform` names these rules: each is one sentence of the page.
 #[test]
 fn the_rules_are_there_once_each() {
-    const RULES: [&str; 35] = [
+    const RULES: [&str; 36] = [
         "wire.qos",
         "join.request",
         "join.ready-last",
@@ -115,6 +115,7 @@ fn the_rules_are_there_once_each() {
         "tick.correction",
         "tick.initial",
         "tick.state-first",
+        "tick.velocity",
         "news.wait",
         "command.order",
         "command.twice",

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use protocol::PROTOCOL_VERSION;
-use protocol::messages::{OTHERS, Performative};
+use protocol::messages::{OTHERS, Performative, Report};
 use protocol::name::OPERATOR;
 
 use super::wire;
@@ -19,8 +19,9 @@ use crate::transcript::{PlayedTick, Transcript};
 use crate::wire::Joining;
 
 /// The rules that the usual ticks show.
-pub(super) const USUAL: [&str; 7] = [
+pub(super) const USUAL: [&str; 8] = [
     "tick.answer",
+    "tick.velocity",
     "join.request",
     "command.sent",
     "number.angles",
@@ -73,6 +74,7 @@ pub(super) fn usual(
     };
     harness.settle(ECHO);
     findings.settle("tick.answer", check_answers(&harness, &transcript));
+    findings.settle("tick.velocity", check_velocities(&harness, &transcript));
     check_commands(&harness, &transcript, findings);
     check_numbers(&harness, &transcript, findings);
     findings.close(&USUAL, Ok(()));
@@ -159,6 +161,28 @@ fn check_answers(harness: &Harness<'_>, transcript: &Transcript) -> Result<(), R
                 "more than one",
             ));
         }
+    }
+    Ok(())
+}
+
+/// Robots that drive ask for a velocity, and no other one does.
+fn check_velocities(harness: &Harness<'_>, transcript: &Transcript) -> Result<(), RuleFailure> {
+    let drives = harness.template.drive.is_some();
+    for entry in transcript {
+        let Report {
+            velocity, proposal, ..
+        } = entry.report;
+        let came = match velocity {
+            Some(_) if !drives => "a velocity",
+            None if drives && proposal != entry.location => "another location, and no velocity",
+            _ => continue,
+        };
+        let expected = match drives {
+            true => "a velocity, or none to brake: the robot has a `drive` in its welcome",
+            false => "a location and no velocity: the robot has no `drive` in its welcome",
+        };
+        let came = format!("{came} in tick {}", entry.tick);
+        return Err(RuleFailure::new(expected, came));
     }
     Ok(())
 }

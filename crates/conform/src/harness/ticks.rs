@@ -71,18 +71,35 @@ impl Harness<'_> {
         })?;
 
         let tick = self.next;
+        let news = self.with_senses(news.clone());
         let mut named = BTreeSet::new();
         if !news.is_empty() {
             named.insert(self.kit.subject());
         }
 
-        self.news = news.clone();
+        self.news = news;
         self.next += 1;
         // Before the barrier opens the tick, which it may complete at once: where the robot is lost.
         self.outcome = None;
         self.begun = Instant::now();
         self.drive(|barrier, out| barrier.open(tick, named, out));
         Ok(())
+    }
+
+    /// Whether the robot senses something in every tick, so that there is no tick without news for it.
+    pub(crate) fn has_steady_senses(&self) -> bool {
+        !self.with_senses(TickUpdate::default()).is_empty()
+    }
+
+    /// News with what the robot senses in every tick: its pose if it drives, its rays, and layers.
+    fn with_senses(&self, news: TickUpdate) -> TickUpdate {
+        let drives = self.template.drive.is_some();
+        TickUpdate {
+            pose: drives.then(|| self.body.pose()),
+            ranges: self.kit.ranges_m(),
+            layers: self.kit.layers_at(self.body.stands),
+            ..news
+        }
     }
 
     /// Waits until the open tick is complete.

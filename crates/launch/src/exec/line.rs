@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use protocol::Message;
 use protocol::messages::{
-    End, KnownSite, LayerAction, LayerResult, MAX_TEXT_BYTES, Panel, Parameters, Payload,
-    Performative, Point, Pose, PublicState, Rays, SensedLayer, SensedRobot, SensedSite, SiteAction,
-    SiteResult, StateVariables, StreamReseed, Variable, Velocity,
+    DriveLimits, End, KnownSite, LayerAction, LayerResult, MAX_TEXT_BYTES, Panel, Parameters,
+    Payload, Performative, Point, Pose, PublicState, Rays, SensedLayer, SensedRobot, SensedSite,
+    SiteAction, SiteResult, StateVariables, StreamReseed, Variable, Velocity,
 };
 use protocol::plain::escape_line;
 use protocol::{RobotName, RunName, Tick};
@@ -59,6 +59,8 @@ pub(super) enum ToProgram<'a> {
         sensing_range_m: f64,
         #[serde(skip_serializing_if = "Option::is_none")]
         rays: Option<Rays>,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        drive: Option<DriveLimits>,
         location: Point,
         #[serde(skip_serializing_if = "Option::is_none")]
         pose: Option<Pose>,
@@ -174,6 +176,7 @@ impl<'a> ToProgram<'a> {
             body_m: welcome.body_m,
             sensing_range_m: welcome.sensing_range_m,
             rays: welcome.rays,
+            drive: welcome.drive,
             location: welcome.location,
             pose,
             roster: &welcome.roster,

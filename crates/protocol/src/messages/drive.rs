@@ -33,3 +33,19 @@ pub struct Pose {
     /// The velocity that it has reached.
     pub velocity: Velocity,
 }
+
+/// The limits of a robot that drives like wheels. It may propose any velocity: the simulator applies them.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct DriveLimits {
+    /// Highest speed, forward and backward, m/s: the lower one of its own limit and that of the field.
+    pub max_speed_mps: f64,
+    /// Fastest turn, to both sides, rad/s. Absent: it has no limit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_turn_radps: Option<f64>,
+    /// Largest change of the speed, m/s². Absent: it has no limit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_acceleration_mps2: Option<f64>,
+    /// Largest change of the turn rate, rad/s². Absent: it has no limit.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_turn_acceleration_radps2: Option<f64>,
+}

@@ -23,7 +23,7 @@ pub use control::{
     Awaited, Control, ControlAnswer, FaultKind, FaultOrder, Intervention, LogFile, OnLate, Phase,
     Presence, ProcessOrder, Range, Reason, RobotStatus, Setup, SetupAnswer, Status,
 };
-pub use drive::{Pose, Velocity};
+pub use drive::{DriveLimits, Pose, Velocity};
 pub use layer::{
     LayerAction, LayerFrame, LayerRefusal, LayerResult, MAX_LAYER_ACTIONS, MAX_LAYER_CELLS,
     MAX_LAYER_VALUE, MAX_LAYERS, MAX_SENSED_CELLS, SensedCell, SensedLayer, SensedRow, cell_center,

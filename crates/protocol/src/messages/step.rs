@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::drive::{Pose, Velocity};
+use super::drive::{DriveLimits, Pose, Velocity};
 use super::layer::{LayerAction, LayerResult, SensedLayer, check_layer_actions};
 use super::limits::{counted, few, finite, is_false, is_zero, short};
 use super::numbers::{Epoch, Generation, Tick};
@@ -149,6 +149,9 @@ pub struct Welcome {
     /// The fan of rays by which it may sense distances, if the scenario has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rays: Option<Rays>,
+    /// Its limits, if it drives like wheels: it proposes velocities, and its news have its [`TickUpdate::pose`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub drive: Option<DriveLimits>,
     /// Where it stands.
     pub location: Point,
     /// Names of all robots of the scenario, itself included, in the order of their bytes.

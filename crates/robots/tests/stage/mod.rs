@@ -375,6 +375,7 @@ pub(crate) fn welcome(
         body_m: BODY_M,
         sensing_range_m: SENSING_M,
         rays: None,
+        drive: None,
         location: at,
         roster: roster.to_vec(),
         known_sites: Vec::new(),

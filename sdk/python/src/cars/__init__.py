@@ -11,6 +11,7 @@ from . import panel
 from ._cars import Cars, Stream, __version__, published_angle, stream
 from ._data import (
     Command,
+    DriveLimits,
     KnownSite,
     LayerAction,
     LayerCell,
@@ -62,6 +63,7 @@ __all__ = [
     "Cars",
     "CarsRobotInterface",
     "Command",
+    "DriveLimits",
     "Error",
     "Experiment",
     "FileError",

@@ -182,6 +182,18 @@ class Rays:
     range_m: float
 
 
+@dataclass(frozen=True)
+class DriveLimits:
+    """The limits of a robot that drives like wheels. It may ask for any velocity: the simulator applies them."""
+
+    max_speed_mps: float
+    """Highest speed, forward and backward: the lower one of its own limit and that of the field."""
+    max_turn_radps: Optional[float] = None
+    """Fastest turn, to both sides; None if it has no limit, as the others."""
+    max_acceleration_mps2: Optional[float] = None
+    max_turn_acceleration_radps2: Optional[float] = None
+
+
 class PublicState(NamedTuple):
     """A robot as it reported itself for ``tick``: the answer to all six queries of the common robot interface."""
 
@@ -223,6 +235,8 @@ class Welcome:
     """Its parameters, as the scenario says, lengths and times in SI units."""
     rays: Optional[Rays] = None
     """The fan of rays of ``cars.ranges``, if the scenario has one."""
+    drive: Optional[DriveLimits] = None
+    """Its limits, if it drives like wheels: it has a ``cars.pose``, and returns ``Action.drive``."""
     known_sites: tuple[KnownSite, ...] = ()
     """The sites that every robot knows of, by name. Their states are sensed within range: ``cars.sites``."""
     last_state: Optional[Mapping[str, Any]] = None
@@ -238,6 +252,10 @@ def read_welcome(text: str) -> Welcome:
     known["location"] = Point(**given["location"])
     if "rays" in given:
         known["rays"] = Rays(**given["rays"])
+    if "drive" in given:
+        # A later version may have further limits.
+        limits = {one.name: given["drive"].get(one.name) for one in fields(DriveLimits)}
+        known["drive"] = DriveLimits(**limits)
     known["roster"] = tuple(given["roster"])
     known["known_sites"] = tuple(
         KnownSite(site["name"], site["kind"], Point(**site["location"])) for site in given.get("known_sites", [])

@@ -5,7 +5,8 @@ use std::time::Duration;
 use lockstep::{Begin, Sent, Turn};
 use protocol::keys::STATE;
 use protocol::messages::{
-    CommandText, Point, PublicState, Report, StateVariables, TickUpdate, Variable, Welcome,
+    CommandText, Point, PublicState, Report, StateVariables, TickUpdate, Variable, Velocity,
+    Welcome,
 };
 use protocol::random::unit;
 use protocol::{Epoch, RobotName, Tick};
@@ -195,7 +196,7 @@ impl Host {
             log,
             site_actions: Vec::new(),
             layer_actions: Vec::new(),
-            velocity: None,
+            velocity: wrong.is("tick.velocity").then(Velocity::default),
         }
     }
 
