@@ -5,6 +5,9 @@
 //! keeps the higher bid of its own table and a received one, so the tables agree in the end, and a robot that is outbid takes
 //! another task. While messages are lost, two robots may go to the same task, until a table arrives or one sees that it is done.
 //!
+//! CBAA does not know robots that crash: their tasks stay theirs. With a `lease`, which is ours, a robot renews its bid while it has the
+//! task, and a task whose bid was not renewed for so long is free again.
+//!
 //! The robot has no emotion. `sdk/python/examples/bidder.py` is the same in Python, to the last bit.
 
 use rand::Rng as _;
@@ -34,6 +37,8 @@ struct BidderParameters {
     sends: Sends,
     /// Time between two tables, if it sends periodically, seconds.
     period: f64,
+    /// Time after which a bid that was not renewed no longer counts, seconds; without it a bid counts for ever \[I\].
+    lease: Option<f64>,
 }
 
 impl Default for BidderParameters {
@@ -43,6 +48,7 @@ impl Default for BidderParameters {
             work: 3.0,
             sends: Sends::Periodically,
             period: 0.5,
+            lease: None,
         }
     }
 }
@@ -68,6 +74,8 @@ struct TaskEntry {
     by: String,
     /// Whether the task is done.
     done: bool,
+    /// When that robot has renewed its bid, simulated seconds; 0 without a lease.
+    renewed_s: f64,
 }
 
 /// A robot that shares tasks.
@@ -81,7 +89,8 @@ pub struct Bidder {
     task: Option<usize>,
     /// Time that it has worked on the task, seconds.
     worked_s: f64,
-    /// When it sends its table next, seconds.
+    /// When it has sent its table, and when it sends it next, seconds.
+    sent_s: f64,
     sends_s: f64,
     /// Whether its table has changed since it was sent.
     has_changed: bool,
@@ -108,6 +117,7 @@ impl Robot for Bidder {
         self.receive(cars);
         self.look(cars);
         self.drop_lost_task(cars);
+        self.renew(cars);
         self.bid(cars);
         let action = self.work(cars);
         self.send(cars);
@@ -136,9 +146,23 @@ impl Bidder {
             let Ok(received) = payload.read::<Vec<TaskEntry>>() else {
                 continue;
             };
-            for (own, received) in self.table.iter_mut().zip(received) {
+            for (own, mut received) in self.table.iter_mut().zip(received) {
+                received.expire(self.parameters.lease, cars.time_s());
                 self.has_changed |= own.merge(received);
             }
+        }
+    }
+
+    /// Renews the bid for its task, and drops those of others that they have not renewed.
+    fn renew(&mut self, cars: &Cars<'_>) {
+        if self.parameters.lease.is_none() {
+            return;
+        }
+        for (index, entry) in self.table.iter_mut().enumerate() {
+            if self.task == Some(index) {
+                entry.renewed_s = cars.time_s();
+            }
+            entry.expire(self.parameters.lease, cars.time_s());
         }
     }
 
@@ -182,8 +206,10 @@ impl Bidder {
         if let Some((task, bid)) = best {
             self.task = Some(task);
             self.has_changed = true;
-            self.table[task].bid = bid;
-            self.table[task].by = cars.name().to_string();
+            let entry = &mut self.table[task];
+            entry.bid = bid;
+            entry.by = cars.name().to_string();
+            entry.renewed_s = self.parameters.lease.map_or(0.0, |_| cars.time_s());
         }
     }
 
@@ -237,10 +263,11 @@ impl Bidder {
     fn send(&mut self, cars: &mut Cars<'_>) {
         let is_due = match self.parameters.sends {
             Sends::Periodically => cars.time_s() >= self.sends_s,
-            Sends::OnChange => self.has_changed,
+            Sends::OnChange => self.has_changed || self.must_renew(cars.time_s()),
             Sends::Never => false,
         };
         if is_due {
+            self.sent_s = cars.time_s();
             self.sends_s = cars.time_s() + self.parameters.period;
             self.has_changed = false;
             // Numbers and texts always are JSON.
@@ -248,20 +275,39 @@ impl Bidder {
             cars.broadcast(TABLE, table);
         }
     }
+
+    /// Whether half of the lease of its task is over since it was renewed for the others.
+    fn must_renew(&self, now_s: f64) -> bool {
+        let lease = self.parameters.lease.filter(|_| self.task.is_some());
+        lease.is_some_and(|lease_s| now_s - self.sent_s >= 0.5 * lease_s)
+    }
 }
 
 impl TaskEntry {
     /// Takes over what is news in another robot's entry for the same task: of two bids the higher one, of equal ones that of the
-    /// robot that comes first by name. Returns whether there was any.
+    /// robot that comes first by name. Returns whether there was any, other than that a bid was renewed.
     fn merge(&mut self, received: Self) -> bool {
-        let before = self.clone();
+        let is_done = received.done && !self.done;
         self.done |= received.done;
         let is_higher = received.bid > self.bid;
         if is_higher || (received.bid == self.bid && received.by < self.by) {
             self.bid = received.bid;
             self.by = received.by;
+            self.renewed_s = received.renewed_s;
+            return true;
         }
-        *self != before
+        if received.bid == self.bid && received.by == self.by {
+            self.renewed_s = self.renewed_s.max(received.renewed_s);
+        }
+        is_done
+    }
+
+    /// Drops a bid that was not renewed for longer than the lease.
+    fn expire(&mut self, lease_s: Option<f64>, now_s: f64) {
+        if lease_s.is_some_and(|lease_s| now_s - self.renewed_s > lease_s) {
+            self.bid = 0.0;
+            self.by.clear();
+        }
     }
 }
 
@@ -274,7 +320,38 @@ mod tests {
             bid,
             by: by.to_owned(),
             done,
+            renewed_s: 0.0,
         }
+    }
+
+    #[test]
+    fn a_bid_that_is_not_renewed_expires_and_does_not_come_back() {
+        let of_c = TaskEntry {
+            renewed_s: 4.0,
+            ..entry(0.9, "C", false)
+        };
+        let mut own = TaskEntry::default();
+        for (now_s, lease_s, by) in [
+            (9.0, Some(5.0), "C"),
+            (9.5, Some(5.0), ""),
+            (9.5, None, "C"),
+        ] {
+            let mut received = of_c.clone();
+            received.expire(lease_s, now_s);
+            own = TaskEntry::default();
+            own.merge(received);
+            assert_eq!(own.by, by, "{now_s} {lease_s:?}");
+        }
+
+        let renewed = TaskEntry {
+            renewed_s: 8.0,
+            ..of_c.clone()
+        };
+        assert!(!own.merge(renewed), "a renewal is no news");
+        own.expire(Some(5.0), 13.0);
+        assert_eq!((own.by.as_str(), own.renewed_s), ("C", 8.0));
+        assert!(!own.merge(of_c), "an older one neither");
+        assert_eq!(own.renewed_s, 8.0);
     }
 
     #[test]

@@ -18,6 +18,7 @@ class Parameters:
     work: float = 3.0
     sends: str = "periodically"
     period: float = 0.5
+    lease: Optional[float] = None
 
 
 @dataclass
@@ -25,6 +26,7 @@ class Entry:
     bid: float = 0.0
     by: str = ""
     done: bool = False
+    renewed_s: float = 0.0
 
 
 class Bidder(Robot):
@@ -35,7 +37,7 @@ class Bidder(Robot):
         self.tasks = [site for site in cars.welcome.known_sites if site.kind == "task"]
         self.table = [Entry() for _ in self.tasks]
         self.task: Optional[int] = None
-        self.worked_s = self.sends_s = 0.0
+        self.worked_s = self.sent_s = self.sends_s = 0.0
         self.has_changed = False
         self.aside_ticks, self.side = 0, 0.0
 
@@ -43,6 +45,7 @@ class Bidder(Robot):
         self.receive(cars)
         self.look(cars)
         self.drop_lost_task(cars)
+        self.renew(cars)
         self.bid(cars)
         action = self.work(cars)
         self.send(cars)
@@ -55,13 +58,28 @@ class Bidder(Robot):
             if command.text != "table":
                 continue
             for own, other in zip(self.table, [Entry(**entry) for entry in command.payload]):
+                self.expire(other, cars.time_s)
                 is_higher = other.bid > own.bid or (other.bid == own.bid and other.by < own.by)
+                if is_higher or (other.bid, other.by) == (own.bid, own.by):
+                    own.renewed_s = other.renewed_s if is_higher else max(own.renewed_s, other.renewed_s)
                 bid, by = (other.bid, other.by) if is_higher else (own.bid, own.by)
                 self.update(own, bid, by, own.done or other.done)
 
     def update(self, entry: Entry, bid: float, by: str, done: bool) -> None:
-        self.has_changed = self.has_changed or entry != Entry(bid, by, done)
+        self.has_changed = self.has_changed or (entry.bid, entry.by, entry.done) != (bid, by, done)
         entry.bid, entry.by, entry.done = bid, by, done
+
+    def renew(self, cars: Cars) -> None:
+        """Renews the bid for its task, and drops those of others that they have not renewed."""
+        for index, entry in enumerate(self.table):
+            if self.parameters.lease is not None and self.task == index:
+                entry.renewed_s = cars.time_s
+            self.expire(entry, cars.time_s)
+
+    def expire(self, entry: Entry, now_s: float) -> None:
+        lease_s = self.parameters.lease
+        if lease_s is not None and now_s - entry.renewed_s > lease_s:
+            entry.bid, entry.by = 0.0, ""
 
     def look(self, cars: Cars) -> None:
         done = {site.name for site in cars.sites if site.state.get("done") is True}
@@ -83,6 +101,7 @@ class Bidder(Robot):
                 self.task, best = index, bid
         if self.task is not None:
             self.update(self.table[self.task], best, cars.name, False)
+            self.table[self.task].renewed_s = 0.0 if self.parameters.lease is None else cars.time_s
 
     def work(self, cars: Cars) -> Action:
         if self.task is None:
@@ -111,9 +130,11 @@ class Bidder(Robot):
         return Action.go(cars, goal, self.parameters.speed, behavior_state="GO")
 
     def send(self, cars: Cars) -> None:
-        sends = self.parameters.sends
-        if (sends == "periodically" and cars.time_s >= self.sends_s) or (sends == "on_change" and self.has_changed):
-            self.sends_s, self.has_changed = cars.time_s + self.parameters.period, False
+        sends, lease_s = self.parameters.sends, self.parameters.lease
+        must_renew = self.task is not None and lease_s is not None and cars.time_s - self.sent_s >= 0.5 * lease_s
+        has_news = sends == "on_change" and (self.has_changed or must_renew)
+        if has_news or (sends == "periodically" and cars.time_s >= self.sends_s):
+            self.sent_s, self.sends_s, self.has_changed = cars.time_s, cars.time_s + self.parameters.period, False
             cars.broadcast("table", [vars(entry) for entry in self.table])
 
 

@@ -19,7 +19,13 @@ WORLDS: list[tuple[str, str, type[Robot], list[dict[str, Any]]]] = [
         "auction",
         "B*",
         Bidder,
-        [{}, {"robot.B*.params.sends": "on_change"}, {"robot.B*.params.sends": "never", "network.commands.loss": 0.9}],
+        [
+            {},
+            {"robot.B*.params.sends": "on_change"},
+            {"robot.B*.params.sends": "never", "network.commands.loss": 0.9},
+            {"robot.B*.params.lease": "2 s", "network.commands.loss": 0.9},
+            {"robot.B*.params.lease": "2 s", "robot.B*.params.sends": "on_change", "network.commands.loss": 0.6},
+        ],
     ),
     (
         "swarm",

@@ -40,3 +40,30 @@ fn an_auction_ends_when_all_tasks_are_done() {
     let end = text.lines().last().unwrap();
     assert!(end.contains(r#""because":"#), "{end}");
 }
+
+/// CBAA knows no robot that crashes: what it has bid for stays its own, unless bids have to be renewed.
+#[test]
+fn tasks_of_a_robot_that_crashes_are_done_by_others_where_bids_have_a_lease() {
+    let lab = Lab::new();
+    for (lease, ends) in [("", false), ("5 s", true)] {
+        for sends in ["periodically", "on_change"] {
+            let run = format!("{sends}{}", lease.len());
+            let mut set = vec![
+                "on_late=continue".to_owned(),
+                r#"fault=[{ robot = "B1", do = "crash", at = "2 s" }]"#.to_owned(),
+                format!("robot.B*.params.sends={sends}"),
+            ];
+            if ends {
+                set.push(format!("robot.B*.params.lease={lease}"));
+            }
+            let mut arguments = vec!["run", "auction", "--run", &run, "--seed", "3"];
+            for change in &set {
+                arguments.extend(["--set", change]);
+            }
+            lab.ok(&arguments);
+            let text = String::from_utf8(lab.bytes(&run)).unwrap();
+            let done = text.matches(r#""event":"site_changed""#).count();
+            assert_eq!(done == 12, ends, "{run}: {done} tasks");
+        }
+    }
+}
