@@ -213,11 +213,10 @@ impl Branch {
     /// Has chance be another one from the next tick on; `of` names its kinds, and without any it is all of it.
     pub fn reseed(&mut self, seed: u64, of: &[ChanceKind]) {
         let Local { simulation, robots } = &mut self.local;
-        let reseed = simulation.reseed(seed, of);
+        simulation.reseed(seed, of);
+        let scenario = simulation.scenario();
         for name in simulation.names() {
-            if let Some(reseed) = reseed.of_robot(name) {
-                robots.reseed(name, reseed);
-            }
+            robots.set_reseeds(name, scenario.stream_reseeds(name, simulation.tick()));
         }
     }
 

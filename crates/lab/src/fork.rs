@@ -67,6 +67,14 @@ impl Fork<'_> {
             add_change(&mut content, next_s, set);
         }
         if let Some((seed, of)) = &self.reseed {
+            if of.is_empty() {
+                // All chance is another one from then on, also where the recorded run would be re-seeded later.
+                let earlier = before.reseeds.partition_point(|one| one.at <= self.tick);
+                let tables = content.get_mut("reseed");
+                if let Some(tables) = tables.and_then(toml::Value::as_array_mut) {
+                    tables.truncate(earlier);
+                }
+            }
             add_reseed(&mut content, next_s, *seed, of);
         }
         let source = Source {

@@ -133,10 +133,10 @@ impl LocalHost {
         })
     }
 
-    /// Has a robot draw from another stream from a tick on. Without effect on a robot that is not of the roster.
-    pub fn reseed(&mut self, name: &RobotName, reseed: StreamReseed) {
+    /// Sets where a robot draws from other streams, from the next tick on. Without effect on a robot that is not of the roster.
+    pub fn set_reseeds(&mut self, name: &RobotName, reseeds: Vec<StreamReseed>) {
         if let Some(index) = self.index(name) {
-            self.runners[index].reseed(reseed);
+            self.runners[index].set_reseeds(reseeds);
         }
     }
 

@@ -80,9 +80,9 @@ impl Runner {
         })
     }
 
-    /// Has the robot draw from another stream from a tick on, as if its welcome had said so.
-    pub(crate) fn reseed(&mut self, reseed: StreamReseed) {
-        Arc::make_mut(&mut self.welcome).reseeds.push(reseed);
+    /// Where the robot draws from other streams from now on, as if its welcome had said so.
+    pub(crate) fn set_reseeds(&mut self, reseeds: Vec<StreamReseed>) {
+        Arc::make_mut(&mut self.welcome).reseeds = reseeds;
     }
 
     /// What it was told when it joined.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use protocol::messages::{FaultKind, Parameters};
+use protocol::messages::{FaultKind, Parameters, StreamReseed};
 use protocol::{RobotName, Tick};
 
 use super::change::Change;
@@ -10,6 +10,7 @@ use super::checked::Scenario;
 use super::fault::{Fault, FaultEnd, Interruption};
 use super::lateness::Lateness;
 use super::network::Network;
+use super::reseed::Reseed;
 
 impl Scenario {
     /// The changes that are in effect from a tick on, and not in the tick before.
@@ -159,6 +160,29 @@ impl Scenario {
         let faults = self.faults_at(tick).iter();
         let restarts = faults.filter(|fault| fault.is_restart() && fault.at == tick);
         restarts.map(|fault| fault.robot.clone()).collect()
+    }
+
+    /// The seed of what robots miss in a tick.
+    #[must_use]
+    pub fn sensing_seed(&self, tick: Tick) -> u64 {
+        let mut begun = self.reseeds.iter().rev().filter(|one| one.at <= tick);
+        let last = begun.find_map(Reseed::of_sensing);
+        last.unwrap_or(self.seed)
+    }
+
+    /// The seed of a robot's stream in a tick.
+    #[must_use]
+    pub fn stream_seed(&self, robot: &RobotName, tick: Tick) -> u64 {
+        let mut begun = self.reseeds.iter().rev().filter(|one| one.at <= tick);
+        let last = begun.find_map(|one| one.of_robot(robot));
+        last.map_or(self.seed, |reseed| reseed.seed)
+    }
+
+    /// Where a robot's stream is drawn anew after a tick.
+    #[must_use]
+    pub fn stream_reseeds(&self, robot: &RobotName, after: Tick) -> Vec<StreamReseed> {
+        let later = self.reseeds.iter().filter(|one| one.at > after);
+        later.filter_map(|one| one.of_robot(robot)).collect()
     }
 }
 

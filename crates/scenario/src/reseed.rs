@@ -9,8 +9,6 @@ use protocol::random::reseeded;
 use protocol::{RobotName, Tick};
 use serde::{Deserialize, Serialize};
 
-use super::checked::Scenario;
-
 /// What chance decides: each kind has random streams of its own, and can be drawn anew by itself.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
@@ -133,30 +131,5 @@ impl Display for Reseed {
             write!(f, ", of = [{}]", of.join(", "))?;
         }
         f.write_str(" }")
-    }
-}
-
-impl Scenario {
-    /// The seed of what robots miss in a tick.
-    #[must_use]
-    pub fn sensing_seed(&self, tick: Tick) -> u64 {
-        let begun = self.reseeds.iter().rev().filter(|one| one.at <= tick);
-        let last = begun.filter_map(Reseed::of_sensing).next();
-        last.unwrap_or(self.seed)
-    }
-
-    /// The seed of a robot's stream in a tick.
-    #[must_use]
-    pub fn stream_seed(&self, robot: &RobotName, tick: Tick) -> u64 {
-        let begun = self.reseeds.iter().rev().filter(|one| one.at <= tick);
-        let last = begun.filter_map(|one| one.of_robot(robot)).next();
-        last.map_or(self.seed, |reseed| reseed.seed)
-    }
-
-    /// Where a robot's stream is drawn anew after a tick.
-    #[must_use]
-    pub fn stream_reseeds(&self, robot: &RobotName, after: Tick) -> Vec<StreamReseed> {
-        let later = self.reseeds.iter().filter(|one| one.at > after);
-        later.filter_map(|one| one.of_robot(robot)).collect()
     }
 }

@@ -1019,3 +1019,56 @@ fn a_condition_that_no_run_ends_by_is_refused() {
         "{error}"
     );
 }
+
+#[test]
+fn a_run_is_re_seeded_by_kinds_of_chance() {
+    let text = format!(
+        "seed = 5\n[[reseed]]\nat = \"20 s\"\nseed = 9\nof = [\"network\", \"robot.A*\"]\n\
+         [[reseed]]\nat = \"10 s\"\nseed = 8\n{TWO_ROBOTS}"
+    );
+    let scenario = parse(&text).unwrap();
+    let [a, b] = ["A", "B"].map(|name| RobotName::new(name).unwrap());
+    let [first, second] = [&scenario.reseeds[0], &scenario.reseeds[1]];
+    assert_eq!((first.at, second.at), (20, 40));
+    assert!(first.of_guests().is_some() && first.of_sensing().is_some());
+    assert!(second.of_guests().is_none() && second.of_network().is_some());
+
+    assert_eq!(scenario.stream_seed(&a, 19), 5);
+    assert_eq!(
+        scenario.stream_seed(&a, 20),
+        first.of_robot(&a).unwrap().seed
+    );
+    assert_eq!(
+        scenario.stream_seed(&a, 40),
+        second.of_robot(&a).unwrap().seed
+    );
+    assert_eq!(scenario.stream_seed(&b, 40), scenario.stream_seed(&b, 20));
+    assert_eq!(scenario.stream_reseeds(&a, 20).len(), 1);
+    assert_eq!(scenario.stream_reseeds(&b, 20).len(), 0);
+    assert_ne!(scenario.sensing_seed(40), 5);
+
+    let again = parse(&scenario.to_toml().unwrap()).unwrap();
+    assert_eq!(again.reseeds, scenario.reseeds);
+
+    for (entry, line, reason) in [
+        ("at = \"0 s\"\nseed = 1", 2, "from the first tick on"),
+        ("at = \"1 s\"\nseed = 9007199254740992", 3, "seed"),
+        (
+            "at = \"1 s\"\nseed = 1\nof = [\"nets\"]",
+            4,
+            "the kinds are network, guests",
+        ),
+        (
+            "at = \"1 s\"\nseed = 1\nof = [\"robot.Zed\"]",
+            4,
+            "no robot is called Zed",
+        ),
+    ] {
+        let error = shown(&parse(&format!("[[reseed]]\n{entry}\n{TWO_ROBOTS}")).unwrap_err());
+        assert!(error.contains(reason), "{entry}: {error}");
+        assert!(
+            error.contains(&format!("hall.toml:{line}:")),
+            "{entry}: {error}"
+        );
+    }
+}

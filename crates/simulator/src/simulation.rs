@@ -328,18 +328,20 @@ impl Simulation {
         self.medium.force(verdict);
     }
 
-    /// Has chance be another one from the next tick on that has not begun. Robots of this process must be told by themselves:
-    /// [`Reseed::of_robot`].
-    pub fn reseed(&mut self, seed: u64, of: &[ChanceKind]) -> Reseed {
+    /// Has chance be another one from the next tick on that has not begun; without kinds all of it, also where the scenario would
+    /// re-seed the run later. Robots of this process must be told by themselves: [`Scenario::stream_reseeds`].
+    pub fn reseed(&mut self, seed: u64, of: &[ChanceKind]) {
+        let reseeds = &mut self.scenario.reseeds;
+        let later = reseeds.partition_point(|one| one.at <= self.now + 1);
+        if of.is_empty() {
+            reseeds.truncate(later);
+        }
         let reseed = Reseed {
             at: self.now + 1,
             seed,
             of: of.to_vec(),
         };
-        let reseeds = &mut self.scenario.reseeds;
-        let place = reseeds.partition_point(|one| one.at <= reseed.at);
-        reseeds.insert(place, reseed.clone());
-        reseed
+        reseeds.insert(later, reseed);
     }
 
     /// Goes on from the last tick as a run of another scenario, which is the same up to then. Its robots must be told by themselves of

@@ -91,7 +91,7 @@ pub fn why(
     let name = file_name(&asked.question);
     let key = key(&asked, &digest)?;
     let place = folder.file(WHY);
-    let (outcomes, kept) = Kept::open(&place, &name, &key)?;
+    let (outcomes, kept) = OutcomeFile::open(&place, &name, &key)?;
     let mut sampler = Sampler {
         asked: &asked,
         options,
@@ -182,20 +182,20 @@ fn key(asked: &AskedRun, digest: &str) -> Result<String, LabError> {
 type Outcomes = BTreeMap<ForkPlan, BTreeMap<u64, Option<f64>>>;
 
 /// The file of outcomes: a line with the key of the question, and one for each fork.
-struct Kept {
+struct OutcomeFile {
     path: PathBuf,
     file: File,
 }
 
 #[derive(Serialize, Deserialize)]
-struct KeptFork {
+struct PlayedFork {
     #[serde(flatten)]
     plan: ForkPlan,
     number: u64,
     outcome: Option<f64>,
 }
 
-impl Kept {
+impl OutcomeFile {
     /// Opens the file of a question, and reads what was played for it before. A file of another version is begun anew.
     fn open(folder: &Path, name: &str, key: &str) -> Result<(Outcomes, Self), LabError> {
         if let Err(error) = std::fs::create_dir(folder)
@@ -216,7 +216,7 @@ impl Kept {
                 .split_inclusive('\n')
                 .filter(|line| line.ends_with('\n'))
             {
-                let Ok(kept) = serde_json::from_str::<KeptFork>(line) else {
+                let Ok(kept) = serde_json::from_str::<PlayedFork>(line) else {
                     break;
                 };
                 whole += line;
@@ -233,7 +233,7 @@ impl Kept {
     }
 
     fn add(&mut self, plan: &ForkPlan, number: u64, outcome: Option<f64>) -> Result<(), LabError> {
-        let kept = KeptFork {
+        let kept = PlayedFork {
             plan: plan.clone(),
             number,
             outcome,
@@ -251,7 +251,7 @@ struct Sampler<'a> {
     /// The run after some ticks.
     rungs: BTreeMap<Tick, Trunk>,
     outcomes: Outcomes,
-    kept: Kept,
+    kept: OutcomeFile,
     /// Forks that were asked for, whether they were played now or before.
     used: u64,
     progress: &'a mut dyn FnMut(WhyProgress),

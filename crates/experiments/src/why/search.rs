@@ -76,7 +76,7 @@ pub(super) struct SearchedRun<'a> {
 
 /// What was found.
 #[derive(Debug, Default)]
-pub(super) struct Findings {
+pub(super) struct FoundJumps {
     pub(super) curve: Vec<CurvePoint>,
     pub(super) jumps: Vec<Jump>,
     pub(super) kinds: Vec<KindEffect>,
@@ -89,7 +89,7 @@ pub(super) struct Findings {
 ///
 /// # Errors
 /// As [`Forks::play`].
-pub(super) fn search(run: &SearchedRun<'_>, forks: &mut dyn Forks) -> Result<Findings, LabError> {
+pub(super) fn search(run: &SearchedRun<'_>, forks: &mut dyn Forks) -> Result<FoundJumps, LabError> {
     let mut search = Search {
         run,
         forks,
@@ -103,7 +103,7 @@ pub(super) fn search(run: &SearchedRun<'_>, forks: &mut dyn Forks) -> Result<Fin
     let kinds = search.kinds()?;
     let planned = search.planned(least_jump)?;
 
-    Ok(Findings {
+    Ok(FoundJumps {
         curve: search.curve(),
         jumps,
         kinds,
