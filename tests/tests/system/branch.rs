@@ -85,7 +85,7 @@ fn a_branch_of_a_record_is_the_rest_of_it() {
         let files = recorded_epoch(&folder, None).unwrap();
         let summary = lab::folder::read_summary(&folder).unwrap().unwrap();
         let mut trunk = Trunk::open(&files, scenario.clone(), project_robots(), false).unwrap();
-        for tick in [0, 7, scenario.ticks / 2] {
+        for tick in [0, 7, trunk.last() / 2] {
             trunk.go_to(tick).unwrap();
             let mut branch = trunk.snapshot().unwrap().into_branch().unwrap();
             branch.play().unwrap();
@@ -129,7 +129,11 @@ fn a_fork_with_another_seed_shares_the_past_alone_and_is_the_same_in_every_way_t
 
     // A fork of a fork, of some kinds of chance only.
     let some = ["--seed", "7", "--reseed", "network,robot.But*"];
-    let args = [&["fork", "latest@150", "--run", "second", "-q"], &some[..]].concat();
+    let args = [
+        &["fork", "latest@150", "--run", "second", "-q"][..],
+        &some[..],
+    ]
+    .concat();
     lab.ok(&args);
     assert_eq!(up_to(&lab, fork, 150), up_to(&lab, "second", 150));
     let said = lab.ok(&["verify", "second"]);
