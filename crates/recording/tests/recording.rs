@@ -6,6 +6,7 @@
 )]
 
 use std::collections::BTreeMap;
+use std::num::NonZero;
 use std::path::{Path, PathBuf};
 
 use protocol::messages::{
@@ -311,17 +312,33 @@ fn damage_bytes(mask: u8) {
     let inner = (400..bytes.len() - 400).step_by(bytes.len() / 60);
     let begin = (0..400).step_by(9);
     let end = (bytes.len() - 400..bytes.len()).step_by(9);
-    let mut errors = 0;
-
-    for at in begin.chain(inner).chain(end) {
-        let mut damaged = bytes.clone();
-        damaged[at] ^= mask;
-        let what = format!("byte {at} of {} ^ {mask:#x}", bytes.len());
-        if let Err(error) = check(folder.path(), &damaged, &what) {
-            assert!(error.to_string().contains("other.mcap"), "{what}: {error}");
-            errors += 1;
+    let places: Vec<usize> = begin.chain(inner).chain(end).collect();
+    let damage = &|places: &[usize]| {
+        let folder = tempfile::tempdir().unwrap();
+        let mut errors = 0;
+        for at in places {
+            let mut damaged = bytes.clone();
+            damaged[*at] ^= mask;
+            let what = format!("byte {at} of {} ^ {mask:#x}", bytes.len());
+            if let Err(error) = check(folder.path(), &damaged, &what) {
+                assert!(error.to_string().contains("other.mcap"), "{what}: {error}");
+                errors += 1;
+            }
         }
-    }
+        errors
+    };
+
+    let threads = std::thread::available_parallelism().map_or(1, NonZero::get);
+    let errors: usize = std::thread::scope(|scope| {
+        let parts = places.chunks(places.len().div_ceil(threads));
+        let workers: Vec<_> = parts
+            .map(|part| scope.spawn(move || damage(part)))
+            .collect();
+        workers
+            .into_iter()
+            .map(|worker| worker.join().unwrap())
+            .sum()
+    });
     assert!(errors > 25, "{errors}");
 }
 

@@ -27,6 +27,9 @@ mod process;
 mod simulation;
 mod star;
 
+use std::num::NonZero;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use protocol::RobotName;
@@ -528,29 +531,37 @@ const FULL_END: &str = "an end with all robots is out of reach";
 
 #[test]
 fn every_mutant_is_found() {
-    let mut missing = Vec::new();
-    for (mutant, world, shows) in SHOWN {
-        let star = world.star(Some(mutant));
-        let (violation, _) = violation(&star);
-        let found = violation.or_else(|| stuck(&star));
-
-        match found {
-            Some(found) => {
-                println!(
-                    "| {mutant:?} | {world:?} | {} | {} |",
-                    found.what,
-                    found.steps.len()
-                );
-                if !found.what.contains(shows) {
-                    missing.push(format!("{mutant:?}: {} instead of {shows}", found.what));
+    let next = AtomicUsize::new(0);
+    let missing = Mutex::new(Vec::new());
+    // The checker explores a world on one thread.
+    let threads = std::thread::available_parallelism().map_or(1, NonZero::get);
+    std::thread::scope(|scope| {
+        for _ in 0..threads {
+            scope.spawn(|| {
+                while let Some(shown) = SHOWN.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    missing.lock().unwrap().extend(why_not_found(*shown));
                 }
-            }
-            None => {
-                println!("| {mutant:?} | {world:?} | nothing | |");
-                missing.push(format!("{mutant:?}: nothing"));
-            }
+            });
         }
-    }
+    });
 
+    let missing = missing.into_inner().unwrap();
     assert!(missing.is_empty(), "{}", missing.join("\n"));
+}
+
+/// What is wrong with what the checker finds of a mutant.
+fn why_not_found((mutant, world, shows): (Mutant, ModelFaults, &str)) -> Option<String> {
+    let star = world.star(Some(mutant));
+    let (violation, _) = violation(&star);
+    let Some(found) = violation.or_else(|| stuck(&star)) else {
+        return Some(format!("{mutant:?}: nothing"));
+    };
+
+    println!(
+        "| {mutant:?} | {world:?} | {} | {} |",
+        found.what,
+        found.steps.len()
+    );
+    let is_shown = found.what.contains(shows);
+    (!is_shown).then(|| format!("{mutant:?}: {} instead of {shows}", found.what))
 }
