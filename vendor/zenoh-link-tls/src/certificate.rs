@@ -125,7 +125,7 @@ fn date_time(tag: u8, text: &[u8]) -> Option<OffsetDateTime> {
     }
 
     let (year, rest) = match (tag, &pairs[..]) {
-        (UTC_TIME, [year @ 50.., rest @ ..]) => (1900 + i32::from(*year), rest),
+        (UTC_TIME, [year @ 50..=99, rest @ ..]) => (1900 + i32::from(*year), rest),
         (UTC_TIME, [year, rest @ ..]) => (2000 + i32::from(*year), rest),
         (GENERALIZED_TIME, [century, year, rest @ ..]) => {
             (100 * i32::from(*century) + i32::from(*year), rest)

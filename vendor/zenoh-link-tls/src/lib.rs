@@ -28,6 +28,7 @@ use zenoh_protocol::{
 };
 use zenoh_result::ZResult;
 
+mod certificate;
 mod opening;
 mod unicast;
 mod utils;

@@ -29,7 +29,6 @@ use tokio::{
 };
 use tokio_rustls::{TlsAcceptor, TlsConnector, TlsStream};
 use tokio_util::sync::CancellationToken;
-use x509_parser::prelude::{FromDer, X509Certificate};
 use zenoh_core::{bail, zasynclock};
 use zenoh_link_commons::{
     get_ip_interface_names,
@@ -46,6 +45,7 @@ use zenoh_protocol::{
 use zenoh_result::{zerror, ZResult};
 
 use crate::{
+    certificate,
     opening::Opening,
     utils::{get_tls_addr, get_tls_host, get_tls_server_name, TlsClientConfig, TlsServerConfig},
     TLS_ACCEPT_THROTTLE_TIME, TLS_DEFAULT_MTU, TLS_LINGER_TIMEOUT, TLS_LOCATOR_PREFIX,
@@ -598,17 +598,11 @@ async fn accept_task(
     Ok(())
 }
 
+// CARS: this function and the two that follow read certificates with `certificate`.
 fn get_client_cert_common_name(tls_conn: &rustls::CommonState) -> ZResult<TlsAuthId> {
     if let Some(client_certs) = tls_conn.peer_certificates() {
-        let (_, cert) = X509Certificate::from_der(client_certs[0].as_ref())?;
-        let subject_name = &cert
-            .subject
-            .iter_common_name()
-            .next()
-            .and_then(|cn| cn.as_str().ok());
-
         Ok(TlsAuthId {
-            auth_value: subject_name.map(|cn| cn.to_string()),
+            auth_value: certificate::common_name(&client_certs[0])?,
         })
     } else {
         Ok(TlsAuthId { auth_value: None })
@@ -621,15 +615,8 @@ fn get_server_cert_common_name(tls_conn: &rustls::ClientConnection) -> ZResult<T
 
     // Need the first certificate in the chain so no need for looping
     if let Some(item) = serv_certs.iter().next() {
-        let (_, cert) = X509Certificate::from_der(item.as_ref())?;
-        let subject_name = &cert
-            .subject
-            .iter_common_name()
-            .next()
-            .and_then(|cn| cn.as_str().ok());
-
         auth_id = TlsAuthId {
-            auth_value: subject_name.map(|cn| cn.to_string()),
+            auth_value: certificate::common_name(item)?,
         };
         return Ok(auth_id);
     }
@@ -644,8 +631,7 @@ fn get_cert_chain_expiration(
     let mut link_expiration: Option<OffsetDateTime> = None;
     if let Some(remote_certs) = cert_chain {
         for cert in *remote_certs {
-            let (_, cert) = X509Certificate::from_der(cert.as_ref())?;
-            let cert_expiration = cert.validity().not_after.to_datetime();
+            let cert_expiration = certificate::not_after(cert)?;
             link_expiration = link_expiration
                 .map(|current_min| current_min.min(cert_expiration))
                 .or(Some(cert_expiration));
