@@ -130,6 +130,12 @@ fn a_clock_is_repeated_while_its_tick_is_open() {
     assert_eq!(before, [], "nothing was granted");
     assert_eq!(repeated.first(), granted.first());
     assert_eq!(after, [], "the tick is complete");
+
+    let next = open(&mut barrier, 1);
+    let Some(BarrierOutput::Grant { clock, .. }) = next.first() else {
+        panic!("{next:?}")
+    };
+    assert_eq!((clock.epoch, clock.tick), (1, 1));
 }
 
 #[test]
@@ -610,11 +616,14 @@ fn a_run_that_is_over_admits_no_robot() {
     let mut barrier = gathered(lateness(OnLate::Wait, 1));
     open(&mut barrier, 0);
     report(&mut barrier, "A", 0);
+    report(&mut barrier, "B", 0);
+    open(&mut barrier, 1);
+    report(&mut barrier, "A", 1);
 
     let end = barrier.end(End::Finished);
     let refused = barrier.join(&name("A"), "A", &mut Vec::new());
 
-    assert_eq!((end.epoch, end.tick, end.end), (1, 0, Some(End::Finished)));
+    assert_eq!((end.epoch, end.tick, end.end), (1, 1, Some(End::Finished)));
     assert_eq!(refused, Err(Refused::Ended));
     assert_eq!(barrier.open_report(&name("A")), None);
     for timer in [Timer::Announce, Timer::Repeat, Timer::Deadline] {
