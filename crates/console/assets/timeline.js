@@ -8,6 +8,7 @@ import { ICONS } from "./icons.js";
 import { stateClass } from "./palette.js";
 import { initials } from "./roster.js";
 import { seconds } from "./units.js";
+import { WhyView } from "./why.js";
 import { TimeWindow, timeView, zoomByWheel } from "./window.js";
 import { html, nothing, render, svg } from "./vendor/lit-html.js";
 
@@ -50,6 +51,7 @@ export class TimelineView {
 
     render(
       html`<div class="timeline-bar"></div>
+        <div class="why" data-testid="why" role="group" aria-label="What decided the run" hidden></div>
         <div class="marks" data-testid="marks"></div>
         <div class="lane" data-testid="timeline">
           <div class="lane-parts"></div>
@@ -75,6 +77,7 @@ export class TimelineView {
     for (const end of /** @type {const} */ (["pointerup", "pointercancel"])) window.addEventListener(end, () => (this.isHeld = false));
 
     const { lane, range } = this;
+    this.why = new WhyView(part("why"), player, range, crosshair);
     crosshair.join({ ...timeView(lane, range, SIDES, () => player.tick_s), hasCursor: false });
     zoomByWheel(lane, range, SIDES);
     lane.addEventListener("dblclick", () => range.reset());
@@ -106,6 +109,7 @@ export class TimelineView {
     if (!isShown) return;
 
     this.renderBar();
+    this.why.render();
     this.lane.style.height = `${Math.min(STRIPS_PX, STRIP_PX * this.robots().length)}px`;
     render(this.drawMarks(), this.marks);
     render(this.drawParts(), this.parts);

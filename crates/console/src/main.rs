@@ -6,6 +6,7 @@
 
 mod app;
 mod browser;
+mod decisions;
 mod diagrams;
 mod failed;
 mod failing;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use protocol::{Epoch, RunName};
-use recording::RecordingError;
+use recording::{RecordingError, RunDecisions};
 
 use crate::playback::{OpenError, RecordedEpoch};
 
@@ -144,6 +144,16 @@ impl Past {
         }
         open.earlier.insert(epoch, earlier.clone());
         Ok(earlier)
+    }
+
+    /// The answers of `cars why` about an epoch; `None` if the folder of the run or the recording of the epoch is not there.
+    pub(crate) fn decisions(&self, epoch: Option<Epoch>) -> Option<RunDecisions> {
+        let mut found = RunDecisions::read(self.folder()?);
+        if !found.all.is_empty() {
+            let recorded = self.epoch(epoch).ok()?;
+            found.all.retain(|decision| recorded.is_of(decision));
+        }
+        Some(found)
     }
 
     /// The epochs that have a recording, in order: the newest [`MAX_EPOCHS`]. One that has just begun may have none yet.

@@ -8,7 +8,7 @@ use protocol::messages::{Flight, HeldProcess, LogRecord, Point, Presence};
 use protocol::{Epoch, Event, RobotName, Tick};
 use recording::{Header, Json, PlacedRobot, RawTick, RecordingError, Timelines};
 use serde::Serialize;
-use timeline::{StateKind, Timeline};
+use timeline::{RunDecision, StateKind, Timeline};
 
 use crate::diagrams::{self, DiagramError, WindowQuery};
 
@@ -164,6 +164,19 @@ impl RecordedEpoch {
 
     fn file(&self) -> RwLockReadGuard<'_, recording::Recording> {
         self.file.read().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Whether an answer is about this epoch: its digest is that of the epoch at its last tick.
+    pub(crate) fn is_of(&self, decision: &RunDecision) -> bool {
+        let (last, mut is_of) = (decision.last, false);
+        let read = self
+            .file()
+            .for_events(last, last.saturating_add(1), |tick| {
+                is_of |= tick.events.iter().any(|event| {
+                matches!(event, Event::Tick { digest, .. } if *digest == decision.digest)
+            });
+            });
+        read.is_ok() && is_of
     }
 
     /// Takes in what has become complete since.

@@ -26,6 +26,7 @@ use tokio::sync::{Notify, Semaphore};
 
 use crate::app::{App, Ending};
 use crate::browser;
+use crate::decisions::ShownDecisions;
 use crate::diagrams::{DiagramError, MAX_WINDOW_TICKS, WindowQuery};
 use crate::guard::{ENTRANCE, HEADERS, RequestRefusal};
 use crate::playback::{MAX_SAMPLED_TICKS, MAX_TICKS, RecordedEpoch, Wanted};
@@ -63,6 +64,7 @@ fn routes(app: Arc<App>) -> Router {
         .route(&format!("{page}recording"), get(recording))
         .route(&format!("{page}recording/ticks"), get(ticks))
         .route(&format!("{page}recording/names"), get(names))
+        .route(&format!("{page}recording/decisions"), get(decisions))
         .route(&format!("{page}recording/diagram"), get(diagram))
         .fallback(async || not_found())
         .layer(from_fn_with_state(app.clone(), guard))
@@ -396,6 +398,21 @@ fn read_names(recording: &RecordedEpoch) -> Response {
         Ok(names) => json_text(names),
         Err(error) => internal_error(&error),
     }
+}
+
+async fn decisions(
+    State(app): State<Arc<App>>,
+    query: Result<Query<WhichEpoch>, QueryRejection>,
+) -> Response {
+    let Ok(Query(WhichEpoch { epoch })) = query else {
+        return bad_range();
+    };
+    // The page asks from time to time: that there is nothing yet is no failure.
+    let answer = move |app: &App| {
+        let found = app.past.as_ref().and_then(|past| past.decisions(epoch));
+        json(&ShownDecisions::from(found.unwrap_or_default()))
+    };
+    read(app, answer).await
 }
 
 async fn diagram_style() -> Response {

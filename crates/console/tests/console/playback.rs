@@ -756,3 +756,71 @@ fn samples_have_every_change_of_state_and_the_whole_log() {
         assert_eq!(answer.status, 400, "{query}: {answer:?}");
     }
 }
+
+/// A run of 21 ticks whose digest after tick N is "digest N", with answers of `cars why` in its folder.
+fn explained_run() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let ticks = (0..21).map(|tick| {
+        let mut recorded = recorded_tick(tick);
+        recorded.events.push(Event::Tick {
+            digest: format!("digest {tick}"),
+            seal: None,
+        });
+        recorded
+    });
+    write(&file(folder.path()), ticks);
+
+    let outcomes =
+        |value: f64| json!({"n": 200, "value": value, "low": value - 0.05, "high": value + 0.05});
+    let mut answer = json!({
+        "digest": "digest 20",
+        "question": {"kind": "measure", "name": "waited"},
+        "is_share": false, "tick_s": 0.5, "last": 20, "sentence": "waited is 3.",
+        "curve": [{"tick": 0, "n": 64, "value": 1.0, "low": 0.5, "high": 1.5}, {"tick": 20, "n": 1, "value": 3.0, "low": null, "high": null}],
+        "jumps": [{"tick": 7, "before": outcomes(1.0), "after": outcomes(3.0), "p": 0.001, "events": [], "cause": null, "tried": []}],
+        "kinds": [], "planned": [], "forks": 600,
+    });
+    let why = folder.path().join("why");
+    std::fs::create_dir(&why).unwrap();
+    std::fs::write(why.join("waited-1.json"), answer.to_string()).unwrap();
+    std::fs::write(why.join("waited-2.json"), "{").unwrap();
+    answer["digest"] = "of another run".into();
+    std::fs::write(why.join("waited-3.json"), answer.to_string()).unwrap();
+    folder
+}
+
+#[test]
+fn what_decided_the_run_is_shown_with_what_is_damaged() {
+    let folder = explained_run();
+    let console = open(folder.path());
+    let found = console.get("recording/decisions?epoch=3").json();
+    let [answer] = &found["answers"].as_array().unwrap()[..] else {
+        panic!("that of another run is not shown: {found}");
+    };
+    assert_eq!(answer["sentence"], "waited is 3.");
+    assert_eq!(
+        answer["curve"][1],
+        json!({"tick": 20, "n": 1, "value": 3.0, "low": null, "high": null})
+    );
+    assert_eq!(answer["range"], json!([0.5, 3.0]));
+    assert_eq!(answer["told"], json!(["3.5 s, tick 7: 1 → 3"]));
+    let notes = found["notes"].as_array().unwrap();
+    assert_eq!(notes.len(), 1);
+    assert!(
+        notes[0]
+            .as_str()
+            .unwrap()
+            .starts_with("why/waited-2.json cannot be shown")
+    );
+
+    assert_eq!(console.get("recording/decisions?epoch=x").status, 400);
+    let other = console.get("recording/decisions?epoch=2").json();
+    assert_eq!(other["answers"], json!([]));
+}
+
+#[test]
+fn a_run_that_nobody_asked_about_has_no_answers() {
+    let folder = run_folder(3);
+    let found = open(folder.path()).get("recording/decisions").json();
+    assert_eq!(found, json!({"answers": [], "notes": []}));
+}
