@@ -8,6 +8,7 @@ use lab::folder::{find, recorded_epoch, recorded_epochs};
 use lab::moment::Moment;
 use protocol::Epoch;
 use record::names::LATEST;
+use reports::decisions;
 use reports::diagram::{DiagramOptions, Window, draw};
 
 use crate::errors::Result;
@@ -50,8 +51,10 @@ pub(crate) fn diagram(args: &DiagramArgs) -> Result<ExitCode> {
     if recorded_epochs(&folder)?.len() > 1 {
         title += &format!(", epoch {}", files.epoch);
     }
+    let decided = decisions(&folder, &files)?;
     let options = DiagramOptions {
         title,
+        decisions: decided.all,
         queries: args.queries,
         is_whole: args.whole,
         ..DiagramOptions::default()
@@ -64,7 +67,7 @@ pub(crate) fn diagram(args: &DiagramArgs) -> Result<ExitCode> {
     let drawn = draw(&files, window, options)?;
     output::write(args.output.as_deref(), &drawn.svg)?;
     // The picture may be on its way to another program, so the notes go to the standard error.
-    for note in drawn.notes {
+    for note in drawn.notes.into_iter().chain(decided.notes) {
         terminal::note(format_args!("note: {note}"));
     }
     Ok(ExitCode::SUCCESS)

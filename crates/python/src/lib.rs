@@ -40,6 +40,7 @@ fn _cars(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(pictures::report, module)?)?;
     module.add_function(wrap_pyfunction!(pictures::figures, module)?)?;
     module.add_function(wrap_pyfunction!(pictures::diagram, module)?)?;
+    module.add_function(wrap_pyfunction!(pictures::answers, module)?)?;
 
     Ok(())
 }

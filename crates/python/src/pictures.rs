@@ -1,4 +1,4 @@
-//! Pictures: as `cars report` and `cars diagram` draw them.
+//! Pictures: as `cars report` and `cars diagram` draw them, and the answers of `cars why` that are in them.
 
 use std::path::PathBuf;
 
@@ -10,7 +10,7 @@ use pictures::Page;
 use pyo3::prelude::*;
 use record::RunFolder;
 use reports::diagram::{DiagramOptions, Window, draw};
-use reports::{of_experiment, of_runs};
+use reports::{decisions, of_experiment, of_runs};
 
 use crate::error::{plain, reported};
 
@@ -61,15 +61,33 @@ pub(crate) fn diagram(
             title += &format!(", epoch {}", files.epoch);
         }
 
+        let decided = decisions(&folder, &files)?;
         let options = DiagramOptions {
             title,
+            decisions: decided.all,
             queries,
             is_whole: whole,
             ..DiagramOptions::default()
         };
-        draw(&files, window, options)
+        let mut drawn = draw(&files, window, options)?;
+        drawn.notes.extend(decided.notes);
+        Ok(drawn)
     });
 
     let drawn = drawn.map_err(reported)?;
     Ok((drawn.svg, drawn.notes))
+}
+
+/// The answers of `cars why` about the last epoch of a run, each as JSON, and what cannot be read of them, a sentence each.
+#[pyfunction]
+pub(crate) fn answers(py: Python<'_>, run: PathBuf) -> PyResult<(Vec<String>, Vec<String>)> {
+    let found = py.detach(|| {
+        let folder = RunFolder::at(run);
+        let files = recorded_epoch(&folder, None)?;
+        decisions(&folder, &files)
+    });
+    let found = found.map_err(reported)?;
+    let answers = found.all.iter().map(serde_json::to_string);
+    let answers = answers.collect::<Result<_, _>>().map_err(plain)?;
+    Ok((answers, found.notes))
 }

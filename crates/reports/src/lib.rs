@@ -3,6 +3,7 @@
 
 mod answer;
 mod course;
+mod decided;
 pub mod diagram;
 mod experiment;
 mod facts;
@@ -15,6 +16,7 @@ mod study;
 mod transitions;
 mod words;
 
+pub use decided::decisions;
 pub use experiment::of_experiment;
 pub use pictures::{Page, WIDTHS_MM};
 pub use runs::{MAX_RUNS, of_runs};

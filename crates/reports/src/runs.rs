@@ -8,11 +8,13 @@ use protocol::messages::{End, Variable};
 use protocol::time::{self, tick_seconds, time_s};
 use protocol::{RobotName, Tick};
 use record::{EpochFiles, RunFolder, Summary};
+use recording::RunDecisions;
 use timeline::{LinkCounts, StateKind, StateOrder};
 
 use super::course::{
     READ_DIAGRAM, course_figure, diagram_lines, run_panel, state_panel, states_in_words,
 };
+use super::decided::{decisions, write_decisions};
 use super::facts::RunFacts;
 use super::floor::occupancy;
 use super::limits::panels;
@@ -39,6 +41,8 @@ struct ReportedRun {
     facts: RunFacts,
     summary: Option<Summary>,
     scenario: String,
+    /// What `cars why` found.
+    decisions: RunDecisions,
 }
 
 /// Writes the report of runs, each in its folder, as HTML. Of a run with several epochs the last one is reported.
@@ -77,6 +81,7 @@ pub fn of_runs(folders: &[RunFolder]) -> Result<Page, LabError> {
     write_lead(&mut page, &runs);
     write_measures(&mut page, &runs);
     if runs.len() == 1 {
+        write_decisions(&mut page, &first.decisions);
         write_states(&mut page, &runs);
         write_summary(&mut page, &runs);
     } else {
@@ -122,6 +127,7 @@ impl ReportedRun {
         Ok(Self {
             name: folder.title(),
             path: folder.path().to_owned(),
+            decisions: decisions(folder, &files)?,
             files,
             facts,
             summary,

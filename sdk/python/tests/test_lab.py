@@ -49,6 +49,52 @@ def test_settings_are_written_as_toml() -> None:
     assert written == ["a=true", "b=1.5", "c=1 m", 'd=[1, "x"]', 'e={"loss" = 0.2, "burst" = {"enter" = 1}}']
 
 
+def explain(run: cars.Run, question: str, jumps: bool = True) -> None:
+    """Writes an answer of ``cars why`` about a run."""
+    outcomes = {"n": 200, "value": 0.12, "low": 0.08, "high": 0.16}
+    cause = {"what": "command 9 was lost", "is_event": True, "without": outcomes}
+    jump = {"tick": 60, "before": outcomes, "after": outcomes | {"value": 0.94}, "events": ["one", "two"], "cause": cause}
+    other = jump | {"tick": 70, "cause": None, "events": []}
+    answer = {
+        "digest": run.summary["digest"], "question": {"kind": "measure", "name": question}, "is_share": True, "tick_s": 0.5,
+        "last": run.summary["ticks"], "sentence": f"{question} was decided at 30 s.", "jumps": [jump, other] if jumps else [],
+        "curve": [{"tick": 0, **outcomes}, {"tick": 60, "n": 1, "value": 1.0, "low": None, "high": None}], "kinds": [], "forks": 9,
+    }  # fmt: skip
+    folder = run.folder / "why"
+    folder.mkdir(exist_ok=True)
+    (folder / f"{question}.json").write_text(json.dumps(answer))
+
+
+@pytest.mark.parametrize("kind", ["pandas", "polars"])
+def test_what_decided_a_run_is_a_sentence_and_frames(kind: str) -> None:
+    run = cars.run(PAPER, seed=7, duration=60)
+    with pytest.raises(cars.Error, match="cars why"):
+        run.why()
+    explain(run, "waited")
+    why = run.why()
+    assert str(why) == why.sentence == "waited was decided at 30 s." and "waited" in repr(why)
+    curve, jumps = why.frames(kind)
+    assert list(curve.columns) == ["tick", "time_s", "value", "low", "high", "n"]
+    assert list(curve["time_s"]) == [0.0, 30.0] and list(curve["value"]) == [0.12, 1.0]
+    assert list(jumps["after_value"]) == [0.94, 0.94]
+    assert [cause if isinstance(cause, str) else None for cause in jumps["cause"]] == ["command 9 was lost", None]
+    assert list(jumps["events"]) == ["one; two", ""] and len(why.jumps) == 2
+
+    explain(run, "served", jumps=False)
+    with pytest.raises(cars.Error, match="'served', 'waited'"):
+        run.why()
+    without = run.why("served").frames(kind).jumps
+    assert len(without) == 0 and "before_low" in without.columns
+    with pytest.raises(cars.Error, match="those that were asked: 'served'"):
+        run.why("walked")
+    with pytest.raises(TypeError, match="question"):
+        run.why(3)  # type: ignore[arg-type]
+
+    (run.folder / "why/waited.json").write_text("{")
+    with pytest.warns(UserWarning, match="waited.json cannot be shown"):
+        assert run.why().question == "served"
+
+
 @pytest.mark.parametrize("kind", ["pandas", "polars"])
 def test_frames_are_the_tables_of_the_export(run: cars.Run, lab: Lab, kind: str) -> None:
     lab.cars("export", str(run.folder), "--csv", "-o", str(lab.folder / "tables"))

@@ -4,6 +4,8 @@ use roxmltree::{Document, Node};
 use serde_json::Value;
 use system_tests::Lab;
 
+use super::report::explain;
+
 /// A picture, by its structure.
 struct Picture {
     svg: String,
@@ -278,4 +280,29 @@ fn refused(lab: &Lab, args: &[&str], reason: &str) {
         .filter(|word| *word != "│")
         .collect();
     assert!(words.join(" ").contains(reason), "{args:?}: {text}");
+}
+
+#[test]
+fn what_decided_the_run_is_a_row_below_the_axis() {
+    let lab = Lab::new();
+    lab.ok(&[
+        "run",
+        "configs/hors_doeuvres.toml",
+        "--run",
+        "hall",
+        "--duration",
+        "100 s",
+    ]);
+    let without = Picture::of(&lab, "hall", &[]);
+    explain(&lab, "hall");
+    let with = Picture::of(&lab, "hall", &[]);
+    assert_eq!(
+        (without.of_class("decision"), with.of_class("decision")),
+        (0, 1)
+    );
+    assert_eq!(with.sum("jump", "data-tick"), 60);
+
+    // Without the answer it is as it was, byte for byte.
+    std::fs::remove_dir_all(lab.file("hall", "why")).unwrap();
+    assert_eq!(Picture::of(&lab, "hall", &[]).svg, without.svg);
 }

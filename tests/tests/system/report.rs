@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use roxmltree::{Document, Node, ParsingOptions};
-use serde_json::Value;
+use serde_json::{Value, json};
 use system_tests::Lab;
 
 /// Most bytes of a report.
@@ -803,4 +803,73 @@ time = { to = { sites = "T*", by = "all", variable = "done" } }
         .collect();
     assert_eq!(times.len(), 4);
     assert_close(&rows[0][3], mean(times.into_iter()));
+}
+
+/// Writes an answer of `cars why` about a run: its outcome jumps in tick 60.
+pub(crate) fn explain(lab: &Lab, run: &str) {
+    let events = lab.events(run);
+    let tick = events
+        .iter()
+        .rfind(|event| event["event"] == "tick")
+        .unwrap();
+    let outcomes =
+        |value: f64| json!({"n": 200, "value": value, "low": value - 0.05, "high": value + 0.05});
+    let point = |tick: u64, value: f64| json!({"tick": tick, "n": 64, "value": value, "low": value - 0.05, "high": value + 0.05});
+    let answer = json!({
+        "digest": tick["digest"],
+        "question": {"kind": "expectation", "name": "a call is answered", "or_undecided": false},
+        "is_share": true, "recorded": 1.0, "tick_s": 0.5, "last": tick["tick"], "sentence": "It was decided at 30 s.",
+        "curve": [point(0, 0.12), point(59, 0.12), point(60, 0.9), point(100, 0.9)],
+        "jumps": [{
+            "tick": 60, "before": outcomes(0.12), "after": outcomes(0.9), "p": 0.001, "events": ["command 9 is lost"], "tried": [],
+            "cause": {"what": "command 9 was lost", "is_event": true, "without": outcomes(0.1)},
+        }],
+        "kinds": [], "planned": [], "forks": 1000,
+    });
+    let folder = lab.file(run, "why");
+    std::fs::create_dir_all(&folder).unwrap();
+    std::fs::write(folder.join("a-call.json"), answer.to_string()).unwrap();
+}
+
+#[test]
+fn what_decided_the_run_is_a_curve_and_a_table_of_its_jumps() {
+    let lab = Lab::new();
+    play(&lab, "hall", &["--duration", "100 s"]);
+    let without = lab.ok(&["report", "hall"]);
+    assert!(!without.contains("What decided it"));
+
+    explain(&lab, "hall");
+    let html = lab.ok(&["report", "hall"]);
+    let document = parsed(&html);
+    assert!(html.contains("It was decided at 30 s."));
+    let rows = table(&document, &["Tick", "time, s", "before", "after", "forks"]);
+    let expected = [
+        "60",
+        "30.0",
+        "12 % (7 % to 17 %)",
+        "90 % (85 % to 95 %)",
+        "200",
+        "command 9 was lost",
+        "10 % (5 % to 15 %)",
+    ];
+    assert_eq!(rows, [expected]);
+    let has_class = |node: &Node<'_, '_>, class| node.attribute("class") == Some(class);
+    let mut nodes = document.descendants();
+    assert!(nodes.any(|node| has_class(&node, "chart outcome")));
+
+    // What is damaged is said, and what is of another run is left out.
+    let file = lab.file("hall", "why/a-call.json");
+    let text = std::fs::read_to_string(&file).unwrap();
+    std::fs::write(
+        lab.file("hall", "why/other.json"),
+        text.replace("\"digest\":\"", "\"digest\":\"0"),
+    )
+    .unwrap();
+    std::fs::write(lab.file("hall", "why/worse.json"), &text[..50]).unwrap();
+    let damaged = lab.ok(&["report", "hall"]);
+    assert!(damaged.contains("why/worse.json cannot be shown"));
+    assert_eq!(
+        damaged.matches("chart outcome").count(),
+        html.matches("chart outcome").count()
+    );
 }

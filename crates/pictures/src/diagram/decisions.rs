@@ -15,8 +15,8 @@ const ROW_PX: f64 = 66.0;
 const PLOT_PX: f64 = 40.0;
 /// Most answers that are drawn.
 const MAX_ROWS: usize = 4;
-/// Most letters of a question.
-const QUESTION_LETTERS: usize = 80;
+/// Most letters of the words above a curve.
+const WORDS_LETTERS: usize = 110;
 /// Classes of the interval, the curve and a jump. They are those of other things, so that the style sheet of a diagram without an
 /// answer is the same.
 const INTERVAL: &str = "b5";
@@ -36,14 +36,18 @@ pub(crate) fn draw_decisions(picture: &mut Picture, decisions: &[RunDecision], t
 fn draw_row(picture: &mut Picture, decision: &RunDecision, top: f64) {
     let (left, right) = (picture.scale.begin_px(), picture.scale.end_px());
     let (above, bottom) = (top + ROW_PX - PLOT_PX, top + ROW_PX);
-    let title = shortened(&decision.question.name, QUESTION_LETTERS);
     let (least, most) = decision.range();
     let y = Scale::new(least, most, bottom, above);
 
     let tag = picture.svg.tag("g").class("decision");
     tag.with("data-question", &decision.question.name).open();
     picture.svg.title(&decision.sentence);
-    let words = format!("{}: {title}", decision.axis());
+    let words = if decision.is_share {
+        format!("{}: {}", decision.axis(), decision.question.name)
+    } else {
+        decision.axis()
+    };
+    let words = shortened(&words, WORDS_LETTERS);
     picture
         .svg
         .text("muted", left, above - 8.0, "start", &words);

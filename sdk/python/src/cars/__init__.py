@@ -53,6 +53,7 @@ from ._hunt import Finding, Hunt, hunt
 from ._pictures import Page, Picture
 from ._robot import Action, CarsRobotInterface, Robot
 from ._run import Run, load, run
+from ._why import Why, WhyFrames
 from .panel import Panel
 
 __all__ = [
@@ -103,6 +104,8 @@ __all__ = [
     "Velocity",
     "Verdict",
     "Welcome",
+    "Why",
+    "WhyFrames",
     "__version__",
     "experiment",
     "hunt",

@@ -110,6 +110,17 @@ def of_rows(rows: Sequence[Mapping[str, Any]], kind: Optional[str] = None) -> Fr
     return polars.DataFrame(flat, infer_schema_length=None)
 
 
+def of_columns(columns: Mapping[str, Sequence[Any]], kind: Optional[str] = None) -> Frame:
+    """The table of these columns, which it has without a row, too."""
+    if chosen(kind) == "pandas":
+        import pandas
+
+        return pandas.DataFrame(columns)
+    import polars
+
+    return polars.DataFrame(columns)
+
+
 def with_value(frame: Frame, column: str) -> Frame:
     """The rows of a frame that have a value in a column, and of their columns those that have any."""
     if hasattr(frame, "dropna"):

@@ -15,6 +15,7 @@ from ._errors import Error
 from ._frames import Frame, Frames, read, with_value
 from ._pictures import Page, Picture
 from ._robot import Robot, maker
+from ._why import Why, answer
 
 Name = Union[str, os.PathLike[str]]
 
@@ -113,6 +114,19 @@ class Run:
         for note in notes:
             warnings.warn(note, stacklevel=2)
         return Picture(svg)
+
+    def why(self, question: Optional[str] = None) -> Why:
+        """What decided it, as ``cars why`` found it before: a sentence, the expected outcome over the run, and where it jumps.
+
+        :param question: what was asked: the name of an expectation or of a measure, a condition, or the path of a number of the
+            summary. It may be left out if one question was asked.
+        :raises Error: if it was not asked.
+        """
+        self._check()
+        found, notes = answer(self.folder, _arguments.text("question", question))
+        for note in notes:
+            warnings.warn(note, stacklevel=2)
+        return found
 
     def _check(self) -> None:
         """Checks that no later run has taken its folder."""
