@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
 use protocol::pattern::matches;
-use protocol::{Event, RobotPattern};
+use protocol::{Event, RobotPattern, schemas};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -105,7 +105,7 @@ enum Domain {
 static KINDS: LazyLock<BTreeMap<String, BTreeMap<String, Domain>>> = LazyLock::new(kinds);
 
 fn kinds() -> BTreeMap<String, BTreeMap<String, Domain>> {
-    let schema = schemars::schema_for!(Event).to_value();
+    let schema: Value = serde_json::from_str(schemas::EVENT).unwrap_or_default();
     let mut kinds = BTreeMap::new();
     for variant in schema["oneOf"].as_array().into_iter().flatten() {
         let mut kind = String::new();

@@ -1,6 +1,5 @@
 //! One encode, one decode. JSON, because any language can speak it and people can read it.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::path;
@@ -24,7 +23,8 @@ pub struct Malformed {
 }
 
 /// A field that is wrong, and why.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct FieldError {
     /// Path of the field: `command`, `robots.Butler`, `setup.obstacles`.
     pub field: String,

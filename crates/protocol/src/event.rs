@@ -1,7 +1,6 @@
 //! What happened in a run: simulated facts only, no wall clock, no process ids. The same seed gives the same events,
 //! byte for byte.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::messages::is_false;
@@ -18,7 +17,8 @@ use crate::{Epoch, Generation, Seq, Tick};
 const MAX_CHANGE_CHARS: usize = 400;
 
 /// One line of `events.jsonl`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Line {
     /// When.
     pub tick: Tick,
@@ -28,7 +28,8 @@ pub struct Line {
 }
 
 /// Something that happened.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(tag = "event", rename_all = "snake_case")]
 pub enum Event {
     /// The run begins.
@@ -306,7 +307,8 @@ pub enum Event {
 }
 
 /// A robot for which the clock waited when a run was aborted.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct WaitedFor {
     /// Who.
     pub robot: RobotName,
@@ -321,7 +323,8 @@ impl std::fmt::Display for WaitedFor {
 }
 
 /// What refused a move.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Blocker {
     /// The edge of the field.
@@ -352,9 +355,8 @@ impl std::fmt::Display for Blocker {
 }
 
 /// Why the medium lost a message, delayed or doubled it.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
-)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Cause {
     /// By chance.

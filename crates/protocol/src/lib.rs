@@ -8,6 +8,8 @@
 pub mod access;
 mod angle;
 pub mod codec;
+#[cfg(test)]
+mod contract;
 pub mod event;
 pub mod keys;
 pub mod messages;
@@ -16,7 +18,13 @@ mod path;
 pub mod pattern;
 pub mod plain;
 pub mod random;
+pub mod recorded;
+pub mod schemas;
 pub mod time;
+
+// The tests of the contract name it as other crates do.
+#[cfg(test)]
+extern crate self as protocol;
 
 pub use angle::published_angle;
 pub use codec::{FieldError, Malformed, Message, decode, encode};

@@ -4,7 +4,6 @@
 use std::fmt;
 use std::ops::RangeInclusive;
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::name::{BadName, RobotName};
@@ -17,9 +16,10 @@ const OPEN: char = '{';
 const MAX_NUMBER: usize = 1_000_000;
 
 /// A set of robots or sites: one by its name, or all whose names match, as in `S*` and `S{1..20}`.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(try_from = "String", into = "String")]
-#[schemars(with = "String")]
+#[cfg_attr(test, schemars(with = "String"))]
 pub struct RobotPattern(String);
 
 impl RobotPattern {

@@ -2,12 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use protocol::messages::{Panel, Report};
-use protocol::{Event, Line, RobotName, Tick};
-use schemars::{JsonSchema, schema_for};
+use protocol::{Event, RobotName, Tick, schemas};
 use serde::Serialize;
 
-use crate::content::{Frame, Header, TickView, WallTimes};
+use crate::content::{Header, TickView};
 use crate::file::{Channels, Chunk, MessageHead};
 use crate::json;
 use crate::protobuf::Protobuf;
@@ -59,10 +57,30 @@ impl Encoder {
     pub(crate) fn new(header: &Header) -> Self {
         let mut channels = Channels::default();
         let ids = Ids {
-            header: add_topic::<Header>(&mut channels, &Topic::Header, "cars.Header"),
-            frame: add_topic::<Frame>(&mut channels, &Topic::Frame, "cars.Frame"),
-            events: add_topic::<Line>(&mut channels, &Topic::Events, "cars.Event"),
-            wall: add_topic::<WallTimes>(&mut channels, &Topic::Wall, "cars.Wall"),
+            header: add_topic(
+                &mut channels,
+                &Topic::Header,
+                "cars.Header",
+                &compact(schemas::HEADER),
+            ),
+            frame: add_topic(
+                &mut channels,
+                &Topic::Frame,
+                "cars.Frame",
+                &compact(schemas::FRAME),
+            ),
+            events: add_topic(
+                &mut channels,
+                &Topic::Events,
+                "cars.Event",
+                &compact(schemas::EVENT),
+            ),
+            wall: add_topic(
+                &mut channels,
+                &Topic::Wall,
+                "cars.Wall",
+                &compact(schemas::WALL),
+            ),
             field: add_view(&mut channels, &View::Field, ViewerSchema::SceneUpdate),
             scene: add_view(&mut channels, &View::Robots, ViewerSchema::SceneUpdate),
             guests: add_view(&mut channels, &View::Guests, ViewerSchema::PointCloud),
@@ -74,14 +92,16 @@ impl Encoder {
             log: add_view(&mut channels, &View::Log, ViewerSchema::Log),
         };
 
+        let report_schema = compact(schemas::REPORT);
+        let panel_schema = compact(schemas::PANEL);
         let mut robots = BTreeMap::new();
         for robot in &header.robots {
             let report = Topic::Report(robot.clone());
             let panel = Topic::Panel(robot.clone());
             let pose = View::Pose(robot.clone());
             let ids = RobotIds {
-                report: add_topic::<Report>(&mut channels, &report, "cars.Report"),
-                panel: add_topic::<Panel>(&mut channels, &panel, "cars.Panel"),
+                report: add_topic(&mut channels, &report, "cars.Report", &report_schema),
+                panel: add_topic(&mut channels, &panel, "cars.Panel", &panel_schema),
                 pose: add_view(&mut channels, &pose, ViewerSchema::PoseInFrame),
             };
             robots.insert(robot.clone(), ids);
@@ -200,10 +220,15 @@ impl Encoder {
     }
 }
 
+/// A schema without the blanks of its file, which is written for people.
+fn compact(schema: &str) -> String {
+    let value: serde_json::Result<serde_json::Value> = serde_json::from_str(schema);
+    value.map_or_else(|_| schema.to_owned(), |value| value.to_string())
+}
+
 /// Adds a channel with messages in JSON.
-fn add_topic<M: JsonSchema>(channels: &mut Channels, topic: &Topic, schema: &'static str) -> u16 {
-    let json = schema_for!(M).to_value().to_string();
-    let schema = channels.add_schema(schema, "jsonschema", json.as_bytes());
+fn add_topic(channels: &mut Channels, topic: &Topic, name: &'static str, schema: &str) -> u16 {
+    let schema = channels.add_schema(name, "jsonschema", schema.as_bytes());
     channels.add_channel(&topic.to_string(), schema, "json")
 }
 

@@ -9,7 +9,7 @@ use protocol::{Event, Line, RobotName, Tick};
 use serde::de::DeserializeOwned;
 
 use crate::METADATA;
-use crate::content::{Frame, Header, Json, RawTick, RecordedTick, TickEvents, WallTimes};
+use crate::content::{self, Frame, Header, Json, RawTick, RecordedTick, TickEvents, WallTimes};
 use crate::damage::{Name, RecordingError};
 use crate::format::{Fields, op};
 use crate::index::{Bytes, ChunkLocation, indexed_topic};
@@ -160,7 +160,7 @@ impl Recording {
     pub fn check(&self) -> Result<(), RecordingError> {
         for offset in &self.metadata {
             let (name, metadata) = self.bytes.metadata(*offset)?;
-            if name == METADATA && metadata != self.header.metadata() {
+            if name == METADATA && metadata != content::metadata(&self.header) {
                 let reason = "the metadata is not that of the header";
                 return Err(self.bytes.name.damaged(*offset, &reason));
             }

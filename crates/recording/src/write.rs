@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use protocol::{Event, Tick};
 
-use crate::content::{Header, TickView};
+use crate::content::{Header, TickView, metadata};
 use crate::encode::Encoder;
 use crate::file::{Chunk, McapFile};
 use crate::{METADATA, SCENARIO};
@@ -302,7 +302,7 @@ impl Drop for Over<'_> {
 /// Writes what does not change: metadata, the scenario, and all channels with the header in a chunk of their own.
 fn begin(path: &Path, header: &Header, scenario: &str, encoder: &Encoder) -> io::Result<McapFile> {
     let mut file = McapFile::begin(File::create(path)?, "cars", encoder.channels().clone())?;
-    file.add_metadata(METADATA, &header.metadata())?;
+    file.add_metadata(METADATA, &metadata(header))?;
     file.attach(SCENARIO, "application/toml", scenario.as_bytes())?;
     file.add_chunk(&encoder.preamble())?;
     Ok(file)

@@ -1,6 +1,5 @@
 //! People and the simulator: the CD-player buttons, and what the simulator says of itself.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::limits::{counted, few, finite, is_false, short};
@@ -11,7 +10,8 @@ use crate::codec::{FieldError, Message, as_json};
 use crate::name::{RobotName, RunName};
 
 /// A request to the simulator. It never goes through the barrier: it is answered at once, also while the clock is held.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(tag = "do", rename_all = "snake_case")]
 pub enum Control {
     /// Start the next epoch: everything back to tick 0, with the same processes.
@@ -119,7 +119,8 @@ impl Message for Control {
 }
 
 /// What a person does to a run in progress. It is what a scenario can say, too: the record has it in the words of the scenario.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(tag = "intervention", rename_all = "snake_case")]
 pub enum Intervention {
     /// Cuts the links between two groups of robots.
@@ -213,7 +214,8 @@ impl Intervention {
 }
 
 /// The answer to a [`Control`].
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(tag = "answer", rename_all = "snake_case")]
 pub enum ControlAnswer {
     /// Done; this is how things stand now.
@@ -236,7 +238,8 @@ pub enum ControlAnswer {
 }
 
 /// The set-up of a run.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct SetupAnswer {
     /// What a person can change before the next epoch.
     pub setup: Setup,
@@ -246,7 +249,8 @@ pub struct SetupAnswer {
 
 /// What a person can change between two epochs: the set-up screen of the paper ("Overall Architecture"). Everything else
 /// of the scenario stays.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Setup {
     /// Where all chance of the epoch comes from.
     pub seed: u64,
@@ -269,7 +273,8 @@ pub struct Setup {
 }
 
 /// A triangular distribution.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Range {
     /// Least value.
     pub min: f64,
@@ -280,7 +285,8 @@ pub struct Range {
 }
 
 /// The readable log of a run, in the run's folder.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct LogFile {
     /// Whether it is written.
     pub enabled: bool,
@@ -327,7 +333,8 @@ impl Setup {
 }
 
 /// What the simulator is doing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Phase {
     /// Robots of the roster are still missing.
@@ -355,7 +362,8 @@ impl std::fmt::Display for Phase {
 }
 
 /// What the clock does about a robot that is late.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum OnLate {
     /// Hold, and say for whom; never act. The mode for science.
@@ -368,7 +376,8 @@ pub enum OnLate {
 
 /// What the scenario has the launcher do to processes before a tick; the clock is held until it answers with
 /// [`Control::FaultsDone`]. The same order may come twice; what was done is not done again.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct FaultOrder {
     /// Epoch.
     pub epoch: Epoch,
@@ -387,7 +396,8 @@ impl Message for FaultOrder {
 }
 
 /// What to do to one robot's process.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct ProcessOrder {
     /// Whose process.
     pub robot: RobotName,
@@ -410,7 +420,8 @@ impl ProcessOrder {
 }
 
 /// A fault of a process.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum FaultKind {
     /// The process is killed; at the end of the fault it is started again.
@@ -424,7 +435,8 @@ pub enum FaultKind {
 }
 
 /// How things stand.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Status {
     /// The run.
     pub run: RunName,
@@ -463,7 +475,8 @@ pub struct Status {
 }
 
 /// A robot that the clock waits for.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Awaited {
     /// Who.
     pub name: RobotName,
@@ -474,7 +487,8 @@ pub struct Awaited {
 }
 
 /// What is known of a robot that is awaited.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Reason {
     /// It has not joined yet.
@@ -502,7 +516,8 @@ impl std::fmt::Display for Reason {
 }
 
 /// One robot of the roster.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct RobotStatus {
     /// Who.
     pub name: RobotName,
@@ -515,7 +530,8 @@ pub struct RobotStatus {
 }
 
 /// Whether a robot is there.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Presence {
     /// Its process is there.

@@ -1,6 +1,5 @@
 //! Robots that drive like wheels.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::limits::finite;
@@ -8,7 +7,8 @@ use super::point::Point;
 use crate::codec::FieldError;
 
 /// A velocity in the robot's own frame, as `cmd_vel` has it in ROS.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Velocity {
     /// Speed along its heading, m/s; negative backward.
     pub linear_mps: f64,
@@ -24,7 +24,8 @@ impl Velocity {
 }
 
 /// Where a robot that drives like wheels stands, where it looks, and how it moves.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Pose {
     /// Its center, meters.
     pub location: Point,

@@ -1,6 +1,5 @@
 //! Layers: a number for each cell of a grid over the floor, which robots sense and change.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::limits::{at_most, finite};
@@ -20,7 +19,8 @@ pub const MAX_LAYER_ACTIONS: usize = 64;
 pub const MAX_LAYER_VALUE: f64 = 1e12;
 
 /// The part of a layer that a robot senses: all cells whose centers are within range.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct SensedLayer {
     /// Its name.
     pub name: String,
@@ -31,7 +31,8 @@ pub struct SensedLayer {
 }
 
 /// Cells of a layer that lie side by side.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct SensedRow {
     /// The row of the grid, from 0.
     pub row: u32,
@@ -97,7 +98,8 @@ pub fn cell_center(column: u32, row: u32, cell_m: f64) -> Point {
 }
 
 /// What a robot does to a layer: to the cell in which a place is, and to all cells whose centers are within a radius of it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct LayerAction {
     /// Name of the layer.
     pub layer: String,
@@ -168,7 +170,8 @@ pub(super) fn check_layer_actions(actions: &[LayerAction]) -> Result<(), FieldEr
 }
 
 /// What became of an action on a layer.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct LayerResult {
     /// Name of the layer, as the action had it.
     pub layer: String,
@@ -180,9 +183,8 @@ pub struct LayerResult {
 }
 
 /// Why an action on a layer was refused. The first reason that holds counts.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
-)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum LayerRefusal {
     /// The scenario has no layer of this name.
@@ -212,7 +214,8 @@ impl std::fmt::Display for LayerRefusal {
 }
 
 /// A layer as observers see it: whole, with 256 levels between the least and the greatest number of its cells.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct LayerFrame {
     /// Its name.
     pub name: String,

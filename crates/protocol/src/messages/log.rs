@@ -1,6 +1,5 @@
 //! Lines of the log.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::limits::{MAX_LINE_BYTES, at_most, short};
@@ -12,7 +11,8 @@ use crate::plain::cut;
 const ELLIPSIS: &str = "...";
 
 /// One line of the log.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct LogRecord {
     /// The epoch.
     pub epoch: Epoch,
@@ -53,9 +53,8 @@ impl LogRecord {
 }
 
 /// Kinds of log lines, to filter by.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
-)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum LogKind {
     /// Init, start, pause, stop, end.

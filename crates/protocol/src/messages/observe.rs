@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use smol_str::SmolStr;
 
@@ -18,7 +17,8 @@ use crate::codec::{FieldError, Message, as_json};
 use crate::name::{RobotName, RunName};
 
 /// The field at a moment, published at a display rate while there are subscribers.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct WorldFrame {
     /// The run.
     pub run: RunName,
@@ -91,9 +91,8 @@ pub struct WorldFrame {
 }
 
 /// How a guest feels about what it asked for.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
-)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum GuestMood {
     /// It has not asked for anything, or got it.
@@ -105,7 +104,8 @@ pub enum GuestMood {
 }
 
 /// A unit of length in which people are shown a run. All messages and records are in meters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub enum DisplayUnit {
     /// Meters.
     #[default]
@@ -120,7 +120,8 @@ pub enum DisplayUnit {
 pub const MAX_FLIGHTS: usize = 256;
 
 /// A command on its way, as observers see it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Flight {
     /// Tick of what is told here.
     pub tick: Tick,
@@ -138,7 +139,8 @@ pub struct Flight {
 }
 
 /// What became of a command.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Fate {
     /// It was sent and is on its way.
@@ -150,7 +152,8 @@ pub enum Fate {
 }
 
 /// A link that the medium has cut, one way.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Cut {
     /// Who cannot reach the other.
     pub from: RobotName,
@@ -163,7 +166,8 @@ pub struct Cut {
 }
 
 /// A robot whose process a fault holds.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct HeldProcess {
     /// Whose.
     pub robot: RobotName,
@@ -173,9 +177,8 @@ pub struct HeldProcess {
 
 /// Whether a run has done what is expected of it. The worse is the greater: a run passes if one expectation does and no other one
 /// fails or is undecided.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
-)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// What should be seen in some run was not seen in this one.
@@ -224,7 +227,8 @@ impl std::fmt::Display for Verdict {
 }
 
 /// How an expectation of the scenario stands.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Standing {
     /// Its name.
     pub expectation: String,
@@ -238,7 +242,8 @@ impl Message for WorldFrame {
 }
 
 /// A robot in a [`WorldFrame`].
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct RobotFrame {
     /// Who.
     pub name: RobotName,
@@ -266,7 +271,8 @@ pub struct RobotFrame {
 }
 
 /// What a robot chooses to display: data, not code.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Panel {
     /// The widgets, from top to bottom.
     pub widgets: Vec<Widget>,
@@ -285,7 +291,8 @@ impl Message for Panel {
 
 /// What a robot displays of one tick, published for the ticks that observers are shown ([`Clock::panels`](super::Clock)). It is
 /// shown with this tick and with no other one.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct TickPanel {
     /// The epoch.
     pub epoch: Epoch,
@@ -334,7 +341,8 @@ fn check_widgets(widgets: &[Widget]) -> Result<(), FieldError> {
 }
 
 /// One element of a panel.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(tag = "widget", rename_all = "snake_case")]
 pub enum Widget {
     /// A labeled line of text.
@@ -381,7 +389,7 @@ pub enum Widget {
     /// Rows of text.
     Table {
         /// The rows.
-        #[schemars(with = "Vec<Vec<String>>")]
+        #[cfg_attr(test, schemars(with = "Vec<Vec<String>>"))]
         rows: Vec<Vec<SmolStr>>,
     },
     /// A picture; shown as an image, so that nothing in it runs.
@@ -442,7 +450,8 @@ impl Widget {
 }
 
 /// How a badge is meant.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Tone {
     /// All is well.
@@ -456,7 +465,8 @@ pub enum Tone {
 }
 
 /// The facial expressions of the seed ("Emotion Components").
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 #[allow(
     missing_docs,

@@ -1,11 +1,11 @@
 //! What a command carries beside its name: one JSON value.
 
-use std::borrow::Cow;
 use std::cmp::Ordering;
 use std::fmt;
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
 
+#[cfg(test)]
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -154,8 +154,9 @@ impl<'de> Deserialize<'de> for Payload {
     }
 }
 
+#[cfg(test)]
 impl JsonSchema for Payload {
-    fn schema_name() -> Cow<'static, str> {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
         "Payload".into()
     }
 

@@ -1,25 +1,14 @@
 //! What messages between robots are meant to do.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What a message between robots is meant to do: the part of KQML that the robots of the paper need (Finin et al. 1994;
 /// the paper's robots spoke KQML, Murphy et al. 2002, abstract). A command is an `achieve`, and an answer to a query a
 /// `tell`. KQML's `ask-one` is not among them: zenoh's queries have no payload, and the key states what is asked for.
 #[derive(
-    Debug,
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    PartialOrd,
-    Ord,
-    Hash,
-    Default,
-    Serialize,
-    Deserialize,
-    JsonSchema,
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize,
 )]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Performative {
     /// The sender wants the receiver to make something true of its environment: every `setRobotCommand`.

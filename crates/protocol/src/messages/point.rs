@@ -1,6 +1,5 @@
 //! Places on the field.
 
-use schemars::JsonSchema;
 use serde::de::{Error, IgnoredAny, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
@@ -8,7 +7,8 @@ use super::limits::finite;
 use crate::codec::FieldError;
 
 /// A place on the field: meters from its lower left corner.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Point {
     /// Meters to the right.
     pub x: f64,

@@ -1,6 +1,5 @@
 //! Distances that a robot senses by a fan of rays.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Most rays of a fan.
@@ -8,7 +7,8 @@ pub const MAX_RAYS: u32 = 720;
 
 /// A fan of rays around a robot. The first points in the direction of motion that the robot reported last, the others follow
 /// counter-clockwise at equal angles.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Rays {
     /// How many.
     pub count: u32,

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::limits::{at_most, finite};
@@ -23,7 +22,8 @@ pub const MAX_SITE_TEXT_BYTES: usize = 256;
 pub const MAX_SITE_ACTIONS: usize = 64;
 
 /// A site that every robot knows of: where it is, and not its state.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct KnownSite {
     /// Its name.
     pub name: String,
@@ -34,7 +34,8 @@ pub struct KnownSite {
 }
 
 /// A site that a robot senses.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct SensedSite {
     /// Its name.
     pub name: String,
@@ -48,7 +49,8 @@ pub struct SensedSite {
 }
 
 /// What a robot does to a site: all of it happens, or nothing.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct SiteAction {
     /// Name of the site.
     pub site: String,
@@ -147,7 +149,8 @@ pub(super) fn check_site_actions(actions: &[SiteAction]) -> Result<(), FieldErro
 }
 
 /// What became of an action on a site.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct SiteResult {
     /// Name of the site, as the action had it.
     pub site: String,
@@ -157,9 +160,8 @@ pub struct SiteResult {
 }
 
 /// Why an action on a site was refused. The first reason that holds counts.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
-)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum SiteRefusal {
     /// The scenario has no site of this name.
@@ -213,7 +215,8 @@ impl std::fmt::Display for SiteRefusal {
 }
 
 /// A site as observers see it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct SiteFrame {
     /// Its name.
     pub name: String,

@@ -1,6 +1,5 @@
 //! What robots let others know of themselves.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::limits::{counted, finite, short};
@@ -12,7 +11,8 @@ use crate::codec::{FieldError, Message, as_json, encode};
 use crate::keys::STATE;
 
 /// The answer to all six queries of the common robot interface at once: the robot as it reported itself for `tick`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct PublicState {
     /// Epoch of the report.
     pub epoch: Epoch,
@@ -47,7 +47,8 @@ impl Message for PublicState {
 }
 
 /// The answer to one of the six queries.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Answer {
     /// That it is an answer: always `tell`.
     #[serde(default = "tell")]

@@ -2,14 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::sensing::Rays;
 use crate::name::RobotName;
 
 /// The shape of a body that is not a square of the run's size. Bodies do not turn.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum BodyShape {
     /// Width along x and height along y, meters.
@@ -30,7 +30,8 @@ impl BodyShape {
 }
 
 /// Walls, shapes of bodies, and how robots sense: what does not change in an epoch. Lengths are in steps of 0.1 mm.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct StaticWorld {
     /// Walls, each the corners of a line, meters.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -55,7 +56,8 @@ impl StaticWorld {
 }
 
 /// Where robots look.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct SensingLimits {
     /// Distance within which they sense other bodies, meters.
     pub range_m: f64,

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::drive::{DriveLimits, Pose, Velocity};
@@ -21,7 +20,8 @@ use crate::codec::{FieldError, Message, as_json};
 use crate::name::{RobotName, RunName};
 
 /// A robot asks to take part.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct JoinRequest {
     /// Version of the contract that the robot speaks.
     pub protocol: u32,
@@ -52,7 +52,8 @@ impl Message for JoinRequest {
 }
 
 /// The simulator's answer to a [`JoinRequest`].
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(tag = "answer", rename_all = "snake_case")]
 pub enum JoinAnswer {
     /// It takes part from the tick whose clock names it.
@@ -71,7 +72,8 @@ impl Message for JoinAnswer {
 }
 
 /// Why a robot may not take part.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Refusal {
     /// No robot of the scenario has this name.
@@ -92,7 +94,8 @@ pub enum Refusal {
 pub type Parameters = BTreeMap<String, serde_json::Value>;
 
 /// Asks a robot whether it can work with these parameters, before they change.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct ParametersOffer {
     /// All of its parameters, as a [`Welcome`] would have them.
     pub parameters: Parameters,
@@ -103,7 +106,8 @@ impl Message for ParametersOffer {
 }
 
 /// The answer to a [`ParametersOffer`].
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(tag = "answer", rename_all = "snake_case")]
 pub enum ParametersAnswer {
     /// It can.
@@ -120,7 +124,8 @@ impl Message for ParametersAnswer {
 }
 
 /// What a robot needs to know to take part in an epoch.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Welcome {
     /// Version of the contract.
     pub protocol: u32,
@@ -185,7 +190,8 @@ pub struct Welcome {
 }
 
 /// From a tick on, a robot draws from a stream with its own name and another seed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct StreamReseed {
     /// The first tick with draws from the new stream.
     pub tick: Tick,
@@ -211,7 +217,8 @@ pub const NEWS_FLAGS: usize = 32;
 ///
 /// The same clock may arrive twice: a message of this tick may have been lost. Every robot that has answered it repeats its
 /// commands and its report, and the simulator ignores what it already has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Clock {
     /// Epoch; a higher one than before means `init`.
     pub epoch: Epoch,
@@ -239,7 +246,8 @@ impl Message for Clock {
 }
 
 /// How a run ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum End {
     /// Its duration is over.
@@ -251,7 +259,8 @@ pub enum End {
 }
 
 /// What is new for one robot in a tick. It is put before the clock of the tick, on the same session.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct TickUpdate {
     /// Epoch of the clock that it belongs to.
     pub epoch: Epoch,
@@ -365,7 +374,8 @@ impl Message for TickUpdate {
 }
 
 /// A robot does not stand where it proposed to.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Correction {
     /// Where it stands instead.
     pub location: Point,
@@ -375,9 +385,8 @@ pub struct Correction {
 }
 
 /// A command that arrives at its target.
-#[derive(
-    Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema,
-)]
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Delivery {
     /// The sender.
     pub from: RobotName,
@@ -392,7 +401,8 @@ pub struct Delivery {
 }
 
 /// Another robot within sensing range.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct SensedRobot {
     /// Who.
     pub name: RobotName,
@@ -401,7 +411,8 @@ pub struct SensedRobot {
 }
 
 /// A robot has done its tick.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Report {
     /// Epoch of the clock it answers.
     pub epoch: Epoch,
@@ -477,7 +488,8 @@ impl Message for Report {
 
 /// A command from one robot to another (`setRobotCommand`), or to all others: put on the outbox of its sender for the medium, which
 /// decides whether and when it arrives, or on the key of its target. An operator's command needs nothing but the text.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Hash, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Hash, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Command {
     /// Epoch in which it was sent.
     #[serde(default)]
@@ -561,7 +573,8 @@ impl Message for Command {
 }
 
 /// A robot that cannot finish its tick reports which robot's answer it waits for, so that it is not held responsible itself.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Waiting {
     /// Epoch.
     pub epoch: Epoch,
@@ -576,7 +589,8 @@ impl Message for Waiting {
 }
 
 /// One sensed body.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct SensedBody {
     /// What it is.
     pub kind: SensedKind,
@@ -585,9 +599,8 @@ pub struct SensedBody {
 }
 
 /// What a robot can tell about a body it senses.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
-)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum SensedKind {
     /// A fixed obstacle.

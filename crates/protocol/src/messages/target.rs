@@ -1,8 +1,8 @@
 //! For whom a command is.
 
-use std::borrow::Cow;
 use std::fmt;
 
+#[cfg(test)]
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -70,8 +70,9 @@ impl<'de> Deserialize<'de> for Target {
     }
 }
 
+#[cfg(test)]
 impl JsonSchema for Target {
-    fn schema_name() -> Cow<'static, str> {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
         "Target".into()
     }
 

@@ -4,6 +4,7 @@ use std::fmt;
 use std::ops::Index;
 use std::sync::Arc;
 
+#[cfg(test)]
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::de::{MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -14,7 +15,8 @@ use crate::codec::FieldError;
 
 /// A value that a robot publishes about itself. Numbers are one kind: 7 and 7.0 are the same value, so that robots in
 /// languages that do not tell them apart give the same run.
-#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(untagged)]
 pub enum Variable {
     /// Yes or no.
@@ -22,7 +24,7 @@ pub enum Variable {
     /// A finite number, in SI units where it has one.
     Number(f64),
     /// Text. A short one needs no memory of its own, and copies of a long one share it.
-    Text(#[schemars(with = "String")] SmolStr),
+    Text(#[cfg_attr(test, schemars(with = "String"))] SmolStr),
 }
 
 /// Derived, it would be tried as one kind after the other, and an error would be written for each that it is not: this runs
@@ -321,6 +323,7 @@ impl<'de> Visitor<'de> for EntriesVisitor {
 /// Room for what robots usually publish.
 const USUAL: usize = 32;
 
+#[cfg(test)]
 impl JsonSchema for StateVariables {
     fn inline_schema() -> bool {
         true

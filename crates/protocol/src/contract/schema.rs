@@ -4,9 +4,10 @@
 use protocol::Line;
 use protocol::messages::{
     Answer, Clock, Command, Control, ControlAnswer, FaultOrder, JoinAnswer, JoinRequest, LogRecord,
-    ParametersAnswer, ParametersOffer, PublicState, Report, TickPanel, TickUpdate, Waiting,
+    Panel, ParametersAnswer, ParametersOffer, PublicState, Report, TickPanel, TickUpdate, Waiting,
     WorldFrame,
 };
+use protocol::recorded::{Frame, Header, WallTimes};
 use schemars::generate::SchemaGenerator;
 use schemars::{JsonSchema, Schema, schema_for};
 
@@ -30,6 +31,14 @@ const fn of<M: JsonSchema>(name: &'static str) -> MessageSchema {
 
 /// What only files have, and no message has.
 pub(crate) const EVENT: MessageSchema = of::<Line>("event");
+
+/// What only recordings have, beside events and reports.
+pub(crate) const RECORDED: [MessageSchema; 4] = [
+    of::<Frame>("frame"),
+    of::<Header>("header"),
+    of::<Panel>("panel"),
+    of::<WallTimes>("wall"),
+];
 
 /// Every message that travels.
 pub(crate) const MESSAGES: [MessageSchema; 17] = [
