@@ -208,9 +208,8 @@ impl Local {
     /// told.
     pub fn go_on_as(&mut self, scenario: Scenario) {
         for name in scenario.robots.keys() {
-            for reseed in scenario.stream_reseeds(name, self.simulation.tick()) {
-                self.robots.reseed(name, reseed);
-            }
+            let reseeds = scenario.stream_reseeds(name, self.simulation.tick());
+            self.robots.set_reseeds(name, reseeds);
         }
         self.simulation.go_on_as(scenario);
     }

@@ -36,7 +36,8 @@ pub struct Pose {
 }
 
 /// The limits of a robot that drives like wheels. It may propose any velocity: the simulator applies them.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct DriveLimits {
     /// Highest speed, forward and backward, m/s: the lower one of its own limit and that of the field.
     pub max_speed_mps: f64,
