@@ -163,7 +163,7 @@ fn in_words(answer: &WhyAnswer) -> String {
     rows.truncate(MAX_ROWS);
     if !rows.is_empty() {
         let head = ["time", "forks", "outcome"];
-        text += &format!("\n{}\n", terminal::table(head, rows, 1, head.len()));
+        text += &format!("\n{}\n", terminal::table(head, rows, 2, head.len()));
     }
 
     if !answer.kinds.is_empty() {
@@ -191,7 +191,9 @@ fn amount(answer: &WhyAnswer, estimate: &ForkEstimate) -> String {
 
 fn percent(estimate: &ForkEstimate) -> String {
     let share = |value: f64| format!("{:.0}", value * 100.0);
-    let value = estimate.value.map_or("none".to_owned(), share);
+    let Some(value) = estimate.value.map(share) else {
+        return format!("none, n = {}", estimate.n);
+    };
     match (estimate.low, estimate.high) {
         (Some(low), Some(high)) => {
             format!(
