@@ -35,14 +35,15 @@ pub use case::FaultCase;
 pub use cause::{FailureSignature, Sign};
 pub use coverage::{CommandFate, Coverage, Feature};
 pub use draw::Ground;
-pub use fault::{Effect, FaultClass, Link, Messages, PlannedFault, TickSpan};
-pub use sent::{Moment, SentMessage};
+pub use fault::{Effect, FaultClass, Messages, PlannedFault, TickSpan};
+
+pub use sent::{Link, Onset, SentMessage};
 pub use shrink::{Bounds, ScenarioParts, Shrunk, shrink};
 pub use trial::{FailedExpectation, HuntRobots, RUNS, Subject, Trial, TrialResult};
 
 use corpus::Corpus;
 use file::Heading;
-use trial::{Plan, PlayedPlan};
+use trial::{PlayedPlan, TrialPlan};
 
 /// Number of plans that are drawn at a time. What they reach guides the plans after them.
 const BATCH: u64 = 16;
@@ -196,7 +197,7 @@ pub fn hunt(
     progress: &mut dyn FnMut(HuntProgress<'_>),
 ) -> Result<HuntReport, LabError> {
     let mut corpus = Corpus::default();
-    let without = Plan::default();
+    let without = TrialPlan::default();
     let mut baseline = subject.play_plan(&without, &BTreeSet::new(), &|feature| {
         corpus.is_new(feature)
     })?;
@@ -335,7 +336,7 @@ impl Hunt<'_> {
     }
 
     /// The plans after the first ones.
-    fn draw(&mut self, first: u64, count: u64) -> Vec<Plan> {
+    fn draw(&mut self, first: u64, count: u64) -> Vec<TrialPlan> {
         let mut plans = Vec::new();
         for plan in first + 1..=first + count {
             let mut chance = stream(self.options.seed, &format!("hunt/{plan}"));
@@ -344,9 +345,9 @@ impl Hunt<'_> {
                 going_on
                     .then(|| self.go_on(&mut chance))
                     .flatten()
-                    .unwrap_or_else(|| Plan {
+                    .unwrap_or_else(|| TrialPlan {
                         case: FaultCase::of(self.ground.draw(&mut chance)),
-                        ..Plan::default()
+                        ..TrialPlan::default()
                     }),
             );
         }
@@ -354,13 +355,13 @@ impl Hunt<'_> {
     }
 
     /// A plan that goes on from a state; `None` if there is none.
-    fn go_on(&mut self, chance: &mut Stream) -> Option<Plan> {
+    fn go_on(&mut self, chance: &mut Stream) -> Option<TrialPlan> {
         let state = self.corpus.choose()?;
         if !self.ground.can_go_on(&state.faults) {
             return None;
         }
         let faults = self.ground.go_on(&state.faults, &state.moment, chance);
-        Some(Plan {
+        Some(TrialPlan {
             case: FaultCase::of(faults),
             after: state.moment.after,
             saved: state.saved.clone(),
@@ -371,7 +372,7 @@ impl Hunt<'_> {
     fn note(
         &mut self,
         first: u64,
-        plans: Vec<Plan>,
+        plans: Vec<TrialPlan>,
         results: Vec<Option<Result<PlayedPlan, LabError>>>,
     ) -> Vec<(u64, FaultCase, TrialResult)> {
         let mut failures = Vec::new();

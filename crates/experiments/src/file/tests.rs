@@ -652,6 +652,11 @@ fn every_example_of_the_page_is_good() {
                     let sites = r#"site=[{ name = "T{1..9}", at = "random", state = { stock = 1, done = false } }]"#;
                     set.push(sites.parse().unwrap());
                 }
+                // Examples of measures without a kind are about a scenario that has them.
+                if block.contains("\"all_done\"") {
+                    let measures = r#"measure=[{ name = "all_done", expression = "1", of = {} }]"#;
+                    set.push(measures.parse().unwrap());
+                }
                 let changes = config::Changes {
                     set,
                     ..config::Changes::default()

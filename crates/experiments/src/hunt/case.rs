@@ -7,7 +7,9 @@ use protocol::{RobotName, Tick};
 use serde::Serialize;
 use toml::{Table, Value};
 
-use super::fault::{Effect, Link, Messages, PlannedFault, chance, seconds};
+use super::fault::{Effect, Messages, PlannedFault, chance, seconds};
+
+use super::sent::Link;
 
 /// A plan of faults on a scenario, which may be smaller than the one that is hunted in.
 #[derive(Debug, Clone, PartialEq, Serialize, Default)]

@@ -6,8 +6,9 @@ use protocol::RobotName;
 use serde::Serialize;
 
 use super::case::FaultCase;
-use super::fault::{FaultClass, Link, PlannedFault};
-use super::sent::SentMessage;
+use super::fault::{FaultClass, PlannedFault};
+
+use super::sent::{Link, SentMessage};
 use super::trial::TrialResult;
 
 /// What the faults of a case do.

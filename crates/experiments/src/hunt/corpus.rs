@@ -6,9 +6,10 @@ use std::sync::Arc;
 use protocol::Tick;
 
 use super::coverage::{Feature, MAX_FEATURES};
-use super::fault::{Link, PlannedFault};
-use super::sent::Moment;
-use super::trial::{Plan, PlayedPlan, SavedRun};
+use super::fault::PlannedFault;
+
+use super::sent::{Link, Onset};
+use super::trial::{PlayedPlan, SavedRun, TrialPlan};
 
 /// Most states; a hunt that has as many goes on from these.
 const MAX_STATES: usize = 4096;
@@ -23,7 +24,7 @@ pub(super) struct ReachedState {
     /// The faults that had begun by then.
     pub(super) faults: Vec<PlannedFault>,
     /// When it was reached.
-    pub(super) moment: Moment,
+    pub(super) moment: Onset,
     /// The run at that time, if it could be copied.
     pub(super) saved: Option<Arc<SavedRun>>,
     /// What was new in that tick.
@@ -72,7 +73,7 @@ impl Corpus {
     }
 
     /// Adds what a plan has reached.
-    pub(super) fn add(&mut self, plan: &Plan, played: &mut PlayedPlan) {
+    pub(super) fn add(&mut self, plan: &TrialPlan, played: &mut PlayedPlan) {
         let result = &played.result;
         let mut new: BTreeMap<Tick, Vec<Feature>> = BTreeMap::new();
         for (feature, tick) in &result.features {
@@ -104,7 +105,7 @@ impl Corpus {
             faults.retain(|fault| fault.has_begun(tick, &result.sent));
             self.states.push(ReachedState {
                 faults,
-                moment: Moment::of(&result.sent, tick),
+                moment: Onset::of(&result.sent, tick),
                 saved,
                 features,
                 chosen: 0,
@@ -130,8 +131,8 @@ mod tests {
     }
 
     /// A plan that goes on after a tick, and reaches these states in these ticks.
-    fn played(after: Tick, seen: &[(&str, Tick)]) -> (Plan, PlayedPlan) {
-        let plan = Plan {
+    fn played(after: Tick, seen: &[(&str, Tick)]) -> (TrialPlan, PlayedPlan) {
+        let plan = TrialPlan {
             case: FaultCase::default(),
             after,
             saved: None,

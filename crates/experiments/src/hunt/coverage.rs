@@ -6,7 +6,9 @@ use protocol::RobotName;
 use protocol::event::Cause;
 use serde::Serialize;
 
-use super::fault::{FaultClass, Link};
+use super::fault::FaultClass;
+
+use super::sent::Link;
 
 /// Most features that are told apart, because robots choose the texts of commands and states.
 pub(super) const MAX_FEATURES: usize = 10_000;

@@ -6,8 +6,9 @@ use protocol::{RobotName, Tick};
 use scenario::MAX_GUESTS;
 use scenario::Scenario;
 
-use super::fault::{AbsenceReason, Effect, FaultClass, Link, Messages, PlannedFault, TickSpan};
-use super::sent::Moment;
+use super::fault::{AbsenceReason, Effect, FaultClass, Messages, PlannedFault, TickSpan};
+
+use super::sent::{Link, Onset};
 use super::trial::TrialResult;
 
 /// Most faults of a plan that is drawn anew.
@@ -35,7 +36,7 @@ pub struct Ground {
     scenario: Scenario,
     roster: Vec<RobotName>,
     /// The beginning of the run without faults.
-    beginning: Moment,
+    beginning: Onset,
     kinds: Vec<FaultClass>,
     /// Those of them that can begin in the middle of a run.
     later_kinds: Vec<FaultClass>,
@@ -56,7 +57,7 @@ impl Ground {
         let mut ground = Self {
             scenario: scenario.clone(),
             roster: scenario.roster(),
-            beginning: Moment::of(&played.sent, 0),
+            beginning: Onset::of(&played.sent, 0),
             kinds: Vec::new(),
             later_kinds: Vec::new(),
             longest_ticks: ((longest_s / scenario.tick_s).round() as Tick).max(1),
@@ -114,7 +115,7 @@ impl Ground {
     pub(super) fn go_on(
         &self,
         faults: &[PlannedFault],
-        moment: &Moment,
+        moment: &Onset,
         chance: &mut Stream,
     ) -> Vec<PlannedFault> {
         let mut faults = faults.to_vec();
@@ -135,7 +136,7 @@ impl Ground {
         &self,
         faults: &mut Vec<PlannedFault>,
         kinds: &[FaultClass],
-        moment: &Moment,
+        moment: &Onset,
         chance: &mut Stream,
     ) {
         let kind = kinds[below(kinds.len(), chance)];
@@ -151,7 +152,7 @@ impl Ground {
         }
     }
 
-    fn fault(&self, kind: FaultClass, moment: &Moment, chance: &mut Stream) -> PlannedFault {
+    fn fault(&self, kind: FaultClass, moment: &Onset, chance: &mut Stream) -> PlannedFault {
         match kind {
             FaultClass::Lose => {
                 let (link, number) = self.command(moment, chance);
@@ -205,7 +206,7 @@ impl Ground {
     }
 
     /// The links to robots of the roster on which commands are sent.
-    fn links<'a>(&self, moment: &'a Moment) -> Vec<(&'a Link, (u64, u64))> {
+    fn links<'a>(&self, moment: &'a Onset) -> Vec<(&'a Link, (u64, u64))> {
         let links = moment.links.iter().map(|(link, counts)| (link, *counts));
         links
             .filter(|(link, _)| self.scenario.robots.contains_key(&link.to))
@@ -213,7 +214,7 @@ impl Ground {
     }
 
     /// A command on which nothing is decided in a moment: its link and its number.
-    fn command(&self, moment: &Moment, chance: &mut Stream) -> (Link, u64) {
+    fn command(&self, moment: &Onset, chance: &mut Stream) -> (Link, u64) {
         let mut links = self.links(moment);
         if links.is_empty() {
             links = self.links(&self.beginning);
@@ -237,7 +238,7 @@ impl Ground {
         &self,
         of: Messages,
         effect: Effect,
-        moment: &Moment,
+        moment: &Onset,
         chance: &mut Stream,
     ) -> PlannedFault {
         let mut link = None;
@@ -259,14 +260,14 @@ impl Ground {
         }
     }
 
-    fn absence(&self, why: AbsenceReason, moment: &Moment, chance: &mut Stream) -> PlannedFault {
+    fn absence(&self, why: AbsenceReason, moment: &Onset, chance: &mut Stream) -> PlannedFault {
         let robot = self.roster[below(self.roster.len(), chance)].clone();
         let span = self.span(moment, chance);
         PlannedFault::Absence { robot, why, span }
     }
 
     /// A partition of one robot from the others, or of two halves.
-    fn partition(&self, one_way: bool, moment: &Moment, chance: &mut Stream) -> PlannedFault {
+    fn partition(&self, one_way: bool, moment: &Onset, chance: &mut Stream) -> PlannedFault {
         let first = below(self.roster.len(), chance);
         let mut one = vec![self.roster[first].clone()];
         let mut other = Vec::new();
@@ -349,7 +350,7 @@ impl Ground {
     }
 
     /// A time that begins in the run, after a moment.
-    fn span(&self, moment: &Moment, chance: &mut Stream) -> TickSpan {
+    fn span(&self, moment: &Onset, chance: &mut Stream) -> TickSpan {
         let left = self.scenario.ticks.saturating_sub(moment.after).max(1);
         let left = usize::try_from(left).unwrap_or(usize::MAX);
         let from = moment.after + 1 + below(soon(left, moment, chance), chance) as Tick;
@@ -364,7 +365,7 @@ impl Ground {
 
 /// How many of the next things one is drawn from, of those that are left: all at the beginning of a run. After a state often only the
 /// first ones, because it may not last.
-fn soon(left: usize, moment: &Moment, chance: &mut Stream) -> usize {
+fn soon(left: usize, moment: &Onset, chance: &mut Stream) -> usize {
     if moment.after == 0 {
         return left;
     }

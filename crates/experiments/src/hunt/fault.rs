@@ -4,7 +4,7 @@ use protocol::messages::Point;
 use protocol::{RobotName, Tick};
 use serde::Serialize;
 
-use super::sent::SentMessage;
+use super::sent::{Link, SentMessage};
 
 /// Steps of a probability: files do not show digits that mean nothing.
 const CHANCE_STEPS: f64 = 100.0;
@@ -108,15 +108,6 @@ pub struct TickSpan {
     pub from: Tick,
     /// First tick after the fault; it may be after the end of the run.
     pub until: Tick,
-}
-
-/// A directed link between two robots.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-pub struct Link {
-    /// The sender.
-    pub from: RobotName,
-    /// The target.
-    pub to: RobotName,
 }
 
 /// The messages that a fault of the network concerns.

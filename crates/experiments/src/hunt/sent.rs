@@ -2,9 +2,17 @@
 
 use std::collections::BTreeMap;
 
-use protocol::Tick;
+use protocol::{RobotName, Tick};
+use serde::Serialize;
 
-use super::fault::Link;
+/// A directed link between two robots.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+pub struct Link {
+    /// The sender.
+    pub from: RobotName,
+    /// The target.
+    pub to: RobotName,
+}
 
 /// A command that a robot sent.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -34,14 +42,14 @@ impl SentMessage {
 
 /// A moment of a run, from which on faults are drawn.
 #[derive(Debug, Clone, Default)]
-pub struct Moment {
+pub struct Onset {
     /// The last tick before them.
     pub(super) after: Tick,
     /// Of each link the number of commands on which is decided, and the number in the whole run.
     pub(super) links: BTreeMap<Link, (u64, u64)>,
 }
 
-impl Moment {
+impl Onset {
     /// The moment after a tick of a run in which these commands were sent.
     pub(super) fn of(sent: &[SentMessage], after: Tick) -> Self {
         let mut links: BTreeMap<Link, (u64, u64)> = BTreeMap::new();

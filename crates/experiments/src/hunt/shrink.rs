@@ -525,7 +525,9 @@ mod tests {
 
     use proptest::prelude::*;
 
-    use super::super::fault::{AbsenceReason, Link};
+    use super::super::fault::AbsenceReason;
+
+    use super::super::sent::Link;
     use super::super::trial::FailedExpectation;
     use super::*;
     use lab::LabError;

@@ -16,8 +16,7 @@ use timeline::{CommandSpan, Span, Timeline};
 
 use super::case::FaultCase;
 use super::coverage::{CommandFate, Feature};
-use super::fault::Link;
-use super::sent::SentMessage;
+use super::sent::{Link, SentMessage};
 use crate::follow::Follow;
 use crate::launches::Launches;
 use crate::own::{ByClass, RobotSource, RunRobots};
@@ -59,7 +58,7 @@ pub struct FailedExpectation {
 
 /// A case, and the run that it goes on from.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Plan {
+pub(super) struct TrialPlan {
     /// The case.
     pub(super) case: FaultCase,
     /// The tick up to which it is the same as the run from which it goes on; 0 for a plan that was drawn anew.
@@ -228,7 +227,7 @@ impl Subject {
     /// If it cannot be played.
     pub(super) fn play_plan(
         &self,
-        plan: &Plan,
+        plan: &TrialPlan,
         wanted: &BTreeSet<String>,
         is_new: &(dyn Fn(&Feature) -> bool + Sync),
     ) -> Result<PlayedPlan, LabError> {
@@ -406,9 +405,9 @@ fn check_made(scenario: &Scenario, file: &Path, robots: &dyn RunRobots) -> Resul
 
 impl Trial for Subject {
     fn play(&self, case: &FaultCase, wanted: &BTreeSet<String>) -> Result<TrialResult, LabError> {
-        let plan = Plan {
+        let plan = TrialPlan {
             case: case.clone(),
-            ..Plan::default()
+            ..TrialPlan::default()
         };
         Ok(self.play_plan(&plan, wanted, &|_| false)?.result)
     }
@@ -587,7 +586,7 @@ mod tests {
 
     use super::super::draw::Ground;
     use super::super::fault::FaultClass;
-    use super::super::sent::Moment;
+    use super::super::sent::Onset;
     use super::*;
 
     fn hall() -> Subject {
@@ -606,16 +605,16 @@ mod tests {
     fn a_copy_goes_on_as_a_run_from_the_beginning() {
         let subject = hall();
         let wanted = BTreeSet::new();
-        let without = Plan::default();
+        let without = TrialPlan::default();
         let baseline = subject.play_plan(&without, &wanted, &|_| false).unwrap();
         let ground = Ground::new(&subject.scenario, &baseline.result, &FaultClass::ALL, 30.0);
 
         let mut gone_on = 0;
         for number in 0..24 {
             let mut chance = stream(1, &format!("test/{number}"));
-            let plan = Plan {
+            let plan = TrialPlan {
                 case: FaultCase::of(ground.draw(&mut chance)),
-                ..Plan::default()
+                ..TrialPlan::default()
             };
             // Bodies of a plan may not fit.
             let Ok(played) = subject.play_plan(&plan, &wanted, &Feature::is_state) else {
@@ -625,10 +624,10 @@ mod tests {
                 let sent = &played.result.sent;
                 let mut faults = plan.case.faults.clone();
                 faults.retain(|fault| fault.has_begun(after, sent));
-                let moment = Moment::of(sent, after);
+                let moment = Onset::of(sent, after);
                 let case = FaultCase::of(ground.go_on(&faults, &moment, &mut chance));
                 let [copied, whole] = [Some(saved), None].map(|saved| {
-                    let plan = Plan {
+                    let plan = TrialPlan {
                         case: case.clone(),
                         after,
                         saved,
