@@ -224,7 +224,7 @@ fn last(recorded: &Recorded, robot: &str, variable: &str) -> f64 {
     let variables = &summary.robots[robot].state_variables;
     variables
         .get(variable)
-        .and_then(|value| value.as_f64())
+        .and_then(robot::Variable::as_f64)
         .unwrap()
 }
 

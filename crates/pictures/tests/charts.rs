@@ -485,7 +485,7 @@ fn what_decided_a_run_is_a_curve_with_its_jumps() {
         let jumps = of_class(&document, "jump");
         assert_eq!(jumps.len(), 3);
         // Of two beside each other one has a label; the other has its words under the pointer.
-        let labels = jumps.iter().flat_map(|jump| jump.children());
+        let labels = jumps.iter().flat_map(roxmltree::Node::children);
         assert_eq!(labels.filter(|node| node.has_tag_name("text")).count(), 2);
     }
     decision.curve.clear();

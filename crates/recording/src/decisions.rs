@@ -102,11 +102,6 @@ fn read_answer(file: &Path) -> Result<RunDecision, String> {
 
 #[cfg(test)]
 mod tests {
-    #![expect(
-        clippy::unwrap_used,
-        reason = "a test that cannot set up its subject fails"
-    )]
-
     use super::*;
 
     /// An answer with what is not shown, as `cars why` writes it.

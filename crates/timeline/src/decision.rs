@@ -348,13 +348,15 @@ mod tests {
 
     #[test]
     fn what_cannot_be_drawn_is_refused_in_words() {
+        type Spoil = fn(&mut RunDecision);
+
         assert_eq!(decision().check(), Ok(()));
-        let wrong: [(&str, fn(&mut RunDecision)); 6] = [
+        let wrong: [(&str, Spoil); 6] = [
             ("out of order", |one| one.curve.reverse()),
             ("after the last", |one| one.last = 59),
             ("not a time", |one| one.tick_s = 0.0),
             ("not finite", |one| {
-                one.curve[0].outcome.low = Some(f64::NAN)
+                one.curve[0].outcome.low = Some(f64::NAN);
             }),
             ("at most", |one| one.sentence = "x".repeat(MAX_TEXT + 1)),
             ("at most", |one| {

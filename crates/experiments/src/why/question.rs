@@ -68,7 +68,7 @@ impl AskedRun {
             return Self::of_expectation(what, scenario, files);
         }
         if let Some(measure) = scenario.measures.iter().find(|one| one.name == what) {
-            return Ok(Self::of_measure(measure.clone(), scenario));
+            return Ok(Self::of_measure(&measure.name, scenario));
         }
         if what.trim_start().starts_with(['{', '[']) {
             return Self::of_condition(what, scenario);
@@ -139,9 +139,9 @@ impl AskedRun {
         })
     }
 
-    fn of_measure(measure: ScenarioMeasure, scenario: &Scenario) -> Self {
+    fn of_measure(name: &str, scenario: &Scenario) -> Self {
         let mut asked = scenario.clone();
-        let name = measure.name.clone();
+        let name = name.to_owned();
         // A ratio may be of other measures, and a count of verdicts.
         let until = asked.measures.iter().position(|one| one.name == name);
         asked.measures.truncate(until.map_or(0, |index| index + 1));
