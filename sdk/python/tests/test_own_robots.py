@@ -239,7 +239,7 @@ def test_a_name_goes_before_a_pattern(place: Place) -> None:
 
 def test_a_hunt_finds_what_an_own_robot_does_not_bear(place: Place) -> None:
     told = place.robots().Told
-    options: dict[str, Any] = {"plans": 32, "kinds": "lose", "seed": 3}
+    options: dict[str, Any] = {"plans": 256, "kinds": "lose", "seed": 3}
     found = [
         cars.hunt(place.folder / "scenario.toml", robots={"*": told}, jobs=jobs, out=place.folder / f"hunt-{jobs}", **options)
         for jobs in (1, 3)
@@ -248,7 +248,7 @@ def test_a_hunt_finds_what_an_own_robot_does_not_bear(place: Place) -> None:
     assert finding.expectation == "the boss is told" and finding.is_minimal and len(finding.faults) == 3
     assert found[1].findings[0]._replace(file=finding.file) == finding
     assert cars.run(finding.file, robots={"*": told}).verdict == "fail"
-    assert "32 plans, 1 findings" in repr(found[0])
+    assert "256 plans, 1 findings" in repr(found[0])
 
 
 def test_a_hunt_finds_a_robot_that_raises(place: Place) -> None:
@@ -256,7 +256,7 @@ def test_a_hunt_finds_a_robot_that_raises(place: Place) -> None:
     place.write("told.py", text)
     hunted = cars.hunt(
         place.folder / "scenario.toml",
-        plans=32,
+        plans=256,
         kinds="lose",
         seed=3,
         robots={"*": place.robots().Told},
