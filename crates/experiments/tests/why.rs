@@ -293,11 +293,16 @@ fn coins_decide_where_they_are_thrown() {
     assert_level(missed, all);
 }
 
+/// How many runs of each kind the thorough tests ask about: a part of the 200 that take an hour.
+fn thorough_runs() -> usize {
+    std::env::var("CARS_WHY_RUNS").map_or(10, |runs| runs.parse().unwrap())
+}
+
 #[test]
-#[ignore = "thorough: minutes"]
-fn intervals_of_coins_cover_the_truth_in_a_hundred_runs() {
+#[ignore = "thorough: minutes; CARS_WHY_RUNS=100 for a hundred"]
+fn intervals_of_coins_cover_the_truth_in_many_runs() {
     let (mut missed, mut all) = (0, 0);
-    for number in 0..100 {
+    for number in 0..thorough_runs() {
         let (of_run, of_all) = misses(number);
         missed += of_run;
         all += of_all;
@@ -388,8 +393,8 @@ fn planted_causes_are_found_and_no_others() {
 }
 
 #[test]
-#[ignore = "thorough: an hour"]
-fn planted_causes_are_found_in_95_percent_of_200_runs_and_no_others_named() {
+#[ignore = "thorough: minutes; CARS_WHY_RUNS=200 takes an hour"]
+fn planted_causes_are_found_in_95_percent_of_runs_and_no_others_named() {
     type Check = fn(usize) -> bool;
     let checks: [(&str, Check); 4] = [
         ("command", finds_the_command),
@@ -397,11 +402,13 @@ fn planted_causes_are_found_in_95_percent_of_200_runs_and_no_others_named() {
         ("crash", finds_the_crash),
         ("none", has_no_cause),
     ];
-    let runs: usize = std::env::var("CARS_WHY_RUNS").map_or(200, |runs| runs.parse().unwrap());
+    let runs = thorough_runs();
+    // Of few runs one may be wrong, although 95 % of all are right.
+    let least = (runs * 95).div_ceil(100).min(runs - 1);
     for (what, check) in checks {
         let right = (0..runs).filter(|number| check(*number)).count();
         println!("{what}: {right} of {runs}");
-        assert!(right * 100 >= runs * 95, "{what}: {right} of {runs}");
+        assert!(right >= least, "{what}: {right} of {runs}");
     }
 }
 
