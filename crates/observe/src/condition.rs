@@ -863,8 +863,8 @@ struct Tracked {
     alternative: Alternative,
     /// The first tick of those up to now in which a state has held without a break, or in which there was no progress.
     since: Option<Tick>,
-    /// The robots that could overlap.
-    overlapping: Vec<RobotName>,
+    /// The robots that could overlap, each with the radius of the largest disc within it if it has a shape of its own, meters.
+    overlapping: Vec<(RobotName, Option<f64>)>,
     /// The variables of progress, each with its robot and its last value.
     progress: Vec<(RobotName, String, Option<f64>)>,
     /// What a robot would have to publish so that the alternative can hold, and has not published yet.
@@ -885,8 +885,10 @@ impl Evaluation {
                 alternative: alternative.clone(),
                 since: None,
                 overlapping: match alternative {
-                    Alternative::Overlap(None) => setting.roster.clone(),
-                    Alternative::Overlap(Some(named)) => matching(named, &setting.roster),
+                    Alternative::Overlap(None) => with_radii(&setting.roster, setting),
+                    Alternative::Overlap(Some(named)) => {
+                        with_radii(&matching(named, &setting.roster), setting)
+                    }
                     _ => Vec::new(),
                 },
                 progress: match alternative {
@@ -1171,23 +1173,49 @@ pub(crate) fn place(tick: Tick, tick_s: f64) -> String {
     format!("tick {tick} ({} s)", tick_seconds(tick, tick_s))
 }
 
-/// Two of these robots that overlap: the first pair from left to right.
-fn overlap(robots: &[RobotName], body_m: f64, seen: &Observation<'_>) -> Option<String> {
-    let mut placed: Vec<(Point, &RobotName)> = Vec::with_capacity(robots.len());
-    for robot in robots {
+fn with_radii(robots: &[RobotName], setting: &RunSetting) -> Vec<(RobotName, Option<f64>)> {
+    let radius_m = |robot| setting.inradius_m.get(robot).copied();
+    robots
+        .iter()
+        .map(|robot| (robot.clone(), radius_m(robot)))
+        .collect()
+}
+
+/// Two of these robots that overlap: the first pair from left to right. Where one has a shape of its own, the largest discs within both
+/// are compared: how a rectangle has turned is not known of every robot.
+fn overlap(
+    robots: &[(RobotName, Option<f64>)],
+    body_m: f64,
+    seen: &Observation<'_>,
+) -> Option<String> {
+    let mut placed: Vec<(Point, &RobotName, Option<f64>)> = Vec::with_capacity(robots.len());
+    for (robot, radius_m) in robots {
         if let Some(state) = (seen.state)(robot) {
-            placed.push((state.location, robot));
+            placed.push((state.location, robot, *radius_m));
         }
     }
-    placed.sort_by(|(one, _), (other, _)| one.x.total_cmp(&other.x));
+    placed.sort_by(|(one, ..), (other, ..)| one.x.total_cmp(&other.x));
 
-    let apart_m = body_m - TOLERANCE_M;
-    for (index, (one, robot)) in placed.iter().enumerate() {
+    let half_m = body_m * 0.5;
+    let largest_m = robots
+        .iter()
+        .filter_map(|(_, radius_m)| *radius_m)
+        .fold(half_m, f64::max);
+    for (index, (one, robot, radius_m)) in placed.iter().enumerate() {
         let near = placed[index + 1..]
             .iter()
-            .take_while(|(other, _)| other.x - one.x < apart_m);
-        for (other, name) in near {
-            if (other.y - one.y).abs() < apart_m {
+            .take_while(|(other, ..)| other.x - one.x < 2.0 * largest_m);
+        for (other, name, other_radius_m) in near {
+            let (x_m, y_m) = (other.x - one.x, (other.y - one.y).abs());
+            let is_overlap = if radius_m.is_none() && other_radius_m.is_none() {
+                let apart_m = body_m - TOLERANCE_M;
+                x_m < apart_m && y_m < apart_m
+            } else {
+                let radii_m = radius_m.unwrap_or(half_m) + other_radius_m.unwrap_or(half_m);
+                let apart_m = radii_m - TOLERANCE_M;
+                x_m * x_m + y_m * y_m < apart_m * apart_m
+            };
+            if is_overlap {
                 let mut names = [robot, name];
                 names.sort();
                 let [first, second] = names;

@@ -45,8 +45,10 @@ pub struct RunSetting {
     pub ticks: Tick,
     /// Width and height of the field, meters.
     pub field_m: [f64; 2],
-    /// Side of every body, meters.
+    /// Side of every body without a shape of its own, meters.
     pub body_m: f64,
+    /// Radius of the largest disc within each robot that has a shape of its own, meters.
+    pub inradius_m: BTreeMap<RobotName, f64>,
     /// Range of the radios at the start, meters; `None` where distance does not matter.
     pub radio_range_m: Option<f64>,
     /// The robots, in the order of their names.

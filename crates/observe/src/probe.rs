@@ -705,6 +705,7 @@ mod tests {
             ticks: 100,
             field_m: [10.0, 10.0],
             body_m: 0.5,
+            inradius_m: BTreeMap::new(),
             radio_range_m: None,
             roster: roster.to_vec(),
             sites: BTreeMap::new(),

@@ -46,6 +46,7 @@ fn setting() -> RunSetting {
         ticks: 1000,
         field_m: [10.0, 10.0],
         body_m: BODY_M,
+        inradius_m: BTreeMap::new(),
         radio_range_m: None,
         roster: roster(),
         sites: BTreeMap::new(),
@@ -70,10 +71,14 @@ struct Run {
 
 impl Run {
     fn of(entry: &str) -> Self {
+        Self::within(entry, &setting())
+    }
+
+    fn within(entry: &str, setting: &RunSetting) -> Self {
         let expectation = read(entry).unwrap();
-        expectation.check(&setting()).unwrap();
+        expectation.check(setting).unwrap();
         Self {
-            watch: Monitor::new(&expectation, &setting()),
+            watch: Monitor::new(&expectation, setting),
             tick: 0,
             robots: BTreeMap::new(),
         }
@@ -536,6 +541,34 @@ fn bodies_that_overlap_are_noticed() {
             judgment.because,
             "tick 4 (2.0 s): A and B overlap near 0.50 m, 0.50 m"
         );
+    }
+}
+
+/// A robot with a shape of its own overlaps what the largest disc within it overlaps.
+#[test]
+fn bodies_overlap_by_their_own_sizes() {
+    let setting = RunSetting {
+        inradius_m: BTreeMap::from([(name("A"), 0.1), (name("C"), 2.0)]),
+        roster: ["A", "B", "C"].map(name).to_vec(),
+        ..setting()
+    };
+    let half_m = BODY_M * 0.5;
+    for (one, other, apart_m) in [
+        ("A", "B", 0.1 + half_m),
+        ("A", "C", 2.1),
+        ("B", "C", 2.0 + half_m),
+    ] {
+        for (away_m, is_overlap) in [(apart_m, false), (apart_m - 1e-6, true)] {
+            let mut run = Run::within("never = { overlap = 'any' }", &setting);
+            run.robot(one).location = Point::new(1.0, 1.0);
+            run.robot(other).location = Point::new(1.0 + 0.6 * away_m, 1.0 - 0.8 * away_m);
+            let judgment = run.tick(&[]);
+            assert_eq!(
+                judgment.is_some(),
+                is_overlap,
+                "{one} and {other}: {away_m} m"
+            );
+        }
     }
 }
 

@@ -20,6 +20,7 @@ fn setting() -> RunSetting {
         field_m: [4.0, 2.0],
         radio_range_m: None,
         body_m: 0.5,
+        inradius_m: BTreeMap::new(),
         roster: vec![RobotName::new("R1").unwrap()],
         sites: BTreeMap::new(),
         layers: vec!["dust".to_owned(), "heat".to_owned()],

@@ -36,6 +36,7 @@ fn setting() -> RunSetting {
         field_m: [4.0, 2.0],
         radio_range_m: None,
         body_m: 0.5,
+        inradius_m: BTreeMap::new(),
         roster: vec![RobotName::new("R1").unwrap(), RobotName::new("R2").unwrap()],
         sites,
         layers: Vec::new(),

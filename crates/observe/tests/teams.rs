@@ -40,6 +40,7 @@ fn setting(robots: usize) -> RunSetting {
         ticks: 20,
         field_m: [4.0, 2.0],
         body_m: 0.5,
+        inradius_m: BTreeMap::new(),
         radio_range_m: Some(3.0),
         roster: (0..robots).map(robot).collect(),
         sites: BTreeMap::new(),

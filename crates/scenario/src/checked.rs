@@ -180,6 +180,17 @@ pub struct RobotSpec {
     pub parameters: Parameters,
 }
 
+/// The radius of the largest disc within each robot that has a shape of its own.
+pub(super) fn inradii_m(robots: &BTreeMap<RobotName, RobotSpec>) -> BTreeMap<RobotName, f64> {
+    let mut radii_m = BTreeMap::new();
+    for (name, robot) in robots {
+        if let Some(shape) = robot.shape {
+            radii_m.insert(name.clone(), shape.inradius_m());
+        }
+    }
+    radii_m
+}
+
 impl Scenario {
     /// Simulated duration, seconds.
     #[must_use]
@@ -195,6 +206,7 @@ impl Scenario {
             ticks: self.ticks,
             field_m: self.field_m,
             body_m: self.body_m,
+            inradius_m: inradii_m(&self.robots),
             radio_range_m: self.network.radio.map(|radio| radio.range_m),
             roster: self.roster(),
             sites: start_states(&self.sites),

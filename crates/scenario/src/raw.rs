@@ -54,7 +54,7 @@ use unplaced::unplaced;
 pub(super) use expect::Expectations;
 
 use super::change::Parent;
-use super::checked::{self, DEFAULT_SEED, RecordContents, RobotSpec, to_wire, to_world};
+use super::checked::{self, DEFAULT_SEED, RecordContents, RobotSpec, inradii_m, to_wire, to_world};
 use super::lateness::Lateness;
 use super::placing::{self, PlacingCause, PlacingError};
 use super::sites::start_states;
@@ -276,6 +276,7 @@ impl ScenarioFile {
             ticks,
             field_m: size.0.map(|length| length.0),
             body_m: body.0,
+            inradius_m: inradii_m(&robots),
             radio_range_m: network.radio.map(|radio| radio.range_m),
             roster: robots.keys().cloned().collect(),
             sites: start_states(&sites),

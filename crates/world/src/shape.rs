@@ -46,6 +46,13 @@ impl Shape {
             Self::Disc { radius_m } => (radius_m, radius_m),
         }
     }
+
+    /// Radius of the largest disc within it, m.
+    #[must_use]
+    pub fn inradius_m(self) -> f64 {
+        let (half_x_m, half_y_m) = self.half_m();
+        half_x_m.min(half_y_m)
+    }
 }
 
 impl Wall {
