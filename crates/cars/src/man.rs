@@ -1,12 +1,11 @@
 //! `cars man`: writes the manual pages of all programs.
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{ExitCode, Stdio};
 
 use clap::{Args, Command};
 use clap_mangen::Man;
-use export::draft::{Draft, unwritable};
+use export::draft::{self, unwritable};
 use launch::{SIBLINGS, find_sibling};
 use terminal::MAN_PAGE;
 
@@ -32,7 +31,7 @@ pub(crate) fn man(args: &ManArgs, cars: Command) -> Result<ExitCode> {
     siblings::build()?;
     for (name, _) in SIBLINGS {
         if let Some(program) = find_sibling(name) {
-            write(&folder.join(format!("{name}.1")), &page_of(&program)?)?;
+            draft::write(&folder.join(format!("{name}.1")), page_of(&program)?)?;
         }
     }
     Ok(ExitCode::SUCCESS)
@@ -63,14 +62,6 @@ fn write_pages(command: &Command, folder: &Path) -> Result<()> {
     let page = Man::new(command.clone());
     let mut text = Vec::new();
     page.render(&mut text)?;
-    write(&folder.join(page.get_filename()), &text)
-}
-
-fn write(path: &Path, page: &[u8]) -> Result<()> {
-    let mut draft = Draft::create(path)?;
-    draft
-        .write_all(page)
-        .map_err(|error| unwritable(path, &error))?;
-    draft.publish()?;
+    draft::write(&folder.join(page.get_filename()), text)?;
     Ok(())
 }

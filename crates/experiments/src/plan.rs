@@ -4,7 +4,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
@@ -23,7 +22,7 @@ use super::own::{ByClass, OwnRobots, RobotSource};
 use super::script;
 use super::setting::Setting;
 use crate::shell;
-use export::draft::{Draft, unwritable};
+use export::draft::{self, unwritable};
 
 /// The plan in the folder of an experiment.
 pub const PLAN: &str = "plan.json";
@@ -436,8 +435,8 @@ impl Plan {
         };
         let mut text = serde_json::to_string_pretty(&sealed).map_err(LabError::failed)?;
         text.push('\n');
-        write(&folder.join(PLAN), &text)?;
-        write(&folder.join(FILE), &self.written.file)?;
+        draft::write(&folder.join(PLAN), &text)?;
+        draft::write(&folder.join(FILE), &self.written.file)?;
         Ok(())
     }
 
@@ -833,16 +832,6 @@ impl WrittenPlan {
         hash.update(&text);
         Ok(format!("{:032x}", hash.digest128()))
     }
-}
-
-/// Writes a file that is seen whole or not at all.
-pub(super) fn write(path: &Path, text: &str) -> Result<(), FileError> {
-    let mut draft = Draft::create(path)?;
-    draft
-        .write_all(text.as_bytes())
-        .map_err(|error| unwritable(path, &error))?;
-    draft.publish()?;
-    Ok(())
 }
 
 fn list_conditions(experiment: &Experiment) -> Result<Vec<Condition>, LabError> {

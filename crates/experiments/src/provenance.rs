@@ -6,7 +6,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use config::FileError;
 use serde::{Deserialize, Serialize};
 
-use super::plan::{ProgramVersion, write};
+use super::plan::ProgramVersion;
 
 /// The provenance in the folder of an experiment.
 pub(super) const PROVENANCE: &str = "provenance.json";
@@ -65,7 +65,7 @@ impl Provenance {
         let mut text = serde_json::to_string_pretty(self)
             .unwrap_or_else(|error| unreachable!("it is always JSON: {error}"));
         text.push('\n');
-        write(&folder.join(PROVENANCE), &text)
+        export::draft::write(&folder.join(PROVENANCE), &text)
     }
 
     /// Reads it from the folder of an experiment; `None` if no results have been written there.

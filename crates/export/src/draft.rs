@@ -99,6 +99,19 @@ impl Write for Draft {
     }
 }
 
+/// Writes a file that is seen whole or not at all, as [`Draft::create`].
+///
+/// # Errors
+/// [`FileError`] if it cannot be written.
+pub fn write(path: &Path, content: impl AsRef<[u8]>) -> Result<(), FileError> {
+    let mut draft = Draft::create(path)?;
+    draft
+        .write_all(content.as_ref())
+        .map_err(|error| unwritable(path, &error))?;
+    draft.publish()?;
+    Ok(())
+}
+
 /// The error of a file that cannot be written.
 pub fn unwritable(path: &Path, reason: &dyn std::fmt::Display) -> FileError {
     FileError::new(format!("cannot write {}: {reason}", path.display()))

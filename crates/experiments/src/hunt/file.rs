@@ -1,7 +1,7 @@
 //! The scenario file of a finding.
 
 use std::fs::File;
-use std::io::{ErrorKind, Write};
+use std::io::ErrorKind;
 use std::path::{Component, Path, PathBuf};
 
 use config::{FileError, shipped};
@@ -15,7 +15,7 @@ use super::case::FaultCase;
 use super::fault::PlannedFault;
 use super::trial::{RUNS, Subject, TrialResult};
 use crate::shell;
-use export::draft::{Draft, unwritable};
+use export::draft::{self, unwritable};
 
 /// What the file of a finding tells beside its case.
 #[derive(Debug, Clone, Copy)]
@@ -44,11 +44,7 @@ pub(super) fn write(
 
     let mut text = comment(path, subject, case, played, heading);
     text += &toml::to_string(&content).map_err(LabError::failed)?;
-    let mut draft = Draft::create(path)?;
-    draft
-        .write_all(text.as_bytes())
-        .map_err(|error| unwritable(path, &error))?;
-    draft.publish()?;
+    draft::write(path, text)?;
     Ok(())
 }
 
