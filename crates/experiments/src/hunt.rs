@@ -14,7 +14,6 @@ mod coverage;
 mod draw;
 mod fault;
 mod file;
-mod parallel;
 mod sent;
 mod shrink;
 mod trial;
@@ -44,6 +43,8 @@ pub use trial::{FailedExpectation, HuntRobots, RUNS, Subject, Trial, TrialResult
 use corpus::Corpus;
 use file::Heading;
 use trial::{PlayedPlan, TrialPlan};
+
+use crate::parallel;
 
 /// Number of plans that are drawn at a time. What they reach guides the plans after them.
 const BATCH: u64 = 16;

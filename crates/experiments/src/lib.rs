@@ -16,6 +16,7 @@ pub mod hunt;
 mod launches;
 mod outcome;
 mod own;
+mod parallel;
 mod plan;
 mod presentation;
 mod processes;

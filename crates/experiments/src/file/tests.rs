@@ -654,7 +654,8 @@ fn every_example_of_the_page_is_good() {
                 }
                 // Examples of measures without a kind are about a scenario that has them.
                 if block.contains("\"all_done\"") {
-                    let measures = r#"measure=[{ name = "all_done", walked = { robots = "*", by = "sum" } }]"#;
+                    let measures =
+                        r#"measure=[{ name = "all_done", walked = { robots = "*", by = "sum" } }]"#;
                     set.push(measures.parse().unwrap());
                 }
                 let changes = config::Changes {

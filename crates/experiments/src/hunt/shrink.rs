@@ -12,9 +12,9 @@ use protocol::{RobotName, Tick};
 
 use super::case::FaultCase;
 use super::fault::{Effect, Messages, PlannedFault, TickSpan, robot_chance};
-use super::parallel::first;
 use super::sent::SentMessage;
 use super::trial::{Trial, TrialResult};
+use crate::parallel::first;
 
 /// Least time of a fault, ticks.
 const MIN_TICKS: Tick = 2;

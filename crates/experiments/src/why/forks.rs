@@ -5,12 +5,11 @@ use std::fs::{File, OpenOptions};
 use std::io::{ErrorKind, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError, mpsc};
-use std::thread::Builder;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use export::draft::Draft;
+use export::draft;
 use lab::LabError;
 use lab::branch::{Branch, Trunk};
 use lab::run::RobotMaker;
@@ -28,6 +27,7 @@ use super::candidates;
 use super::plan::{Counterfactual, ForkPlan};
 use super::question::AskedRun;
 use super::search::{Forks, SearchedRun, search};
+use crate::parallel;
 use crate::plan::ProgramVersion;
 
 /// Most copies of the run at ticks of it that are kept.
@@ -72,7 +72,7 @@ pub fn why(
     run: &RunName,
     files: &EpochFiles,
     options: &WhyOptions<'_>,
-    progress: &mut dyn FnMut(WhyProgress),
+    progress: &mut (dyn FnMut(WhyProgress) + Send),
 ) -> Result<(WhyAnswer, PathBuf), LabError> {
     let recorded = Scenario::load(&files.scenario, &config::Changes::default())?;
     let asked = AskedRun::read(options.what.as_deref(), &recorded, files)?;
@@ -134,21 +134,12 @@ pub fn why(
     answer.sentence = answer.in_words();
     let path = place.join(format!("{name}.json"));
     let json = serde_json::to_string_pretty(&answer).map_err(LabError::failed)?;
-    write(&path, &format!("{json}\n"))?;
+    draft::write(&path, format!("{json}\n"))?;
     Ok((answer, path))
 }
 
-fn write(path: &Path, text: &str) -> Result<(), LabError> {
-    let mut draft = Draft::create(path)?;
-    draft
-        .write_all(text.as_bytes())
-        .map_err(|error| unwritable(path, &error))?;
-    draft.publish()?;
-    Ok(())
-}
-
 fn unwritable(path: &Path, error: &std::io::Error) -> LabError {
-    LabError::File(export::draft::unwritable(path, error))
+    LabError::File(draft::unwritable(path, error))
 }
 
 /// The name of a question's files: its words.
@@ -254,7 +245,7 @@ struct Sampler<'a> {
     kept: OutcomeFile,
     /// Forks that were asked for, whether they were played now or before.
     used: u64,
-    progress: &'a mut dyn FnMut(WhyProgress),
+    progress: &'a mut (dyn FnMut(WhyProgress) + Send),
 }
 
 impl Forks for Sampler<'_> {
@@ -286,67 +277,41 @@ impl Forks for Sampler<'_> {
 }
 
 impl Sampler<'_> {
-    /// Plays forks that were not played yet.
+    /// Plays forks that were not played yet, and keeps the outcome of each as soon as it is known.
     fn play_all(&mut self, plan: &ForkPlan, numbers: &[u64]) -> Result<(), LabError> {
-        let shared = plan.shared();
-        let base = Mutex::new(self.branch(shared)?);
-        let next = AtomicUsize::new(0);
-        let stop = self.options.stop;
-        let asked = self.asked;
-        let (sender, receiver) = mpsc::channel();
-        let work = &|sender: mpsc::Sender<(u64, Result<Option<f64>, LabError>)>| {
-            while !stop.load(Ordering::Relaxed) {
-                let Some(number) = numbers.get(next.fetch_add(1, Ordering::Relaxed)) else {
-                    break;
-                };
-                let copy = base
-                    .lock()
-                    .unwrap_or_else(PoisonError::into_inner)
-                    .snapshot();
-                let outcome = copy.and_then(|branch| fork(asked, branch, plan, *number));
-                if sender.send((*number, outcome)).is_err() {
-                    break;
-                }
-            }
-        };
+        let tick = plan.shared();
+        let base = Mutex::new(self.branch(tick)?);
+        let known = self.outcomes.entry(plan.clone()).or_default();
+        let keeping = Mutex::new((known, &mut self.kept, &mut *self.progress));
+        let has_failed = AtomicBool::new(false);
+        let (asked, forks) = (self.asked, self.used);
 
-        let mut first_error = None;
-        std::thread::scope(|scope| {
-            let jobs = self.options.jobs.clamp(1, numbers.len());
-            let mut workers = 0;
-            for _ in 0..jobs {
-                let sender = sender.clone();
-                let worker = Builder::new().spawn_scoped(scope, move || work(sender));
-                workers += usize::from(worker.is_ok());
+        let WhyOptions { jobs, stop, .. } = self.options;
+        let played = parallel::all(numbers, *jobs, stop, |&number| {
+            if has_failed.load(Ordering::Relaxed) {
+                return Ok(());
             }
-            if workers == 0 {
-                work(sender);
-            } else {
-                drop(sender);
-            }
-            for (number, outcome) in receiver {
-                let kept = outcome.and_then(|outcome| {
-                    self.kept.add(plan, number, outcome)?;
-                    let of_plan = self.outcomes.entry(plan.clone()).or_default();
-                    of_plan.insert(number, outcome);
-                    Ok(())
-                });
-                if let Err(error) = kept {
-                    next.store(numbers.len(), Ordering::Relaxed);
-                    first_error.get_or_insert(error);
-                }
-                (self.progress)(WhyProgress {
-                    forks: self.used,
-                    tick: shared,
-                });
-            }
+            let copy = locked(&base).snapshot();
+            let outcome = copy.and_then(|branch| fork(asked, branch, plan, number));
+
+            let (known, kept, progress) = &mut *locked(&keeping);
+            progress(WhyProgress { forks, tick });
+            let is_kept = outcome.and_then(|outcome| {
+                kept.add(plan, number, outcome)?;
+                known.insert(number, outcome);
+                Ok(())
+            });
+            has_failed.fetch_or(is_kept.is_err(), Ordering::Relaxed);
+            is_kept
         });
 
-        match first_error {
-            Some(error) => Err(error),
-            None if stop.load(Ordering::Relaxed) => Err(LabError::Interrupted),
-            None => Ok(()),
+        for is_kept in played.into_iter().flatten() {
+            is_kept?;
         }
+        if stop.load(Ordering::Relaxed) {
+            return Err(LabError::Interrupted);
+        }
+        Ok(())
     }
 
     /// The run after a tick, as a branch.
@@ -362,6 +327,10 @@ impl Sampler<'_> {
         }
         trunk.into_branch()
     }
+}
+
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Plays a fork; returns its outcome. A fork in which a robot fails has none.
