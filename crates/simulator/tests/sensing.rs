@@ -2,16 +2,13 @@
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
+mod actors;
 mod common;
 
-use std::collections::BTreeMap;
-use std::convert::Infallible;
 use std::path::Path;
-use std::sync::Arc;
 
-use lockstep::{Bulletin, Exchange, IncarnationNotice, TickOutcome};
-use protocol::RobotName;
-use protocol::messages::{CommandText, Point, Report, SensedKind, TickUpdate};
+use actors::Actors;
+use protocol::messages::{Point, SensedKind, TickUpdate};
 use scenario::Scenario;
 use scenario::diagnostic::{FileError, Source};
 use simulator::Simulation;
@@ -52,38 +49,6 @@ fn parse(file: &str) -> Result<Scenario, FileError> {
     Scenario::parse(&source, Path::new("."))
 }
 
-/// Robots that stay and look in a direction; the news of A.
-struct Watchers {
-    places: BTreeMap<RobotName, Point>,
-    heading_rad: f64,
-    news: Vec<TickUpdate>,
-}
-
-impl Exchange<TickUpdate, Arc<Report>, CommandText> for Watchers {
-    type Error = Infallible;
-
-    fn exchange(
-        &mut self,
-        tick: u64,
-        bulletin: &dyn Bulletin<TickUpdate>,
-    ) -> Result<TickOutcome<Arc<Report>, CommandText>, Infallible> {
-        let mut outcome = TickOutcome::default();
-        for (name, proposal) in &self.places {
-            if name.as_str() == "A" {
-                let news = bulletin.compose(name, IncarnationNotice::default());
-                self.news.push(news);
-            }
-            let report = Report {
-                direction_rad: self.heading_rad,
-                ..common::report(tick, *proposal)
-            };
-            let answer = (Arc::new(report), Vec::new());
-            outcome.reports.insert(name.clone(), answer);
-        }
-        Ok(outcome)
-    }
-}
-
 /// The news of A in ticks 0 to `ticks`, while it looks in a direction.
 fn news(sensing: &str, heading_rad: f64, ticks: usize) -> Vec<TickUpdate> {
     news_of(&format!("{FILE}{sensing}\n"), heading_rad, ticks)
@@ -96,17 +61,23 @@ fn news_of(file: &str, heading_rad: f64, ticks: usize) -> Vec<TickUpdate> {
     let a = names[0].clone();
     simulation.list_bodies(&a, true);
     simulation.list_ranges(&a, true);
-    let place = |name: &RobotName| (name.clone(), simulation.location(name).unwrap());
-    let mut watchers = Watchers {
-        places: names.iter().map(place).collect(),
-        heading_rad,
-        news: Vec::new(),
-    };
+    let mut watchers = Actors::of(&simulation, |report, headings: Vec<f64>| {
+        report.direction_rad = headings[0];
+    });
+    for tick in 0..=ticks as u64 {
+        for name in &names {
+            watchers
+                .actions
+                .insert((tick, name.clone()), vec![heading_rad]);
+        }
+    }
     simulation.init(&mut watchers).unwrap();
     for _ in 0..ticks {
         simulation.step(&mut watchers).unwrap();
     }
-    watchers.news
+    let news = watchers.news.into_iter();
+    news.map(|mut news| news.remove(&a).unwrap_or_default())
+        .collect()
 }
 
 /// The names of robots and sites that A senses, and how many obstacles.
