@@ -361,10 +361,10 @@ impl Hunt<'_> {
         if !self.ground.can_go_on(&state.faults) {
             return None;
         }
-        let faults = self.ground.go_on(&state.faults, &state.moment, chance);
+        let faults = self.ground.go_on(&state.faults, &state.onset, chance);
         Some(TrialPlan {
             case: FaultCase::of(faults),
-            after: state.moment.after,
+            after: state.onset.after,
             saved: state.saved.clone(),
         })
     }

@@ -7,7 +7,6 @@ use protocol::Tick;
 
 use super::coverage::{Feature, MAX_FEATURES};
 use super::fault::PlannedFault;
-
 use super::sent::{Link, Onset};
 use super::trial::{PlayedPlan, SavedRun, TrialPlan};
 
@@ -24,7 +23,7 @@ pub(super) struct ReachedState {
     /// The faults that had begun by then.
     pub(super) faults: Vec<PlannedFault>,
     /// When it was reached.
-    pub(super) moment: Onset,
+    pub(super) onset: Onset,
     /// The run at that time, if it could be copied.
     pub(super) saved: Option<Arc<SavedRun>>,
     /// What was new in that tick.
@@ -105,7 +104,7 @@ impl Corpus {
             faults.retain(|fault| fault.has_begun(tick, &result.sent));
             self.states.push(ReachedState {
                 faults,
-                moment: Onset::of(&result.sent, tick),
+                onset: Onset::of(&result.sent, tick),
                 saved,
                 features,
                 chosen: 0,
@@ -159,7 +158,7 @@ mod tests {
     #[test]
     fn a_state_is_new_once_and_before_the_last_tick() {
         let corpus = corpus_of(&[(0, &[("X", 5), ("Y", 5), ("Z", 100)]), (0, &[("X", 3)])]);
-        let ticks: Vec<Tick> = corpus.states.iter().map(|one| one.moment.after).collect();
+        let ticks: Vec<Tick> = corpus.states.iter().map(|one| one.onset.after).collect();
         assert_eq!(ticks, [5], "X and Y are one state, Z is the last tick");
         assert!(!corpus.is_new(&change("X")) && corpus.is_new(&change("W")));
         assert!(!corpus.is_new(&Feature::Fault {
@@ -184,7 +183,7 @@ mod tests {
         let mut counts: BTreeMap<Tick, u64> = BTreeMap::new();
         for _ in 0..110 {
             let state = corpus.choose().unwrap();
-            *counts.entry(state.moment.after).or_default() += 1;
+            *counts.entry(state.onset.after).or_default() += 1;
         }
         assert_eq!(counts, BTreeMap::from([(5, 10), (8, 100)]));
     }

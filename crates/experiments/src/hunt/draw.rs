@@ -115,18 +115,18 @@ impl Ground {
     pub(super) fn go_on(
         &self,
         faults: &[PlannedFault],
-        moment: &Onset,
+        onset: &Onset,
         chance: &mut Stream,
     ) -> Vec<PlannedFault> {
         let mut faults = faults.to_vec();
         let can_reseed = self.later_kinds.contains(&FaultClass::Reseed);
         if can_reseed && unit(chance) < 0.5 {
-            self.add(&mut faults, &[FaultClass::Reseed], moment, chance);
+            self.add(&mut faults, &[FaultClass::Reseed], onset, chance);
         } else {
-            self.add(&mut faults, &self.later_kinds, moment, chance);
+            self.add(&mut faults, &self.later_kinds, onset, chance);
         }
         while faults.len() < MAX_STEPS && unit(chance) < 0.5 {
-            self.add(&mut faults, &self.later_kinds, moment, chance);
+            self.add(&mut faults, &self.later_kinds, onset, chance);
         }
         faults
     }
@@ -136,11 +136,11 @@ impl Ground {
         &self,
         faults: &mut Vec<PlannedFault>,
         kinds: &[FaultClass],
-        moment: &Onset,
+        onset: &Onset,
         chance: &mut Stream,
     ) {
         let kind = kinds[below(kinds.len(), chance)];
-        let fault = self.fault(kind, moment, chance);
+        let fault = self.fault(kind, onset, chance);
         let is_twice = faults.iter().any(|other| match (other, &fault) {
             (PlannedFault::Reseed { at: one, .. }, PlannedFault::Reseed { at: other, .. }) => {
                 one == other
@@ -152,49 +152,49 @@ impl Ground {
         }
     }
 
-    fn fault(&self, kind: FaultClass, moment: &Onset, chance: &mut Stream) -> PlannedFault {
+    fn fault(&self, kind: FaultClass, onset: &Onset, chance: &mut Stream) -> PlannedFault {
         match kind {
             FaultClass::Lose => {
-                let (link, number) = self.command(moment, chance);
+                let (link, number) = self.command(onset, chance);
                 PlannedFault::Lose { link, number }
             }
             FaultClass::Late => {
-                let (link, number) = self.command(moment, chance);
+                let (link, number) = self.command(onset, chance);
                 let most = MAX_LATE_TICKS >> below(DOUBLINGS, chance);
                 let by = 1 + below(most, chance) as Tick;
                 PlannedFault::Late { link, number, by }
             }
             FaultClass::Double => {
-                let (link, number) = self.command(moment, chance);
+                let (link, number) = self.command(onset, chance);
                 PlannedFault::Double { link, number }
             }
             FaultClass::Reseed => PlannedFault::Reseed {
-                at: moment.after + 1,
+                at: onset.after + 1,
                 seed: 1 + below(MAX_RESEED, chance) as u64,
                 of: Vec::new(),
             },
             FaultClass::Loss => {
                 let effect = Effect::Loss(5 * (1 + below(20, chance) as u64));
-                self.channel(self.messages(chance), effect, moment, chance)
+                self.channel(self.messages(chance), effect, onset, chance)
             }
             FaultClass::Burst => {
                 let enter = 1 + below(20, chance) as u64;
                 let leave = 5 * (1 + below(10, chance) as u64);
                 let effect = Effect::Burst(enter, leave);
-                self.channel(self.messages(chance), effect, moment, chance)
+                self.channel(self.messages(chance), effect, onset, chance)
             }
             FaultClass::Delay => {
                 let effect = Effect::Delay(1 << below(6, chance));
-                self.channel(Messages::Commands, effect, moment, chance)
+                self.channel(Messages::Commands, effect, onset, chance)
             }
             FaultClass::Duplication => {
                 let effect = Effect::Duplication(5 * (1 + below(20, chance) as u64));
-                self.channel(Messages::Commands, effect, moment, chance)
+                self.channel(Messages::Commands, effect, onset, chance)
             }
-            FaultClass::Partition => self.partition(false, moment, chance),
-            FaultClass::OneWay => self.partition(true, moment, chance),
-            FaultClass::Crash => self.absence(AbsenceReason::Crash, moment, chance),
-            FaultClass::Hang => self.absence(AbsenceReason::Hang, moment, chance),
+            FaultClass::Partition => self.partition(false, onset, chance),
+            FaultClass::OneWay => self.partition(true, onset, chance),
+            FaultClass::Crash => self.absence(AbsenceReason::Crash, onset, chance),
+            FaultClass::Hang => self.absence(AbsenceReason::Hang, onset, chance),
             FaultClass::Wall => self.wall(chance),
             FaultClass::Crowd => {
                 let count = self.scenario.guests.count;
@@ -206,23 +206,23 @@ impl Ground {
     }
 
     /// The links to robots of the roster on which commands are sent.
-    fn links<'a>(&self, moment: &'a Onset) -> Vec<(&'a Link, (u64, u64))> {
-        let links = moment.links.iter().map(|(link, counts)| (link, *counts));
+    fn links<'a>(&self, onset: &'a Onset) -> Vec<(&'a Link, (u64, u64))> {
+        let links = onset.links.iter().map(|(link, counts)| (link, *counts));
         links
             .filter(|(link, _)| self.scenario.robots.contains_key(&link.to))
             .collect()
     }
 
-    /// A command on which nothing is decided in a moment: its link and its number.
-    fn command(&self, moment: &Onset, chance: &mut Stream) -> (Link, u64) {
-        let mut links = self.links(moment);
+    /// A command on which nothing is decided in a onset: its link and its number.
+    fn command(&self, onset: &Onset, chance: &mut Stream) -> (Link, u64) {
+        let mut links = self.links(onset);
         if links.is_empty() {
             links = self.links(&self.beginning);
         }
         let (link, (decided, all)) = links[below(links.len(), chance)];
         // At the end of a run there may be none. In another run there may be one.
         let left = usize::try_from((all - decided).max(1)).unwrap_or(usize::MAX);
-        let number = decided + 1 + below(soon(left, moment, chance), chance) as u64;
+        let number = decided + 1 + below(soon(left, onset, chance), chance) as u64;
         (link.clone(), number)
     }
 
@@ -238,7 +238,7 @@ impl Ground {
         &self,
         of: Messages,
         effect: Effect,
-        moment: &Onset,
+        onset: &Onset,
         chance: &mut Stream,
     ) -> PlannedFault {
         let mut link = None;
@@ -256,18 +256,18 @@ impl Ground {
             link,
             of,
             effect,
-            span: self.span(moment, chance),
+            span: self.span(onset, chance),
         }
     }
 
-    fn absence(&self, why: AbsenceReason, moment: &Onset, chance: &mut Stream) -> PlannedFault {
+    fn absence(&self, why: AbsenceReason, onset: &Onset, chance: &mut Stream) -> PlannedFault {
         let robot = self.roster[below(self.roster.len(), chance)].clone();
-        let span = self.span(moment, chance);
+        let span = self.span(onset, chance);
         PlannedFault::Absence { robot, why, span }
     }
 
     /// A partition of one robot from the others, or of two halves.
-    fn partition(&self, one_way: bool, moment: &Onset, chance: &mut Stream) -> PlannedFault {
+    fn partition(&self, one_way: bool, onset: &Onset, chance: &mut Stream) -> PlannedFault {
         let first = below(self.roster.len(), chance);
         let mut one = vec![self.roster[first].clone()];
         let mut other = Vec::new();
@@ -298,7 +298,7 @@ impl Ground {
             other,
             one_way,
             cuts,
-            span: self.span(moment, chance),
+            span: self.span(onset, chance),
         }
     }
 
@@ -349,11 +349,11 @@ impl Ground {
         is_inside(place.x, width_m) && is_inside(place.y, height_m) && !is_on_robot
     }
 
-    /// A time that begins in the run, after a moment.
-    fn span(&self, moment: &Onset, chance: &mut Stream) -> TickSpan {
-        let left = self.scenario.ticks.saturating_sub(moment.after).max(1);
+    /// A time that begins in the run, after a onset.
+    fn span(&self, onset: &Onset, chance: &mut Stream) -> TickSpan {
+        let left = self.scenario.ticks.saturating_sub(onset.after).max(1);
         let left = usize::try_from(left).unwrap_or(usize::MAX);
-        let from = moment.after + 1 + below(soon(left, moment, chance), chance) as Tick;
+        let from = onset.after + 1 + below(soon(left, onset, chance), chance) as Tick;
         let scale = SHORTEST_TICKS << below(DOUBLINGS, chance);
         let lasting = scale + below(scale as usize, chance) as Tick;
         TickSpan {
@@ -365,8 +365,8 @@ impl Ground {
 
 /// How many of the next things one is drawn from, of those that are left: all at the beginning of a run. After a state often only the
 /// first ones, because it may not last.
-fn soon(left: usize, moment: &Onset, chance: &mut Stream) -> usize {
-    if moment.after == 0 {
+fn soon(left: usize, onset: &Onset, chance: &mut Stream) -> usize {
+    if onset.after == 0 {
         return left;
     }
     (left >> below(HALVINGS, chance)).max(1)

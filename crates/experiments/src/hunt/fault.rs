@@ -277,18 +277,22 @@ impl PlannedFault {
             Self::Lose { link, number }
             | Self::Late { link, number, .. }
             | Self::Double { link, number } => Some((link, *number)),
-            _ => None,
+            Self::Channel { .. }
+            | Self::Partition { .. }
+            | Self::Absence { .. }
+            | Self::Wall { .. }
+            | Self::Crowd { .. }
+            | Self::Reseed { .. } => None,
         }
     }
 
     /// The same for another command of the link, if it concerns exactly one.
     pub(super) fn of_command(&self, other: u64) -> Self {
         let mut fault = self.clone();
-        match &mut fault {
-            Self::Lose { number, .. } | Self::Late { number, .. } | Self::Double { number, .. } => {
-                *number = other;
-            }
-            _ => {}
+        if let Self::Lose { number, .. } | Self::Late { number, .. } | Self::Double { number, .. } =
+            &mut fault
+        {
+            *number = other;
         }
         fault
     }
@@ -305,7 +309,12 @@ impl PlannedFault {
             | Self::Partition { span, .. }
             | Self::Absence { span, .. } => span.from <= tick,
             Self::Reseed { at, .. } => *at <= tick,
-            _ => true,
+            // Those before are of single commands; walls and guests are there from the beginning.
+            Self::Lose { .. }
+            | Self::Late { .. }
+            | Self::Double { .. }
+            | Self::Wall { .. }
+            | Self::Crowd { .. } => true,
         }
     }
 
@@ -347,7 +356,12 @@ impl PlannedFault {
             Self::Channel { span, .. }
             | Self::Partition { span, .. }
             | Self::Absence { span, .. } => *span = time,
-            _ => {}
+            Self::Lose { .. }
+            | Self::Late { .. }
+            | Self::Double { .. }
+            | Self::Wall { .. }
+            | Self::Crowd { .. }
+            | Self::Reseed { .. } => {}
         }
         fault
     }

@@ -249,14 +249,21 @@ impl Subject {
                 let robots = source.begin();
                 let mut local = self.local(scenario, robots.as_ref(), saved)?;
                 let is_begun = saved.is_some();
-                play_here(
-                    &mut local,
-                    is_begun,
-                    robots.as_ref(),
-                    wanted,
-                    &mut notes,
-                    &mut copies,
-                )
+                let run = AssertUnwindSafe(|| {
+                    play_here(
+                        &mut local,
+                        is_begun,
+                        robots.as_ref(),
+                        wanted,
+                        &mut notes,
+                        &mut copies,
+                    )
+                });
+                match catch_unwind(run) {
+                    Ok(Ok(())) => None,
+                    Ok(Err(error)) => Some(error.to_string()),
+                    Err(_) => Some("a robot panicked".to_owned()),
+                }
             }
             HuntRobots::Processes(launches, launch) => {
                 play_by_processes(scenario, launches, launch.as_ref(), wanted, &mut notes)?
@@ -305,27 +312,8 @@ impl Subject {
     }
 }
 
-/// Plays a run in this process. Returns why it has not come to its end, if it has not.
-fn play_here(
-    local: &mut Local,
-    is_begun: bool,
-    robots: &dyn RunRobots,
-    wanted: &BTreeSet<String>,
-    notes: &mut TrialNotes,
-    copies: &mut Copies<'_>,
-) -> Option<String> {
-    let gone = catch_unwind(AssertUnwindSafe(|| {
-        go(local, is_begun, robots, wanted, notes, copies)
-    }));
-    match gone {
-        Ok(Ok(())) => None,
-        Ok(Err(error)) => Some(error.to_string()),
-        Err(_) => Some("a robot panicked".to_owned()),
-    }
-}
-
 /// Plays a run in this process until a wanted expectation fails, or to its end.
-fn go(
+fn play_here(
     local: &mut Local,
     is_begun: bool,
     robots: &dyn RunRobots,
@@ -624,8 +612,8 @@ mod tests {
                 let sent = &played.result.sent;
                 let mut faults = plan.case.faults.clone();
                 faults.retain(|fault| fault.has_begun(after, sent));
-                let moment = Onset::of(sent, after);
-                let case = FaultCase::of(ground.go_on(&faults, &moment, &mut chance));
+                let onset = Onset::of(sent, after);
+                let case = FaultCase::of(ground.go_on(&faults, &onset, &mut chance));
                 let [copied, whole] = [Some(saved), None].map(|saved| {
                     let plan = TrialPlan {
                         case: case.clone(),
