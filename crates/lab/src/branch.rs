@@ -60,10 +60,11 @@ impl Trunk {
         self.entries.last().map_or(0, |entry| entry.tick)
     }
 
-    /// What the record has of a tick.
+    /// The events that the record has of a tick; none after its last one.
     #[must_use]
-    pub fn entry(&self, tick: Tick) -> Option<&Entry> {
-        self.entries.get(usize::try_from(tick).ok()?)
+    pub fn events(&self, tick: Tick) -> &[Event] {
+        let index = usize::try_from(tick).unwrap_or(usize::MAX);
+        self.entries.get(index).map_or(&[], |entry| &entry.events)
     }
 
     /// The simulation after the last tick that was executed.

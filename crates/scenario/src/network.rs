@@ -146,11 +146,14 @@ impl Network {
     /// Whether any link has bursts.
     #[must_use]
     pub fn has_bursts(&self) -> bool {
+        self.channels().any(|channel| channel.burst.is_some())
+    }
+
+    /// All that is said of commands and of queries, of single links and of the others.
+    pub fn channels(&self) -> impl Iterator<Item = &Channel> {
         let links = self.links.iter();
         let own = links.flat_map(|link| [&link.commands, &link.queries]);
-        let own = own.flatten();
-        let mut all = own.chain([&self.commands, &self.queries]);
-        all.any(|channel| channel.burst.is_some())
+        own.flatten().chain([&self.commands, &self.queries])
     }
 }
 

@@ -4,7 +4,7 @@ use lab::branch::Trunk;
 use protocol::event::{Blocker, Cause};
 use protocol::messages::FaultKind;
 use protocol::{Event, RobotName, Seq, Tick};
-use record::Entry;
+use scenario::network::Channel;
 use scenario::{ChanceKind, Scenario};
 
 use super::plan::Counterfactual;
@@ -50,26 +50,19 @@ fn has_chance(scenario: &Scenario) -> bool {
     let later = scenario.changes.iter().map(|change| &change.network);
     let mut networks = later.chain([&scenario.network]);
     networks.any(|network| {
-        let links = network.links.iter();
-        let mut channels = links
-            .flat_map(|link| [link.commands, link.queries])
-            .flatten()
-            .chain([network.commands, network.queries]);
-        channels.any(|channel| channel != scenario::network::Channel::default())
+        let mut channels = network.channels();
+        channels.any(|channel| *channel != Channel::default())
     })
 }
 
 /// The events of a tick in words, those first that say most.
 pub(super) fn events(trunk: &Trunk, tick: Tick) -> Vec<String> {
-    let Some(entry) = trunk.entry(tick) else {
-        return Vec::new();
-    };
     let mut words = Vec::new();
-    for (what, _) in all(trunk, entry) {
+    for (what, _) in all(trunk, tick) {
         words.push(what);
     }
     let tick_s = trunk.simulation().scenario().tick_s;
-    for event in &entry.events {
+    for event in trunk.events(tick) {
         // Those are among the causes, with more words.
         let is_told = matches!(
             event,
@@ -90,18 +83,16 @@ pub(super) fn events(trunk: &Trunk, tick: Tick) -> Vec<String> {
 
 /// What may have caused a jump in a tick, in words, and what happens without it.
 pub(super) fn candidates(trunk: &Trunk, tick: Tick) -> Vec<(String, Counterfactual)> {
-    let mut found = trunk
-        .entry(tick)
-        .map_or_else(Vec::new, |entry| all(trunk, entry));
+    let mut found = all(trunk, tick);
     found.truncate(MAX_CANDIDATES);
     found
 }
 
 /// All that can be left out of a tick, what is rare first.
-fn all(trunk: &Trunk, entry: &Entry) -> Vec<(String, Counterfactual)> {
+fn all(trunk: &Trunk, tick: Tick) -> Vec<(String, Counterfactual)> {
     let mut found: Vec<(u8, String, Counterfactual)> = Vec::new();
-    for event in &entry.events {
-        if let Some((rank, what, instead)) = left_out(trunk, entry.tick, event)
+    for event in trunk.events(tick) {
+        if let Some((rank, what, instead)) = left_out(trunk, tick, event)
             && !found.iter().any(|(_, _, other)| *other == instead)
         {
             found.push((rank, what, instead));
@@ -192,11 +183,7 @@ fn left_out(trunk: &Trunk, tick: Tick, event: &Event) -> Option<(u8, String, Cou
 fn named(trunk: &Trunk, tick: Tick, by: &RobotName, target: &RobotName, number: Seq) -> String {
     let first = tick.saturating_sub(MAX_UNDER_WAY);
     for tick in (first..=tick).rev() {
-        for event in trunk
-            .entry(tick)
-            .into_iter()
-            .flat_map(|entry| &entry.events)
-        {
+        for event in trunk.events(tick) {
             if let Event::CommandSent {
                 from, seq, command, ..
             } = event
@@ -249,11 +236,7 @@ pub(super) fn planned(trunk: &Trunk, scenario: &Scenario) -> Vec<(Tick, String, 
     }
     if !scenario.network.named.is_empty() {
         for tick in 1..=last {
-            for event in trunk
-                .entry(tick)
-                .into_iter()
-                .flat_map(|entry| &entry.events)
-            {
+            for event in trunk.events(tick) {
                 if is_named(event)
                     && let Some((_, what, instead)) = left_out(trunk, tick, event)
                 {
