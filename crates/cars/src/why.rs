@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use config::units::Time;
-use experiments::why::{ForkEstimate, WhyAnswer, WhyOptions, why as find_out};
+use experiments::why::{WhyAnswer, WhyOptions, why as find_out};
 use indicatif::{ProgressBar, ProgressStyle};
 use lab::folder::{find, recorded_epoch, run_name};
 use lab::run::project_robots;
@@ -132,23 +132,28 @@ pub(crate) fn why(args: &WhyArgs) -> Result<ExitCode> {
 fn in_words(answer: &WhyAnswer) -> String {
     let mut text = format!("{}\n", answer.sentence);
 
+    let is_share = answer.is_share;
     let mut rows = Vec::new();
     for jump in &answer.jumps {
-        let time_s = format!("{} s", time_s(jump.tick, answer.tick_s));
+        let time_s = format!("{} s", time_s(jump.shown.tick, answer.tick_s));
         rows.push([
             time_s.clone(),
             "before".to_owned(),
-            amount(answer, &jump.before),
+            jump.shown.before.in_words_with_count(is_share),
         ]);
         rows.push([
             time_s.clone(),
             "after".to_owned(),
-            amount(answer, &jump.after),
+            jump.shown.after.in_words_with_count(is_share),
         ]);
         for tried in &jump.tried {
             let restores = if tried.restores { " *" } else { "" };
             let what = format!("without: {}{restores}", tried.what);
-            rows.push([time_s.clone(), what, amount(answer, &tried.without)]);
+            rows.push([
+                time_s.clone(),
+                what,
+                tried.without.in_words_with_count(is_share),
+            ]);
         }
     }
     for effect in &answer.planned {
@@ -157,7 +162,7 @@ fn in_words(answer: &WhyAnswer) -> String {
         rows.push([
             time_s,
             format!("without {}{matters}", effect.what),
-            amount(answer, &effect.without),
+            effect.without.in_words_with_count(is_share),
         ]);
     }
     rows.truncate(MAX_ROWS);
@@ -170,39 +175,12 @@ fn in_words(answer: &WhyAnswer) -> String {
         text +=
             "\nOther chance of one kind alone, from the first tick on, gives another outcome in:\n";
         for effect in &answer.kinds {
-            text += &format!("  {}: {}\n", effect.kind, percent(&effect.changed));
+            text += &format!(
+                "  {}: {}\n",
+                effect.kind,
+                effect.changed.in_words_with_count(true)
+            );
         }
     }
     text + &format!("\n{} forks\n", answer.forks)
-}
-
-fn amount(answer: &WhyAnswer, estimate: &ForkEstimate) -> String {
-    if answer.is_share {
-        return percent(estimate);
-    }
-    let value = estimate
-        .value
-        .map_or("none".to_owned(), |value| format!("{value:.3}"));
-    match (estimate.low, estimate.high) {
-        (Some(low), Some(high)) => format!("{value} ({low:.3} to {high:.3}), n = {}", estimate.n),
-        _ => format!("{value}, n = {}", estimate.n),
-    }
-}
-
-fn percent(estimate: &ForkEstimate) -> String {
-    let share = |value: f64| format!("{:.0}", value * 100.0);
-    let Some(value) = estimate.value.map(share) else {
-        return format!("none, n = {}", estimate.n);
-    };
-    match (estimate.low, estimate.high) {
-        (Some(low), Some(high)) => {
-            format!(
-                "{value} % ({} to {}), n = {}",
-                share(low),
-                share(high),
-                estimate.n
-            )
-        }
-        _ => format!("{value} %, n = {}", estimate.n),
-    }
 }

@@ -9,9 +9,7 @@ mod question;
 mod search;
 mod sentence;
 
-pub use answer::{
-    CurvePoint, ForkEstimate, Jump, JumpCause, KindEffect, PlannedEffect, TriedCause, WhyAnswer,
-};
+pub use answer::{Jump, KindEffect, PlannedEffect, TriedCause, WhyAnswer};
 pub use forks::{WhyOptions, WhyProgress, why};
 pub use plan::{Counterfactual, ForkPlan};
 pub use question::Question;

@@ -20,6 +20,7 @@ use lab::run::{RobotMaker, execute_with};
 use protocol::RobotName;
 use protocol::random::unit;
 use record::RunFolder;
+use recording::RunDecisions;
 use robot::{Action, BadParameters, Cars, Robot};
 use scenario::Scenario;
 
@@ -213,6 +214,21 @@ fn ask(recorded: &Recorded, what: &str) -> WhyAnswer {
     let run = "run".parse().unwrap();
     let (answer, _) = why(&recorded.folder, &run, &files, &options, &mut |_| {}).unwrap();
     println!("{}", answer.sentence);
+
+    // The console, reports and diagrams read the file as another type.
+    let found = RunDecisions::read(recorded.folder.path());
+    assert!(found.notes.is_empty(), "{:?}", found.notes);
+    let [shown] = &found.all[..] else {
+        panic!("{} answers", found.all.len());
+    };
+    assert_eq!(shown.question.name, answer.question.words());
+    assert_eq!(shown.curve, answer.curve);
+    assert!(
+        shown
+            .jumps
+            .iter()
+            .eq(answer.jumps.iter().map(|jump| &jump.shown))
+    );
     answer
 }
 
@@ -252,7 +268,7 @@ fn misses(number: usize) -> (u32, u32) {
     let what = format!("{{ robot = \"{name}\", variable = \"heads\", above = 2.5 }}");
     let answer = ask(&recorded, &what);
 
-    let ticks: Vec<u64> = answer.jumps.iter().map(|jump| jump.tick).collect();
+    let ticks: Vec<u64> = answer.jumps.iter().map(|jump| jump.shown.tick).collect();
     // The first jump is the least that counts, and so is not always named.
     assert!(ticks == FLIPS || ticks == FLIPS[1..], "{ticks:?}");
     let mut missed = 0;
@@ -271,6 +287,7 @@ fn misses(number: usize) -> (u32, u32) {
     }
     for jump in &answer.jumps {
         let cause = jump
+            .shown
             .cause
             .as_ref()
             .expect("the robot's chance is the cause");
@@ -330,9 +347,9 @@ fn finds_the_command(number: usize) -> bool {
     let what = format!("{{ robot = \"{name}\", variable = \"key\", above = 0.5 }}");
     let answer = ask(&recorded, &what);
     let found = answer.jumps.iter().any(|jump| {
-        let cause = jump.cause.as_ref();
+        let cause = jump.shown.cause.as_ref();
         let words = cause.map_or("", |cause| cause.what.as_str());
-        jump.tick.abs_diff(DECISIVE + 1) <= 1
+        jump.shown.tick.abs_diff(DECISIVE + 1) <= 1
             && words.contains("(key)")
             && words.ends_with("was lost")
     });
@@ -357,8 +374,12 @@ fn finds_the_way(number: usize) -> bool {
     let what = format!("{{ robot = \"{name}\", variable = \"blocked\", above = 0.5 }}");
     let answer = ask(&recorded, &what);
     answer.jumps.iter().any(|jump| {
-        let words = jump.cause.as_ref().map_or("", |cause| cause.what.as_str());
-        jump.tick.abs_diff(DECISIVE + 1) <= 1
+        let words = jump
+            .shown
+            .cause
+            .as_ref()
+            .map_or("", |cause| cause.what.as_str());
+        jump.shown.tick.abs_diff(DECISIVE + 1) <= 1
             && (words == format!("a guest blocked {name}") || words == "chance of guests")
     })
 }

@@ -8,7 +8,7 @@ use serde::Serialize;
 use timeline::RunDecision;
 
 /// Folder with the answers, in the folder of the run.
-const FOLDER: &str = "why";
+pub const ANSWERS: &str = "why";
 /// Most answers of a run that are shown.
 const MAX_ANSWERS: usize = 16;
 /// Most bytes of an answer.
@@ -28,12 +28,12 @@ impl RunDecisions {
     #[must_use]
     pub fn read(run: &Path) -> Self {
         let mut found = Self::default();
-        let mut files = match answer_files(&run.join(FOLDER)) {
+        let mut files = match answer_files(&run.join(ANSWERS)) {
             Ok(files) => files,
             Err(error) => {
                 found
                     .notes
-                    .push(format!("The folder {FOLDER} cannot be read: {error}."));
+                    .push(format!("The folder {ANSWERS} cannot be read: {error}."));
                 return found;
             }
         };
@@ -50,7 +50,7 @@ impl RunDecisions {
                 Err(reason) => {
                     let name = file.file_name().unwrap_or_default().to_string_lossy();
                     found.notes.push(format!(
-                        "{FOLDER}/{name} cannot be shown: {reason}. cars why writes it anew."
+                        "{ANSWERS}/{name} cannot be shown: {reason}. cars why writes it anew."
                     ));
                 }
             }
@@ -118,7 +118,7 @@ mod tests {
     fn answers_are_read_and_what_is_damaged_is_said() {
         let run = tempfile::tempdir().unwrap();
         assert!(RunDecisions::read(run.path()).notes.is_empty());
-        let folder = run.path().join(FOLDER);
+        let folder = run.path().join(ANSWERS);
         fs::create_dir(&folder).unwrap();
         fs::write(folder.join("a.json"), ANSWER).unwrap();
         fs::write(folder.join("a.jsonl"), "{}").unwrap();
@@ -145,7 +145,7 @@ mod tests {
     #[test]
     fn no_more_answers_than_can_be_shown_are_read() {
         let run = tempfile::tempdir().unwrap();
-        let folder = run.path().join(FOLDER);
+        let folder = run.path().join(ANSWERS);
         fs::create_dir(&folder).unwrap();
         for index in 10..10 + MAX_ANSWERS + 3 {
             fs::write(folder.join(format!("{index}.json")), ANSWER).unwrap();

@@ -25,7 +25,7 @@ pub use content::{
     Frame, Header, Json, PlacedRobot, RawTick, RecordedTick, TickEvents, TickView, WallTimes,
 };
 pub use damage::RecordingError;
-pub use decisions::RunDecisions;
+pub use decisions::{ANSWERS, RunDecisions};
 pub use read::Recording;
 pub use shown::LastReports;
 pub use ticks::Ticks;

@@ -62,7 +62,7 @@ pub(super) fn write_decisions(page: &mut Page, decisions: &RunDecisions) {
 fn figure(decision: &RunDecision) -> Figure {
     let chart = OutcomeCurve(decision.clone());
     let begin = decision.curve.first().map(|point| {
-        let amount = decision.amount_with_interval(&point.outcome);
+        let amount = point.outcome.in_words_with_count(decision.is_share);
         format!(" At the beginning it is {amount} forks.")
     });
     let caption = format!(

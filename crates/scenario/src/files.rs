@@ -25,7 +25,7 @@ pub const OPERATOR_CONFIG: &str = "operator_config";
 /// The changes of real links that `cars net play` made.
 pub const LINKS: &str = "links.jsonl";
 /// Folder with the answers of `cars why`, and with the outcomes of forks from which they are made.
-pub const WHY: &str = "why";
+pub const WHY: &str = recording::ANSWERS;
 pub use protocol::name::LATEST;
 
 /// Why a name cannot be that of the log.

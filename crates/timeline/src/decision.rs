@@ -159,48 +159,19 @@ impl RunDecision {
     /// Outcomes in words: a share in percent.
     #[must_use]
     pub fn amount(&self, outcomes: &ForkOutcomes) -> String {
-        let value = outcomes.value.map(|value| self.number(value));
-        value.unwrap_or_else(|| "no number".to_owned())
+        outcomes.value.map_or_else(none, |value| self.number(value))
     }
 
     /// An outcome in words: a share in percent.
     #[must_use]
     pub fn number(&self, value: f64) -> String {
-        if self.is_share {
-            format!("{:.0} %", value * 100.0)
-        } else {
-            short(value)
-        }
-    }
-
-    /// Outcomes in words, with interval and number of forks.
-    #[must_use]
-    pub fn amount_with_interval(&self, outcomes: &ForkOutcomes) -> String {
-        let value = self.amount(outcomes);
-        let number = |value: f64| {
-            if self.is_share {
-                format!("{:.0}", value * 100.0)
-            } else {
-                short(value)
-            }
-        };
-        match (outcomes.low, outcomes.high) {
-            (Some(low), Some(high)) => {
-                format!(
-                    "{value} ({} to {}), n = {}",
-                    number(low),
-                    number(high),
-                    outcomes.n
-                )
-            }
-            _ => format!("{value}, n = {}", outcomes.n),
-        }
+        outcome_in_words(value, self.is_share)
     }
 
     /// A jump in words.
     #[must_use]
     pub fn told(&self, jump: &DecisionJump) -> String {
-        let time = short(time_s(jump.tick, self.tick_s));
+        let time = outcome_in_words(time_s(jump.tick, self.tick_s), false);
         let (before, after) = (self.amount(&jump.before), self.amount(&jump.after));
         let mut text = format!("{time} s, tick {}: {before} → {after}", jump.tick);
         if let Some(cause) = &jump.cause {
@@ -220,6 +191,26 @@ impl ForkOutcomes {
             self.low.unwrap_or(value).min(value),
             self.high.unwrap_or(value).max(value),
         ))
+    }
+
+    /// In words: the value and its interval, `12 % (8 to 16)` of shares.
+    #[must_use]
+    pub fn in_words(&self, is_share: bool) -> String {
+        let Some(value) = self.value else {
+            return none();
+        };
+        let value = outcome_in_words(value, is_share);
+        let end = |end| in_unit(end, is_share);
+        match self.low.zip(self.high) {
+            Some((low, high)) => format!("{value} ({} to {})", end(low), end(high)),
+            None => value,
+        }
+    }
+
+    /// In words, with the number of forks: `12 % (8 to 16), n = 200`.
+    #[must_use]
+    pub fn in_words_with_count(&self, is_share: bool) -> String {
+        format!("{}, n = {}", self.in_words(is_share), self.n)
     }
 
     fn check(&self, tick: Tick) -> Result<(), String> {
@@ -248,11 +239,24 @@ impl DecisionJump {
     }
 }
 
-/// A number with at most three decimals.
-fn short(value: f64) -> String {
+/// An outcome in words: a share in percent, any other number with at most three decimals.
+#[must_use]
+pub fn outcome_in_words(value: f64, is_share: bool) -> String {
+    let unit = if is_share { " %" } else { "" };
+    in_unit(value, is_share) + unit
+}
+
+fn in_unit(value: f64, is_share: bool) -> String {
+    if is_share {
+        return format!("{:.0}", value * 100.0);
+    }
     let text = format!("{value:.3}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
     if text == "-0" { "0" } else { text }.to_owned()
+}
+
+fn none() -> String {
+    "no number".to_owned()
 }
 
 fn check_count(what: &str, count: usize, most: usize) -> Result<(), String> {
@@ -334,13 +338,10 @@ mod tests {
         let expected = "30 s, tick 60: 12 % → 94 %, because command 9 was lost; without it 10 %";
         assert_eq!(told, expected);
         let outcome = decision.jumps[0].before;
-        assert_eq!(
-            decision.amount_with_interval(&outcome),
-            "12 % (8 to 16), n = 200"
-        );
+        assert_eq!(outcome.in_words_with_count(true), "12 % (8 to 16), n = 200");
 
         decision.is_share = false;
-        let words = decision.amount_with_interval(&outcome);
+        let words = outcome.in_words_with_count(false);
         assert_eq!(words, "0.12 (0.08 to 0.16), n = 200");
         let (low, high) = decision.range();
         assert!((low - 0.08).abs() < 1e-9 && (high - 0.98).abs() < 1e-9);

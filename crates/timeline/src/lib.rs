@@ -18,6 +18,7 @@ mod span;
 pub use counts::{Counts, LinkCounts, RobotCounts, StateCounts};
 pub use decision::{
     DecisionCause, DecisionJump, DecisionPoint, DecisionQuestion, ForkOutcomes, RunDecision,
+    outcome_in_words,
 };
 pub use fold::Timeline;
 pub use names::StateOrder;

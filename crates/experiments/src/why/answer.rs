@@ -3,11 +3,12 @@
 use protocol::{RunName, Tick};
 use serde::{Deserialize, Serialize};
 use statistics::Estimate;
+use timeline::{DecisionJump, DecisionPoint, ForkOutcomes};
 
 use super::plan::ForkPlan;
 use super::question::Question;
 
-/// What decided a run.
+/// What decided a run. What is shown of it is read as [`RunDecision`](timeline::RunDecision).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct WhyAnswer {
     /// Version of the program.
@@ -27,7 +28,7 @@ pub struct WhyAnswer {
     /// The last tick of the run.
     pub last: Tick,
     /// The expected outcome after ticks, in their order.
-    pub curve: Vec<CurvePoint>,
+    pub curve: Vec<DecisionPoint>,
     /// The ticks in which it jumps, in their order.
     pub jumps: Vec<Jump>,
     /// What the kinds of chance can change, each by itself from the first tick on.
@@ -44,78 +45,35 @@ pub struct WhyAnswer {
     pub sentence: String,
 }
 
-/// The expected outcome of a number of forks, with its interval of 95 %.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct ForkEstimate {
-    /// The forks with an outcome.
-    pub n: usize,
-    /// Their mean; `None` without one.
-    pub value: Option<f64>,
-    /// Lower end, if there is an interval.
-    pub low: Option<f64>,
-    /// Upper end.
-    pub high: Option<f64>,
-}
-
-impl ForkEstimate {
-    /// The estimate of outcomes, of which some forks have none.
-    #[must_use]
-    pub fn of(outcomes: &[Option<f64>], is_share: bool) -> Self {
-        let values: Vec<f64> = outcomes.iter().flatten().copied().collect();
-        let estimate = if is_share {
-            let ones = values.iter().filter(|value| **value == 1.0).count();
-            Estimate::share(ones, values.len())
-        } else {
-            Estimate::mean(&values)
-        };
-        let bounds = estimate.bounds();
-        Self {
-            n: values.len(),
-            value: estimate.value.is_finite().then_some(estimate.value),
-            low: bounds.map(|(low, _)| low),
-            high: bounds.map(|(_, high)| high),
-        }
+/// What outcomes of forks give, of which some have none.
+#[must_use]
+pub(super) fn outcomes_of(outcomes: &[Option<f64>], is_share: bool) -> ForkOutcomes {
+    let values: Vec<f64> = outcomes.iter().flatten().copied().collect();
+    let estimate = if is_share {
+        let ones = values.iter().filter(|value| **value == 1.0).count();
+        Estimate::share(ones, values.len())
+    } else {
+        Estimate::mean(&values)
+    };
+    let bounds = estimate.bounds();
+    ForkOutcomes {
+        n: values.len() as u64,
+        value: estimate.value.is_finite().then_some(estimate.value),
+        low: bounds.map(|(low, _)| low),
+        high: bounds.map(|(_, high)| high),
     }
-}
-
-/// The expected outcome after a tick.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct CurvePoint {
-    /// The tick.
-    pub tick: Tick,
-    /// The estimate; of the last tick, the outcome itself, without an interval.
-    #[serde(flatten)]
-    pub outcome: ForkEstimate,
 }
 
 /// A tick in which the expected outcome jumps.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Jump {
-    /// The tick.
-    pub tick: Tick,
-    /// The expected outcome after the tick before, from forks that took no part in finding the jump.
-    pub before: ForkEstimate,
-    /// The expected outcome after the tick.
-    pub after: ForkEstimate,
+    /// What is shown of it. The outcomes on both sides are those of forks that took no part in finding it.
+    #[serde(flatten)]
+    pub shown: DecisionJump,
     /// The p value of the difference, after Holm's correction for all ticks that were tested.
     pub p: f64,
-    /// What happened in the tick, in words.
-    pub events: Vec<String>,
-    /// What caused it, if one event or one kind of chance did.
-    pub cause: Option<JumpCause>,
     /// Each cause that was tried.
     pub tried: Vec<TriedCause>,
-}
-
-/// The cause of a jump.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct JumpCause {
-    /// In words.
-    pub what: String,
-    /// Whether it is an event; else it is a kind of chance.
-    pub is_event: bool,
-    /// The expected outcome without it.
-    pub without: ForkEstimate,
 }
 
 /// A cause that was tried.
@@ -126,7 +84,7 @@ pub struct TriedCause {
     /// The forks without it.
     pub plan: ForkPlan,
     /// The expected outcome without it.
-    pub without: ForkEstimate,
+    pub without: ForkOutcomes,
     /// The p value of the difference to the expected outcome after the tick, after Holm's correction for all causes of the jump.
     pub p: f64,
     /// Whether the outcome is restored without it: at least half of the jump is gone.
@@ -139,7 +97,7 @@ pub struct KindEffect {
     /// The kind.
     pub kind: String,
     /// The share of forks with another outcome than the run, if only this kind is another one from the first tick on.
-    pub changed: ForkEstimate,
+    pub changed: ForkOutcomes,
 }
 
 /// What something that the scenario plans changes.
@@ -150,9 +108,9 @@ pub struct PlannedEffect {
     /// The tick in which it begins.
     pub tick: Tick,
     /// The expected outcome with it.
-    pub with: ForkEstimate,
+    pub with: ForkOutcomes,
     /// The expected outcome without it.
-    pub without: ForkEstimate,
+    pub without: ForkOutcomes,
     /// The p value of the difference, after Holm's correction for all that the scenario plans.
     pub p: f64,
     /// Whether it matters.

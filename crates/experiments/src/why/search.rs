@@ -11,10 +11,9 @@ use lab::LabError;
 use protocol::Tick;
 use scenario::ChanceKind;
 use statistics::{SignFlip, holm};
+use timeline::{DecisionCause, DecisionJump, DecisionPoint, ForkOutcomes};
 
-use super::answer::{
-    CurvePoint, ForkEstimate, Jump, JumpCause, KindEffect, PlannedEffect, TriedCause,
-};
+use super::answer::{Jump, KindEffect, PlannedEffect, TriedCause, outcomes_of};
 use super::plan::{Counterfactual, ForkPlan};
 
 /// Points of the curve at first, beside tick 0.
@@ -77,7 +76,7 @@ pub(super) struct SearchedRun<'a> {
 /// What was found.
 #[derive(Debug, Default)]
 pub(super) struct FoundJumps {
-    pub(super) curve: Vec<CurvePoint>,
+    pub(super) curve: Vec<DecisionPoint>,
     pub(super) jumps: Vec<Jump>,
     pub(super) kinds: Vec<KindEffect>,
     pub(super) planned: Vec<PlannedEffect>,
@@ -298,12 +297,14 @@ impl Search<'_> {
             }
             let is_share = self.run.is_share;
             let mut jump = Jump {
-                tick,
-                before: ForkEstimate::of(&before, is_share),
-                after: ForkEstimate::of(&after, is_share),
+                shown: DecisionJump {
+                    tick,
+                    before: outcomes_of(&before, is_share),
+                    after: outcomes_of(&after, is_share),
+                    events: (self.run.events)(tick),
+                    cause: None,
+                },
                 p,
-                events: (self.run.events)(tick),
-                cause: None,
                 tried: Vec::new(),
             };
             self.explain(&mut jump, &after, change)?;
@@ -328,7 +329,7 @@ impl Search<'_> {
         after: &[Option<f64>],
         change: f64,
     ) -> Result<(), LabError> {
-        let tick = jump.tick;
+        let tick = jump.shown.tick;
         let mut plans: Vec<(String, ForkPlan)> = Vec::new();
         for (what, event) in (self.run.candidates)(tick) {
             plans.push((what, ForkPlan::Without { tick, event }));
@@ -365,12 +366,12 @@ impl Search<'_> {
             jump.tried.push(TriedCause {
                 what,
                 plan,
-                without: ForkEstimate::of(&without, self.run.is_share),
+                without: outcomes_of(&without, self.run.is_share),
                 p,
                 restores,
             });
         }
-        jump.cause = best.map(|(is_event, _, index)| JumpCause {
+        jump.shown.cause = best.map(|(is_event, _, index)| DecisionCause {
             what: jump.tried[index].what.clone(),
             is_event,
             without: jump.tried[index].without,
@@ -396,7 +397,7 @@ impl Search<'_> {
                 .collect();
             effects.push(KindEffect {
                 kind: kind.to_string(),
-                changed: ForkEstimate::of(&changed, true),
+                changed: outcomes_of(&changed, true),
             });
         }
         Ok(effects)
@@ -422,8 +423,8 @@ impl Search<'_> {
             effects.push(PlannedEffect {
                 what: what.clone(),
                 tick: *tick,
-                with: ForkEstimate::of(&with, self.run.is_share),
-                without: ForkEstimate::of(&without, self.run.is_share),
+                with: outcomes_of(&with, self.run.is_share),
+                without: outcomes_of(&without, self.run.is_share),
                 p: 1.0,
                 matters: mean(&change).abs() >= least_jump,
             });
@@ -435,20 +436,20 @@ impl Search<'_> {
         Ok(effects)
     }
 
-    fn curve(&self) -> Vec<CurvePoint> {
+    fn curve(&self) -> Vec<DecisionPoint> {
         let is_share = self.run.is_share;
-        let mut curve: Vec<CurvePoint> = self
+        let mut curve: Vec<DecisionPoint> = self
             .points
             .iter()
-            .map(|(&tick, outcomes)| CurvePoint {
+            .map(|(&tick, outcomes)| DecisionPoint {
                 tick,
-                outcome: ForkEstimate::of(outcomes, is_share),
+                outcome: outcomes_of(outcomes, is_share),
             })
             .collect();
-        curve.push(CurvePoint {
+        curve.push(DecisionPoint {
             tick: self.run.last,
-            outcome: ForkEstimate {
-                n: usize::from(self.run.recorded.is_some()),
+            outcome: ForkOutcomes {
+                n: u64::from(self.run.recorded.is_some()),
                 value: self.run.recorded,
                 low: None,
                 high: None,
@@ -567,7 +568,7 @@ mod tests {
             };
             // The rest is decided by chance in the last tick.
             let jumps = jumps(case, 1.0, &probability);
-            found += u64::from(jumps.iter().any(|jump| jump.tick == at));
+            found += u64::from(jumps.iter().any(|jump| jump.shown.tick == at));
         }
         assert!(found * 100 >= CASES * 95, "{found} of {CASES}");
     }

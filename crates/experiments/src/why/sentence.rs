@@ -2,7 +2,9 @@
 
 use protocol::time::time_s;
 
-use super::answer::{ForkEstimate, Jump, WhyAnswer};
+use timeline::{DecisionJump, ForkOutcomes, outcome_in_words};
+
+use super::answer::WhyAnswer;
 use super::question::Question;
 
 /// How near the expected outcome after tick 0 must be to that of the run, so that the run was decided from the start.
@@ -32,7 +34,7 @@ impl WhyAnswer {
             text += &self.without_jumps();
         } else {
             // The largest change first: that is what decided it.
-            let mut jumps: Vec<&Jump> = self.jumps.iter().collect();
+            let mut jumps: Vec<&DecisionJump> = self.jumps.iter().map(|jump| &jump.shown).collect();
             jumps.sort_by(|one, other| size(other).total_cmp(&size(one)));
             text += "It was decided ";
             let told: Vec<String> = jumps.iter().take(3).map(|jump| self.told(jump)).collect();
@@ -100,16 +102,16 @@ impl WhyAnswer {
 
     fn number_in_words(&self, name: &str) -> String {
         match self.recorded {
-            Some(value) => format!("{name} is {}", short(value)),
+            Some(value) => format!("{name} is {}", outcome_in_words(value, false)),
             None => format!("{name} has no number"),
         }
     }
 
     /// What happened in a tick.
-    fn told(&self, jump: &Jump) -> String {
+    fn told(&self, jump: &DecisionJump) -> String {
         let mut text = format!(
             "at {} s (tick {}): {} -> {}",
-            short(time_s(jump.tick, self.tick_s)),
+            outcome_in_words(time_s(jump.tick, self.tick_s), false),
             jump.tick,
             self.amount(&jump.before),
             self.amount(&jump.after)
@@ -134,39 +136,16 @@ impl WhyAnswer {
         text
     }
 
-    /// An estimate with its interval.
-    fn amount(&self, estimate: &ForkEstimate) -> String {
-        let Some(value) = estimate.value else {
-            return "unknown".to_owned();
-        };
-        let number = |value: f64| {
-            if self.is_share {
-                format!("{:.0}", value * 100.0)
-            } else {
-                short(value)
-            }
-        };
-        let unit = if self.is_share { " %" } else { "" };
-        match (estimate.low, estimate.high) {
-            (Some(low), Some(high)) => format!(
-                "{}{unit} ({} to {})",
-                number(value),
-                number(low),
-                number(high)
-            ),
-            _ => format!("{}{unit}", number(value)),
+    /// Outcomes with their interval.
+    fn amount(&self, outcomes: &ForkOutcomes) -> String {
+        match outcomes.value {
+            Some(_) => outcomes.in_words(self.is_share),
+            None => "unknown".to_owned(),
         }
     }
 }
 
-fn size(jump: &Jump) -> f64 {
+fn size(jump: &DecisionJump) -> f64 {
     let change = jump.after.value.zip(jump.before.value);
     change.map_or(0.0, |(after, before)| (after - before).abs())
-}
-
-/// A number with at most three decimals.
-fn short(value: f64) -> String {
-    let text = format!("{value:.3}");
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    text.to_owned()
 }
