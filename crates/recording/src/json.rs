@@ -57,9 +57,16 @@ fn hundredths(value: f64) -> Option<u32> {
 /// The last `N` digits of a number.
 fn digits<const N: usize>(mut number: u32) -> [u8; N] {
     let mut digits = [b'0'; N];
-    for digit in digits.iter_mut().rev() {
-        *digit = b'0' + (number % 10) as u8;
-        number /= 10;
+    // By pairs: half the divisions.
+    for pair in digits.rchunks_mut(2) {
+        let last = (number % 100) as u8;
+        number /= 100;
+        if let [tens, ones] = pair {
+            *tens = b'0' + last / 10;
+            *ones = b'0' + last % 10;
+        } else {
+            pair[0] = b'0' + last % 10;
+        }
     }
     digits
 }

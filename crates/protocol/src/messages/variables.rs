@@ -152,7 +152,7 @@ impl StateVariables {
 
     /// The variables of entries in any order. Of several with the same name the last one counts.
     fn from_entries(mut entries: Vec<Entry>) -> Self {
-        let is_sorted = entries.is_sorted_by(|(one, _), (next, _)| one < next);
+        let is_sorted = entries.is_sorted_by(|(one, _), (next, _)| one.as_str() < next.as_str());
         if !is_sorted {
             entries.reverse();
             entries.sort_by(|(one, _), (other, _)| one.cmp(other));
@@ -195,7 +195,11 @@ impl StateVariables {
         let mut entries = Vec::with_capacity(self.len() + added.size_hint().1.unwrap_or(USUAL));
         let mut own = Arc::unwrap_or_clone(self.0).into_iter().peekable();
 
+        let mut is_sorted = true;
+        let mut before = None;
         for (name, value) in added {
+            is_sorted &= before < Some(name);
+            before = Some(name);
             while let Some(entry) = own.next_if(|(entry, _)| entry.as_str() < name) {
                 entries.push(entry);
             }
@@ -203,7 +207,12 @@ impl StateVariables {
             entries.push((SmolStr::new_static(name), value));
         }
         entries.extend(own);
-        Self::from_entries(entries)
+
+        if is_sorted {
+            Self(Arc::new(entries))
+        } else {
+            Self::from_entries(entries)
+        }
     }
 
     /// Keeps the variables for which `is_kept` returns true. It is called once for each, in the order of the names.
