@@ -145,7 +145,7 @@ def test_words_of_commands_and_cuts_are_within_the_plan(launch, open_page):
             const envelopes = [];
             const calls = {fillText: written, rect: envelopes};
             const context = new Proxy({}, {get: (_, name) => (...all) => void calls[name]?.push(all), set: () => true});
-            const flight = {text: 'bring the pencils to the hall', fate: 'sent', progress: 0, faded: 0};
+            const flight = {text: 'bring the pencils to the hall', fate: 'sent', progress: 0, faded: 0, isNamed: true};
             const taken = {words: [], robots: []}, pen = {context, camera, theme: readTheme()};
             draw.cut(pen, {x: 0, y: 5}, {x: 1, y: 5}, 'Butler → Leguin', taken.words);
             for (const x of [0, 10]) draw.flight(pen, flight, {x, y: 5}, {x: 5, y: 5}, taken);
