@@ -3,7 +3,7 @@
 
 use std::ops::RangeInclusive;
 
-use protocol::pattern::{overlap, split_range};
+use protocol::pattern::{self, split_range};
 
 /// The name of a robot of a table with a count or a range.
 #[must_use]
@@ -36,7 +36,7 @@ fn numbers(element: &toml::Value) -> Option<RangeInclusive<usize>> {
 /// If the robots of a table of this name are not numbered from 1.
 pub(crate) fn count_ranges(robots: &mut [toml::Value], pattern: &str) -> Result<(), String> {
     for element in robots {
-        let Some(base) = name(element).filter(|base| overlap(pattern, base)) else {
+        let Some(base) = name(element).filter(|base| pattern::matches(pattern, base)) else {
             continue;
         };
         let base = base.to_owned();
@@ -64,9 +64,9 @@ pub(crate) fn matches(element: &toml::Value, pattern: &str) -> bool {
         return false;
     };
     match numbers(element) {
-        None => overlap(pattern, name),
+        None => pattern::matches(pattern, name),
         Some(numbers) if numbers.is_empty() => false,
-        Some(numbers) => overlap(pattern, &member(name, *numbers.start())),
+        Some(numbers) => pattern::matches(pattern, &member(name, *numbers.start())),
     }
 }
 
@@ -84,7 +84,7 @@ pub(crate) fn separate(robots: &mut Vec<toml::Value>, have_classes: bool, patter
             return false;
         }
         let count = numbers.clone().count();
-        let named = numbers.filter(|number| overlap(pattern, &member(name, *number)));
+        let named = numbers.filter(|number| pattern::matches(pattern, &member(name, *number)));
         let named = named.count();
         named > 0 && named < count
     });

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use protocol::pattern::{is_pattern, overlap};
+use protocol::pattern::{is_pattern, overlap, path_parts, split_range};
 
 use crate::bulk;
 use crate::diagnostic::{FileError, Source};
@@ -38,28 +38,28 @@ impl std::str::FromStr for Override {
     type Err = String;
 
     /// Parses `path=value`. The parts of the path are joined by `.`; an element of a list is named by its `name` or its index
-    /// from 0, as in `robot.Butler.params.refiller=Vonda`, and several by a pattern, as in `robot.S*.on_late=abort`. A value
-    /// that is not TOML is a text.
+    /// from 0, as in `robot.Butler.params.refiller=Vonda`, and several by a pattern, as in `robot.S*.on_late=abort` or
+    /// `robot.S{2..3}.on_late=abort`. A value that is not TOML is a text.
     fn from_str(text: &str) -> Result<Self, String> {
         let (path, value) = text
             .split_once('=')
             .ok_or_else(|| format!("{text:?} is not of the form path=value"))?;
-        let path: Vec<String> = path.trim().split('.').map(str::to_owned).collect();
+        let path = path_parts(path.trim());
 
-        if path.iter().any(String::is_empty) {
+        if path.iter().any(|part| part.is_empty()) {
             return Err(format!("{text:?}: a part of the path is empty"));
         }
 
-        if let Some(part) = path.iter().find(|part| !is_key(part)) {
-            return Err(format!(
-                "{text:?} is not of the form path=value: {part:?} is not a key"
-            ));
+        for part in &path {
+            let base = split_range(part)?.map_or(*part, |(base, _)| base);
+            if !is_key(base) {
+                return Err(format!(
+                    "{text:?} is not of the form path=value: {part:?} is not a key"
+                ));
+            }
         }
 
-        Ok(Self {
-            path,
-            value: parse_value(value),
-        })
+        Ok(Self::new(&path, parse_value(value)))
     }
 }
 
@@ -343,6 +343,20 @@ mod tests {
         let given = |index: usize| changed["robot"][index].get("params").is_some();
         assert_eq!([given(0), given(1), given(2)], [true, true, false]);
 
+        let change: Override = "robot.S{2..3}.params.k=2".parse().unwrap();
+        assert_eq!(change.to_string().parse(), Ok(change.clone()));
+        let changed = change.apply(file.parse().unwrap()).unwrap();
+        let given = |index: usize| changed["robot"][index].get("params").is_some();
+        assert_eq!([given(0), given(1), given(2)], [false, true, false]);
+        for wrong in [
+            "robot.S{3..2}.k=1",
+            "robot.S{2..3.k=1",
+            "robot.S{2..3}x.k=1",
+        ] {
+            let error = wrong.parse::<Override>().unwrap_err();
+            assert!(error.contains("range"), "{error}");
+        }
+
         for (change, reason) in [
             (
                 "robot.X*.params.k=2",
@@ -371,6 +385,8 @@ mod tests {
             ("robot.S*.params.x=1", "robot.*1.params.x=1", true),
             ("robot.S*.params.x=1", "robot.Butler.params.x=1", false),
             ("robot.S*.params.x=1", "robot.S.count=1", false),
+            ("robot.S{2..3}.params.x=1", "robot.S3.params.x=1", true),
+            ("robot.S{2..3}.params.x=1", "robot.S4.params.x=1", false),
         ] {
             let one: Override = one.parse().unwrap();
             let other: Override = other.parse().unwrap();

@@ -1,5 +1,6 @@
 //! State variables that rise with progress, each with the robots that have it: `Butler.served`, `S*.trips`, `S{1..20}.trips`.
 
+use protocol::pattern::path_parts;
 use protocol::{RobotName, RobotPattern};
 use serde::Deserialize;
 
@@ -24,13 +25,13 @@ impl TryFrom<String> for Counter {
     type Error = NoCounter;
 
     fn try_from(text: String) -> Result<Self, NoCounter> {
-        let parts = split_first(&text);
-        let counter = parts.and_then(|(robots, variable)| {
-            Some(Self {
-                robots: RobotPattern::new(robots).ok()?,
-                variable: variable.to_owned(),
-            })
-        });
+        let counter = match path_parts(&text)[..] {
+            [robots, _, ..] => RobotPattern::new(robots).ok().map(|pattern| Self {
+                robots: pattern,
+                variable: text[robots.len() + 1..].to_owned(),
+            }),
+            _ => None,
+        };
 
         counter.ok_or(NoCounter(text))
     }
@@ -50,33 +51,6 @@ pub(crate) fn each(counters: &[Counter], roster: &[RobotName]) -> Vec<(RobotName
         each.extend(robots.map(|robot| (robot.clone(), counter.variable.clone())));
     }
     each
-}
-
-/// Splits a text at its first dot that is not in a range of numbers such as `{1..20}`.
-fn split_first(text: &str) -> Option<(&str, &str)> {
-    let mut is_in_range = false;
-    for (index, letter) in text.char_indices() {
-        match letter {
-            '{' => is_in_range = true,
-            '}' => is_in_range = false,
-            '.' if !is_in_range => return Some((&text[..index], &text[index + 1..])),
-            _ => {}
-        }
-    }
-    None
-}
-
-/// The parts of a path that is joined by dots, as in `robots.S{1..20}.received`.
-#[must_use]
-pub fn path_parts(path: &str) -> Vec<&str> {
-    let mut parts = Vec::new();
-    let mut rest = path;
-    while let Some((part, after)) = split_first(rest) {
-        parts.push(part);
-        rest = after;
-    }
-    parts.push(rest);
-    parts
 }
 
 #[cfg(test)]
@@ -107,19 +81,5 @@ mod tests {
         }
         let dotted = Counter::try_from("A.x.y".to_owned()).unwrap();
         assert_eq!(dotted.variable, "x.y");
-    }
-
-    #[test]
-    fn ranges_in_paths_stay_whole() {
-        for (path, parts) in [
-            ("ticks", &["ticks"][..]),
-            (
-                "robots.S{1..20}.sent.*",
-                &["robots", "S{1..20}", "sent", "*"],
-            ),
-            ("a..b", &["a", "", "b"]),
-        ] {
-            assert_eq!(path_parts(path), parts);
-        }
     }
 }

@@ -24,7 +24,7 @@ use protocol::{Event, RobotName, Tick};
 pub use combine::By;
 pub use comparison::{TestError, ValueBounds, ValueTest};
 pub use condition::{Evaluation, TickCondition, TickConditionError};
-pub use counter::{Counter, NoCounter, path_parts};
+pub use counter::{Counter, NoCounter};
 pub use expect::{Expectation, Judgment, Monitor, Monitors};
 pub use expression::{Expression, ExpressionError};
 pub use live::{Measurements, ScenarioMeasure, WrongMeasure, check_measures};

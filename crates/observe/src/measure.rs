@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use config::units::Time;
+use protocol::pattern::path_parts;
 use protocol::{RobotName, RobotPattern};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{MapAccess, SeqAccess, Visitor};
@@ -12,7 +13,7 @@ use toml::Spanned;
 use crate::combine::By;
 use crate::comparison::{TestError, TestTable};
 use crate::condition::TickCondition;
-use crate::counter::{Counter, path_parts};
+use crate::counter::Counter;
 use crate::expression::Expression;
 use crate::pattern::{Pattern, PatternError};
 use crate::quantity::{

@@ -3,13 +3,14 @@
 use std::collections::BTreeMap;
 
 use protocol::pattern::matches;
+use protocol::pattern::path_parts;
 use protocol::time::time_s;
 use protocol::{Event, RobotName, Tick};
 use serde_json::Value;
 
 use crate::combine::{By, truth};
 use crate::condition::Evaluation;
-use crate::counter::{self, path_parts};
+use crate::counter;
 use crate::expression::Expression;
 use crate::measure::{
     Between, Count, Measure, MeasureSource, Measured, Number, OfDurations, Parts, When,

@@ -12,6 +12,10 @@ use crate::name::{BadName, RobotName};
 const ANY: char = '*';
 /// How a range of numbers begins.
 const OPEN: char = '{';
+/// How it ends.
+const CLOSE: char = '}';
+/// Most numbers of a range that are compared one by one with another pattern.
+const MAX_TRIED: usize = 10_000;
 /// Largest number of a range.
 const MAX_NUMBER: usize = 1_000_000;
 
@@ -47,7 +51,7 @@ impl RobotPattern {
     /// Whether it can match several names.
     #[must_use]
     pub fn is_open(&self) -> bool {
-        is_pattern(&self.0) || self.0.contains(OPEN)
+        is_pattern(&self.0)
     }
 
     /// The pattern as text.
@@ -84,10 +88,25 @@ impl fmt::Display for RobotPattern {
     }
 }
 
-/// Whether a text has a part that stands for any number of characters.
+/// Whether a text may stand for several names: it has a star or a range.
 #[must_use]
 pub fn is_pattern(text: &str) -> bool {
-    text.contains(ANY)
+    text.contains([ANY, OPEN])
+}
+
+/// The parts of a path that is joined by dots, as in `robots.S{1..20}.received`; the dots of a range join nothing.
+#[must_use]
+pub fn path_parts(path: &str) -> Vec<&str> {
+    let mut is_in_range = false;
+    let is_joint = |letter: char| {
+        match letter {
+            OPEN => is_in_range = true,
+            CLOSE => is_in_range = false,
+            _ => {}
+        }
+        letter == '.' && !is_in_range
+    };
+    path.split(is_joint).collect()
 }
 
 /// Splits a name such as `S{1..20}` into what comes before the range and its numbers, the last one among them; `None` for a name
@@ -100,7 +119,7 @@ pub fn split_range(name: &str) -> Result<Option<(&str, RangeInclusive<usize>)>, 
         return Ok(None);
     };
     let numbers = braces
-        .strip_suffix('}')
+        .strip_suffix(CLOSE)
         .and_then(|range| range.split_once(".."));
     let numbers = numbers.and_then(|(first, last)| {
         let number = |text: &str| plain_number(text).filter(|number| *number <= MAX_NUMBER);
@@ -144,9 +163,24 @@ pub fn matches(pattern: &str, name: &str) -> bool {
     })
 }
 
-/// Whether two patterns match a common text. A text without a star is a pattern that matches itself alone.
+/// Whether two patterns match a common text. A pattern without stars and range matches itself alone. A range of more than
+/// 10,000 numbers counts as a star.
 #[must_use]
 pub fn overlap(one: &str, other: &str) -> bool {
+    for (ranged, other) in [(one, other), (other, one)] {
+        if let Ok(Some((base, numbers))) = split_range(ranged) {
+            if numbers.clone().count() > MAX_TRIED {
+                return overlap(&format!("{base}{ANY}"), other);
+            }
+            return match is_pattern(other) {
+                true => numbers
+                    .into_iter()
+                    .any(|number| overlap(&format!("{base}{number}"), other)),
+                false => matches(ranged, other),
+            };
+        }
+    }
+
     let one: Vec<char> = one.chars().collect();
     let other: Vec<char> = other.chars().collect();
 
@@ -230,6 +264,40 @@ mod tests {
         ] {
             let refused = RobotPattern::new(bad).unwrap_err().to_string();
             assert!(refused.contains("is not a usable name"), "{refused}");
+        }
+    }
+
+    #[test]
+    fn a_range_overlaps_what_matches_one_of_its_numbers() {
+        for (one, other, overlaps) in [
+            ("S{2..3}", "S3", true),
+            ("S{2..3}", "S4", false),
+            ("S{2..3}", "*3", true),
+            ("S{2..3}", "S*4", false),
+            ("S{2..3}", "S{3..9}", true),
+            ("S{2..3}", "S{4..9}", false),
+            ("S{2..13}", "S1{0..9}", true),
+            ("S{2..10000}", "S{9999..20000}", true),
+            ("S{1..20000}", "S{30000..30001}", true),
+            ("S{1..20000}", "T{1..2}", false),
+            ("S*{1..2}", "T2", false),
+        ] {
+            assert_eq!(overlap(one, other), overlaps, "{one} and {other}");
+            assert_eq!(overlap(other, one), overlaps, "{other} and {one}");
+        }
+    }
+
+    #[test]
+    fn ranges_in_paths_stay_whole() {
+        for (path, parts) in [
+            ("ticks", &["ticks"][..]),
+            (
+                "robots.S{1..20}.sent.*",
+                &["robots", "S{1..20}", "sent", "*"],
+            ),
+            ("a..b", &["a", "", "b"]),
+        ] {
+            assert_eq!(path_parts(path), parts);
         }
     }
 

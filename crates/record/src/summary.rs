@@ -168,7 +168,7 @@ impl Summary {
     pub fn check_path(path: &str) -> Result<(), String> {
         let is_of = |number: &str| {
             let wanted: Vec<&str> = number.split('.').collect();
-            let given = observe::path_parts(path);
+            let given = protocol::pattern::path_parts(path);
             let mut parts = wanted.iter().zip(&given);
             wanted.len() == given.len()
                 && parts.all(|(wanted, given)| *wanted == "*" || wanted == given)

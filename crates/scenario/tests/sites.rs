@@ -5,7 +5,8 @@
 use std::path::Path;
 
 use protocol::messages::{
-    MAX_KNOWN_SITES, MAX_SITE_TEXT_BYTES, MAX_SITE_VARIABLES, MAX_SITES, Point, Variable,
+    MAX_KNOWN_SITES, MAX_SITE_TEXT_BYTES, MAX_SITE_VARIABLES, MAX_SITES, MAX_SITES_BYTES, Point,
+    StateVariables, Variable, site_bytes,
 };
 use scenario::diagnostic::{FileError, Source};
 use scenario::{Changes, OnConflict, Scenario};
@@ -187,6 +188,27 @@ fn a_site_that_cannot_be_is_refused_where_it_is_written() {
     }
     let most = BULK.replace("count = 3", &format!("count = {MAX_SITES}"));
     assert_eq!(parse(&most).unwrap().sites.len(), MAX_SITES);
+}
+
+#[test]
+fn all_sites_together_fit_into_half_a_message() {
+    let text = "x".repeat(200);
+    let state = StateVariables::from_iter([("label", Variable::from(text.as_str()))]);
+    // All names have the same length.
+    let most = MAX_SITES_BYTES / site_bytes("T100", "site", &state);
+    let sites = |count: usize| {
+        let names = format!("T{{100..{}}}", 99 + count);
+        format!(
+            "[[site]]\nname = \"{names}\"\nat = \"random\"\nrange = \"1 m\"\nstate = {{ label = \"{text}\" }}\n"
+        )
+    };
+    assert_eq!(parse(&sites(most)).unwrap().sites.len(), most);
+    let error = shown(&parse(&sites(most + 1)).unwrap_err());
+    let last = format!("the sites up to T{} take", 100 + most);
+    assert!(
+        error.contains(&last) && error.contains("hall.toml:1:"),
+        "{error}"
+    );
 }
 
 #[test]

@@ -11,7 +11,7 @@ use protocol::messages::{
     CommandText, Correction, Cut, Delivery, DriveLimits, End, FaultKind, GuestMood, HeldProcess,
     Intervention, NEWS_FLAGS, OnLate, Parameters, ParametersOffer, Point, Pose, ProcessOrder,
     PublicState, Report, SensedBody, SensedKind, SensedRobot, SensedSite, Standing, StateVariables,
-    Target, TickUpdate, Welcome,
+    Target, TickUpdate, Welcome, site_bytes,
 };
 use protocol::random::{Stream, stream};
 use protocol::{
@@ -25,7 +25,7 @@ use crate::guests::GuestState;
 use crate::layers::Layers;
 use crate::medium::{Arrival, ForcedVerdict, Medium, SentCommand};
 use crate::sensing::{Viewpoint, ranges_m};
-use crate::sites::{SiteOrders, Sites, most_bytes};
+use crate::sites::{SiteOrders, Sites};
 use scenario::{
     ChanceKind, Change, FaultEnd, Lateness, Override, Reseed, Scenario, to_wire, to_world,
 };
@@ -1278,7 +1278,7 @@ impl Simulation {
         for site in self.sites.near(to_wire(self.world.robots()[of])) {
             let what = format_args!("site/{}", site.name);
             if let Some(at) = viewpoint.senses(what, to_world(site.location), None) {
-                bytes += most_bytes(&site);
+                bytes += site_bytes(&site.name, &site.kind, &site.state);
                 if bytes > MAX_SITE_BYTES {
                     break;
                 }

@@ -7,8 +7,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::mem::discriminant;
 
 use protocol::messages::{
-    KnownSite, MAX_SITE_TEXT_BYTES, Point, SensedSite, SiteAction, SiteFrame, SiteRefusal,
-    SiteResult, StateVariables, Variable,
+    KnownSite, MAX_SITE_TEXT_BYTES, MAX_SITES_BYTES, Point, SensedSite, SiteAction, SiteFrame,
+    SiteRefusal, SiteResult, StateVariables, Variable, site_bytes,
 };
 use protocol::{Event, RobotName};
 use scenario::{OnConflict, Scenario, SiteSpec};
@@ -17,6 +17,8 @@ use scenario::{OnConflict, Scenario, SiteSpec};
 #[derive(Debug, Clone, Default)]
 pub struct Sites {
     sites: BTreeMap<String, Site>,
+    /// What all of them take in a frame at most, bytes.
+    bytes: usize,
     /// What became of the actions of the last tick, by robot.
     results: BTreeMap<RobotName, Vec<SiteResult>>,
 }
@@ -52,8 +54,10 @@ impl Sites {
             };
             (name.clone(), site)
         });
+        let sites: BTreeMap<_, _> = sites.collect();
         Self {
-            sites: sites.collect(),
+            bytes: sites.iter().map(|(name, site)| site.bytes(name)).sum(),
+            sites,
             results: BTreeMap::new(),
         }
     }
@@ -138,7 +142,14 @@ impl Sites {
         if at.distance_m(site.spec.at) > site.spec.range_m {
             return Err(SiteRefusal::OutOfRange);
         }
-        site.after(action)
+        let state = site.after(action)?;
+
+        let bytes = site_bytes(&action.site, &site.spec.kind, &state);
+        let others = self.bytes - site.bytes(&action.site);
+        match others + bytes <= MAX_SITES_BYTES {
+            true => Ok(state),
+            false => Err(SiteRefusal::TooLong),
+        }
     }
 
     /// Gives a site a state. Returns an event for each variable that has another value than before.
@@ -147,7 +158,9 @@ impl Sites {
             return Vec::new();
         };
 
+        self.bytes -= site.bytes(name);
         let before = std::mem::replace(&mut site.state, state);
+        self.bytes += site.bytes(name);
         let mut events = Vec::new();
         for ((key, from), (_, to)) in before.iter().zip(&site.state) {
             if from != to {
@@ -241,6 +254,11 @@ impl Sites {
 }
 
 impl Site {
+    /// What it takes in a frame at most.
+    fn bytes(&self, name: &str) -> usize {
+        site_bytes(name, &self.spec.kind, &self.state)
+    }
+
     fn has_changed(&self) -> bool {
         let mut now = self.state.iter();
         now.any(|(key, value)| {
@@ -302,20 +320,4 @@ impl Site {
             && variable.min.is_none_or(|min| number >= min)
             && variable.max.is_none_or(|max| number <= max)
     }
-}
-
-/// An upper bound of the bytes of a sensed site in a message.
-pub(crate) fn most_bytes(site: &SensedSite) -> usize {
-    /// Of a byte of a text, which JSON may escape.
-    const ESCAPED: usize = 6;
-    /// Of the names of fields, a number and its separators.
-    const FIELDS: usize = 120;
-    const VARIABLE: usize = 30;
-
-    let mut bytes = FIELDS + site.name.len() + site.kind.len();
-    for (key, value) in &site.state {
-        let text = value.as_str().map_or(0, str::len);
-        bytes += VARIABLE + key.len() + ESCAPED * text;
-    }
-    bytes
 }

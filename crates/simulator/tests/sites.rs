@@ -12,8 +12,8 @@ use actors::Actors;
 use lockstep::IncarnationNotice;
 use proptest::prelude::*;
 use protocol::messages::{
-    KnownSite, MAX_SITE_TEXT_BYTES, Point, Report, SiteAction, SiteRefusal, StateVariables,
-    Variable,
+    KnownSite, MAX_SITE_TEXT_BYTES, MAX_SITES_BYTES, Point, Report, SiteAction, SiteRefusal,
+    StateVariables, Variable,
 };
 use protocol::{RobotName, RunName};
 use scenario::Scenario;
@@ -393,6 +393,29 @@ fn news_hold_as_many_sites_as_fit() {
     );
     let bytes = protocol::encode(&news).len();
     assert!((20 * 1024..70 * 1024).contains(&bytes), "{bytes}");
+}
+
+#[test]
+fn texts_that_all_sites_have_no_room_for_are_refused() {
+    let text = "[[robot]]\nname = \"A\"\nat = [\"2 m\", \"2.5 m\"]\n[[site]]\nname = \"T\"\ncount = 1000\nat = [\"2 m\", \"2 m\"]\nrange = \"1 m\"\nstate = { label = \"\" }\n";
+    let mut sites = Sites::new(&scenario(text));
+    let worst = "\u{1}".repeat(MAX_SITE_TEXT_BYTES);
+    let mut label = |number: usize, text: &str| {
+        let action = SiteAction::set(format!("T{number}"), "label", text);
+        carry_out(&mut sites, &vec![(name("A"), vec![action])]);
+        let frame = protocol::encode(&sites.frames());
+        assert!(frame.len() <= MAX_SITES_BYTES, "{}", frame.len());
+        sites.results(&name("A"))[0].refused
+    };
+
+    let first_refused = (1..=1000).find(|number| label(*number, &worst).is_some());
+    let first_refused = first_refused.unwrap();
+    assert!((100..1000).contains(&first_refused), "{first_refused}");
+    assert_eq!(label(first_refused, &worst), Some(SiteRefusal::TooLong));
+    // What is given back is there for others.
+    assert_eq!(label(1, ""), None);
+    assert_eq!(label(first_refused, &worst), None);
+    assert_eq!(label(1, &worst), Some(SiteRefusal::TooLong));
 }
 
 #[test]

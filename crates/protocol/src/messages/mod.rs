@@ -42,7 +42,8 @@ pub use point::Point;
 pub use sensing::{MAX_RAYS, Rays};
 pub use site::{
     KnownSite, MAX_KNOWN_SITES, MAX_SITE_ACTIONS, MAX_SITE_TEXT_BYTES, MAX_SITE_VARIABLES,
-    MAX_SITES, SensedSite, SiteAction, SiteFrame, SiteRefusal, SiteResult,
+    MAX_SITES, MAX_SITES_BYTES, SensedSite, SiteAction, SiteFrame, SiteRefusal, SiteResult,
+    site_bytes,
 };
 pub use state::{Answer, PublicState};
 pub use static_world::{BodyShape, SensingLimits, StaticWorld};

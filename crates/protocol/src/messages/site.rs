@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::limits::{at_most, finite};
 use super::point::Point;
 use super::variables::{StateVariables, Variable, check_variables};
-use crate::codec::FieldError;
+use crate::codec::{FieldError, MAX_MESSAGE_BYTES};
 use crate::name::MAX_NAME_LEN;
 
 /// Most sites of a scenario.
@@ -18,6 +18,8 @@ pub const MAX_KNOWN_SITES: usize = 512;
 pub const MAX_SITE_VARIABLES: usize = 16;
 /// Longest text in the state of a site, in bytes.
 pub const MAX_SITE_TEXT_BYTES: usize = 256;
+/// Most bytes that the sites of a scenario may take together in a frame, by [`site_bytes`]: half of a message.
+pub const MAX_SITES_BYTES: usize = MAX_MESSAGE_BYTES / 2;
 /// Most actions on sites in a report.
 pub const MAX_SITE_ACTIONS: usize = 64;
 
@@ -172,7 +174,7 @@ pub enum SiteRefusal {
     UnknownKey,
     /// A variable of another kind: number, text and flag do not replace each other.
     OtherType,
-    /// The text is longer than a site holds.
+    /// The text is longer than a site holds, or all sites together would be longer than [`MAX_SITES_BYTES`].
     TooLong,
     /// The state is not as `only_if` has it.
     Condition,
@@ -212,6 +214,24 @@ impl std::fmt::Display for SiteRefusal {
             Self::Conflict => "another robot changes it in the same tick",
         })
     }
+}
+
+/// An upper bound of the bytes of a site in a message.
+#[must_use]
+pub fn site_bytes(name: &str, kind: &str, state: &StateVariables) -> usize {
+    /// Of a byte of a text, which JSON may escape.
+    const ESCAPED: usize = 6;
+    /// Of the names of fields, a place and their separators.
+    const FIELDS: usize = 120;
+    /// Of a number and its separators.
+    const VARIABLE: usize = 30;
+
+    let mut bytes = FIELDS + name.len() + kind.len();
+    for (key, value) in state {
+        let text = value.as_str().map_or(0, str::len);
+        bytes += VARIABLE + key.len() + ESCAPED * text;
+    }
+    bytes
 }
 
 /// A site as observers see it.

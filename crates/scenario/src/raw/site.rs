@@ -8,7 +8,8 @@ use config::units::Length;
 use config::{FileError, Source};
 use protocol::RobotName;
 use protocol::messages::{
-    MAX_KNOWN_SITES, MAX_SITE_TEXT_BYTES, MAX_SITE_VARIABLES, MAX_SITES, Point, Variable,
+    MAX_KNOWN_SITES, MAX_SITE_TEXT_BYTES, MAX_SITE_VARIABLES, MAX_SITES, MAX_SITES_BYTES, Point,
+    Variable, site_bytes,
 };
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
@@ -62,6 +63,7 @@ pub(super) fn check(
 ) -> Result<(BTreeMap<String, SiteSpec>, SiteSpans), FileError> {
     let mut sites = BTreeMap::new();
     let mut known = 0;
+    let mut bytes = 0;
     let mut spans = SiteSpans::new();
 
     for entry in raw {
@@ -100,6 +102,13 @@ pub(super) fn check(
             let spec = spec.clone().placed(&place, field_m);
             let spec =
                 spec.map_err(|reason| FileError::at(source, Some(table.at.span()), &reason))?;
+            bytes += site_bytes(name.as_str(), &spec.kind, &spec.start());
+            if bytes > MAX_SITES_BYTES {
+                let reason = format!(
+                    "the sites up to {name} take {bytes} bytes of a frame, more than the {MAX_SITES_BYTES} of all: fewer sites, fewer variables or shorter texts"
+                );
+                return Err(refuse(&reason));
+            }
             if sites.insert(name.to_string(), spec).is_some() {
                 return Err(refuse(&format!("a second site called {name}")));
             }
