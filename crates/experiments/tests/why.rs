@@ -53,6 +53,19 @@ impl Robot for Thrower {
     }
 }
 
+/// The same, of a robot that cannot be copied.
+struct Uncopied(Thrower);
+
+impl Robot for Uncopied {
+    fn init(&mut self, cars: &mut Cars<'_>) -> Result<(), BadParameters> {
+        self.0.init(cars)
+    }
+
+    fn tick(&mut self, cars: &mut Cars<'_>) -> Action {
+        self.0.tick(cars)
+    }
+}
+
 /// Adds a small random number in each tick: no tick decides where the sum ends.
 #[derive(Clone, Default)]
 struct Drifter {
@@ -493,4 +506,28 @@ fn an_answer_does_not_depend_on_threads_and_goes_on_where_it_was_stopped() {
     assert_eq!(resumed, whole);
     assert_eq!(again, std::fs::read(&path).unwrap());
     assert_eq!(more, all - played);
+}
+
+#[test]
+fn a_robot_that_cannot_be_copied_gives_the_same_answer() {
+    let text = format!("{HEAD}{}", robot("Coin", "Thrower", 6.0));
+    let what = "{ robot = \"Coin\", variable = \"heads\", above = 1.5 }";
+    let recorded = record(&text, 1);
+    let files = recorded_epoch(&recorded.folder, None).unwrap();
+    let run = "run".parse().unwrap();
+    let stop = AtomicBool::new(false);
+
+    let uncopied: RobotMaker = Arc::new(|_, _| Some(Box::new(Uncopied(Thrower::default()))));
+    let mut answers = Vec::new();
+    for make in [robots(), uncopied] {
+        let options = WhyOptions {
+            make,
+            ..options(what, &stop, 2)
+        };
+        let (answer, _) = why(&recorded.folder, &run, &files, &options, &mut |_| {}).unwrap();
+        std::fs::remove_dir_all(recorded.folder.file("why")).unwrap();
+        answers.push(answer);
+    }
+    assert!(!answers[0].jumps.is_empty());
+    assert_eq!(answers[0], answers[1]);
 }

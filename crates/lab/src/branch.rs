@@ -23,6 +23,8 @@ pub struct Trunk {
     again: Reexecution,
     /// The ticks of the record, from tick 0 on, without its end.
     entries: Arc<Vec<Entry>>,
+    /// The scenario before tick 0.
+    scenario: Arc<Scenario>,
     verdicts: BTreeMap<String, Verdict>,
     summary: Option<Summary>,
     make: RobotMaker,
@@ -33,19 +35,33 @@ impl Trunk {
     /// another. With `sums_up`, branches have summaries.
     ///
     /// # Errors
-    /// If the record cannot be read, or the scenario cannot be set up.
+    /// If the record cannot be read, the scenario cannot be set up, or `make` does not make all of its robots.
     pub fn open(
         files: &EpochFiles,
         scenario: Scenario,
         make: RobotMaker,
         sums_up: bool,
     ) -> Result<Self, LabError> {
-        let again = Reexecution::with_robots(scenario, 1, make.clone())?;
+        let entries = Arc::new(read(files)?);
+        Self::begin(entries, Arc::new(scenario), make, sums_up)
+    }
+
+    fn begin(
+        entries: Arc<Vec<Entry>>,
+        scenario: Arc<Scenario>,
+        make: RobotMaker,
+        sums_up: bool,
+    ) -> Result<Self, LabError> {
+        let again = Reexecution::with_robots(scenario.as_ref().clone(), 1, make.clone())?;
+        if let Some(robot) = again.scripted.first() {
+            return Err(cannot_go_on(robot));
+        }
         let simulation = &again.local.simulation;
         let summary = sums_up.then(|| simulation.begin_summary(&RunName::unknown()));
         let mut trunk = Self {
-            entries: Arc::new(read(files)?),
+            entries,
             again,
+            scenario,
             verdicts: BTreeMap::new(),
             summary,
             make,
@@ -109,14 +125,21 @@ impl Trunk {
         Ok(())
     }
 
-    /// A copy after the last tick, which can be executed further as this one.
+    /// A copy after the last tick, which can be executed further as this one. If a robot cannot be copied, the same run after tick 0
+    /// instead, with robots made anew: [`Self::go_to`] executes it up to any tick.
     ///
     /// # Errors
-    /// If a robot cannot be copied, or its state is not known.
+    /// If the state of a robot is not known, or one cannot be made.
     pub fn snapshot(&self) -> Result<Self, LabError> {
+        let Some(again) = self.again.snapshot()? else {
+            let (entries, scenario) = (self.entries.clone(), self.scenario.clone());
+            let sums_up = self.summary.is_some();
+            return Self::begin(entries, scenario, self.make.clone(), sums_up);
+        };
         Ok(Self {
-            again: self.again.snapshot()?,
+            again,
             entries: self.entries.clone(),
+            scenario: self.scenario.clone(),
             verdicts: self.verdicts.clone(),
             summary: self.summary.clone(),
             make: self.make.clone(),

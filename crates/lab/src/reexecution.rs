@@ -103,23 +103,26 @@ impl Reexecution {
         })
     }
 
-    /// A copy after a tick.
+    /// A copy after a tick; `None` if a robot cannot be copied.
     ///
     /// # Errors
-    /// If a robot cannot be copied, or is taken from the record.
-    pub(crate) fn snapshot(&self) -> Result<Self, LabError> {
+    /// If a robot is taken from the record.
+    pub(crate) fn snapshot(&self) -> Result<Option<Self>, LabError> {
         if let Some(robot) = self.scripted.first() {
             return Err(cannot_go_on(robot));
         }
-        Ok(Self {
+        let Ok(local) = self.local.snapshot() else {
+            return Ok(None);
+        };
+        Ok(Some(Self {
             run: self.run.clone(),
-            local: self.local.snapshot().map_err(|robot| cannot_copy(&robot))?,
+            local,
             script: RecordedReports::default(),
             scripted: BTreeSet::new(),
             absent: self.absent.clone(),
             from_record: self.from_record.clone(),
             make: self.make.clone(),
-        })
+        }))
     }
 
     /// Executes a tick that was recorded, or the end of the run.
@@ -339,7 +342,7 @@ pub(crate) fn cannot_go_on(robot: &RobotName) -> LabError {
     ))
     .with_help(
         "a run is forked in one process; robots in other languages, and robots that went on after a tick that they had \
-         missed, have a state that only their processes knew",
+         missed, have a state that only their processes knew. Classes of Python go on in Python: cars.why(run, robots={…})",
     )
 }
 

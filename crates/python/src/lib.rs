@@ -17,6 +17,7 @@ mod runner;
 mod scoped_borrow;
 mod stream;
 mod values;
+mod why;
 
 use pyo3::prelude::*;
 
@@ -37,6 +38,7 @@ fn _cars(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(experiment::experiment, module)?)?;
     module.add_function(wrap_pyfunction!(experiment::verdicts, module)?)?;
     module.add_function(wrap_pyfunction!(hunt::hunt, module)?)?;
+    module.add_function(wrap_pyfunction!(why::why, module)?)?;
     module.add_function(wrap_pyfunction!(pictures::report, module)?)?;
     module.add_function(wrap_pyfunction!(pictures::figures, module)?)?;
     module.add_function(wrap_pyfunction!(pictures::diagram, module)?)?;

@@ -5,6 +5,7 @@ use std::fmt;
 use std::sync::Arc;
 
 use experiments::{OwnRobots, RobotSource, RunRobots};
+use lab::run::RobotMaker;
 use protocol::pattern::RobotPattern;
 use pyo3::prelude::*;
 use robot::{Robot, RobotName};
@@ -97,6 +98,20 @@ impl Makers {
             makers: self,
             failure: failure.clone(),
         }
+    }
+
+    /// Prepares a run and its branches. What a robot raises ends its branch only; what a maker raises is kept in `failure`.
+    pub(crate) fn of_branches(&self, failure: &FirstException) -> RobotMaker {
+        let makers = self.clone();
+        let failure = failure.clone();
+        Arc::new(move |name, class| {
+            let own = FirstException::default();
+            let robot = makers.of_run(&own).make(name, class);
+            if let (None, Some(error)) = (&robot, own.take()) {
+                failure.set(error);
+            }
+            robot
+        })
     }
 
     fn matching(&self, robot: &RobotName) -> impl Iterator<Item = &(RobotPattern, Py<PyAny>)> {

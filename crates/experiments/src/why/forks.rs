@@ -239,7 +239,7 @@ impl OutcomeFile {
 struct Sampler<'a> {
     asked: &'a AskedRun,
     options: &'a WhyOptions<'a>,
-    /// The run after some ticks.
+    /// Copies of the run after some ticks, or, if it cannot be copied, after tick 0.
     rungs: BTreeMap<Tick, Trunk>,
     outcomes: Outcomes,
     kept: OutcomeFile,
@@ -280,7 +280,7 @@ impl Sampler<'_> {
     /// Plays forks that were not played yet, and keeps the outcome of each as soon as it is known.
     fn play_all(&mut self, plan: &ForkPlan, numbers: &[u64]) -> Result<(), LabError> {
         let tick = plan.shared();
-        let base = Mutex::new(self.branch(tick)?);
+        let base = Mutex::new(self.rung(tick)?);
         let known = self.outcomes.entry(plan.clone()).or_default();
         let keeping = Mutex::new((known, &mut self.kept, &mut *self.progress));
         let has_failed = AtomicBool::new(false);
@@ -292,7 +292,10 @@ impl Sampler<'_> {
                 return Ok(());
             }
             let copy = locked(&base).snapshot();
-            let outcome = copy.and_then(|branch| fork(asked, branch, plan, number));
+            let outcome = copy.and_then(|mut trunk| {
+                trunk.go_to(tick)?;
+                fork(asked, trunk.into_branch()?, plan, number)
+            });
 
             let (known, kept, progress) = &mut *locked(&keeping);
             progress(WhyProgress { forks, tick });
@@ -314,8 +317,8 @@ impl Sampler<'_> {
         Ok(())
     }
 
-    /// The run after a tick, as a branch.
-    fn branch(&mut self, tick: Tick) -> Result<Branch, LabError> {
+    /// The run after a tick.
+    fn rung(&mut self, tick: Tick) -> Result<Trunk, LabError> {
         let before = self.rungs.range(..=tick).next_back();
         let (_, rung) = before.ok_or_else(|| LabError::failed("a run begins with tick 0"))?;
         let mut trunk = rung.snapshot()?;
@@ -325,7 +328,7 @@ impl Sampler<'_> {
                 self.rungs.insert(tick, trunk.snapshot()?);
             }
         }
-        trunk.into_branch()
+        Ok(trunk)
     }
 }
 

@@ -52,7 +52,7 @@ from ._frames import Frames
 from ._hunt import Finding, Hunt, hunt
 from ._pictures import Page, Picture
 from ._robot import Action, CarsRobotInterface, Robot
-from ._run import Run, load, run
+from ._run import Run, load, run, why
 from ._why import Why, WhyFrames
 from .panel import Panel
 
@@ -116,4 +116,5 @@ __all__ = [
     "run",
     "stream",
     "take_part",
+    "why",
 ]

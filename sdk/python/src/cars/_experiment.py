@@ -12,11 +12,7 @@ from . import _arguments, _cars, _programs, _settings
 from ._frames import Frame, of_rows, read_runs
 from ._pictures import Page
 from ._robot import Robot, maker
-from ._run import Name
-
-
-MAX_JOBS = 4096
-"""Most runs at the same time: each has a thread."""
+from ._run import MAX_JOBS, Name
 
 
 class Verdict(NamedTuple):

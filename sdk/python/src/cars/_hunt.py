@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import Any, NamedTuple, Optional, Union
 
 from . import _arguments, _cars, _settings
-from ._experiment import MAX_JOBS
 from ._robot import Robot, maker
-from ._run import Name
+from ._run import MAX_JOBS, Name
 
 MAX_PLANS = 100_000_000
 """Most plans of a hunt."""

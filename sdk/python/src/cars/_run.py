@@ -19,6 +19,9 @@ from ._why import Why, answer
 
 Name = Union[str, os.PathLike[str]]
 
+MAX_JOBS = 4096
+"""Most runs at the same time: each has a thread."""
+
 
 class Run:
     """A run that was recorded."""
@@ -116,7 +119,8 @@ class Run:
         return Picture(svg)
 
     def why(self, question: Optional[str] = None) -> Why:
-        """What decided it, as ``cars why`` found it before: a sentence, the expected outcome over the run, and where it jumps.
+        """What decided it, as ``cars why`` or :func:`cars.why` found it before: a sentence, the expected outcome over the run, and
+        where it jumps.
 
         :param question: what was asked: the name of an expectation or of a measure, a condition, or the path of a number of the
             summary. It may be left out if one question was asked.
@@ -213,3 +217,45 @@ def load(run: Name = "latest", *, out: Name = "runs") -> Run:
     """
     folder, summary = _cars.find(_arguments.path("out", out), _arguments.path("run", run))
     return Run(folder, None if summary is None else json.loads(summary))
+
+
+def why(
+    run: Union[Run, Name],
+    question: Optional[str] = None,
+    *,
+    robots: Optional[Mapping[str, Callable[[], Robot]]] = None,
+    budget: Union[int, str, None] = None,
+    jobs: Optional[int] = None,
+    out: Name = "runs",
+) -> Why:
+    """Finds out what decided a run, as ``cars why`` does: the expected outcome after each tick, from forks with other chance, and the
+    events at which it jumps.
+
+    Robots of Rust are copied where a fork begins. Those of Python are made anew for each fork and executed again from the start of the
+    run, which takes as long as so many runs: give a ``budget``. What a robot raises ends its fork, which then has no outcome.
+
+    :param run: a run, or its name or folder.
+    :param question: the name of an expectation or of a measure, a condition such as
+        ``'{ robot = "Butler", behavior = "INTERCEPT" }'``, or the path of a number of the summary; without it the expectation that
+        failed first, or else the last one.
+    :param robots: the classes of robots of Python with which it was run: see :func:`cars.run`.
+    :param budget: most forks, such as ``2000``, or the time after which no fork is begun, such as ``"5 min"``; without it as many as
+        the answer needs. The same number of forks gives the same answer. What was played before for a question is not played again.
+    :param jobs: number of forks at the same time; without it the number of processors. The answer does not depend on it.
+    :param out: where run folders are made.
+    :raises Error: if the run has nothing of that kind, or is another one when it is executed again.
+    :raises TypeError, BadArgument: which argument has a type or a value that is not accepted.
+    """
+    asked = run if isinstance(run, Run) else load(run, out=out)
+    asked._check()
+    makers = _arguments.makers("robots", robots)
+    is_time = isinstance(budget, str)
+    words = _cars.why(
+        asked.folder,
+        _arguments.text("question", question),
+        forks=None if budget is None or is_time else _arguments.whole("budget", budget, 1, 2**53 - 1),
+        time=_arguments.text("budget", budget) if is_time else None,
+        jobs=None if jobs is None else _arguments.whole("jobs", jobs, 1, MAX_JOBS),
+        robots={of: maker(of, make) for of, make in makers.items()},
+    )
+    return asked.why(words)
