@@ -9,6 +9,7 @@ use system_tests::programs;
 /// For each crate of this project: which others of this project it may depend on, tests included.
 const ALLOWED: &[(&str, &[&str])] = &[
     ("world", &[]),
+    ("radio", &[]),
     ("affect", &[]),
     ("protocol", &[]),
     ("lockstep", &["protocol"]),
@@ -37,6 +38,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         "scenario",
         &[
             "world",
+            "radio",
             "config",
             "lockstep",
             "observe",
@@ -61,6 +63,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         &[
             "record",
             "scenario",
+            "radio",
             "world",
             "bus",
             "config",
@@ -383,7 +386,7 @@ fn one_file_names_the_middleware() {
 #[test]
 fn the_pure_crates_know_no_clock_no_network_and_no_files() {
     for (name, dependencies) in dependencies() {
-        if ["world", "affect", "lockstep", "pictures"].contains(&name.as_str()) {
+        if ["world", "radio", "affect", "lockstep", "pictures"].contains(&name.as_str()) {
             for impure in ["tokio", "tracing", "zenoh", "clap", "nix"] {
                 assert!(
                     !dependencies.contains(impure),
@@ -391,7 +394,7 @@ fn the_pure_crates_know_no_clock_no_network_and_no_files() {
                 );
             }
         }
-        if name == "world" {
+        if ["world", "radio"].contains(&name.as_str()) {
             assert!(
                 !dependencies.contains("serde"),
                 "the environment is not a message"
