@@ -132,6 +132,68 @@ impl Bodies {
         self.grid.push(center);
     }
 
+    /// Adds the next body, a guest that is not on the field.
+    pub(crate) fn push_absent_guest(&mut self) {
+        self.centers.push(Point::default());
+        self.grid.push_absent();
+    }
+
+    /// Whether a guest is on the field.
+    pub(crate) fn is_present(&self, guest: usize) -> bool {
+        self.grid.contains(self.guests_from + guest)
+    }
+
+    /// Puts a guest on the field that is not there, or returns what is in its place. Other guests are not in its way.
+    pub(crate) fn enter_guest(&mut self, index: usize, at: Point) -> Result<(), Blocker> {
+        let id = self.guests_from + index;
+        self.check_way_among_guests(id, at, at)?;
+
+        self.centers[id] = at;
+        self.grid.insert(id, at);
+        Ok(())
+    }
+
+    /// Takes a guest off the field.
+    pub(crate) fn leave_guest(&mut self, index: usize) {
+        self.grid.remove(self.guests_from + index);
+    }
+
+    /// Moves a guest, or leaves it in place and returns what blocks it. Other guests are not in its way.
+    pub(crate) fn move_guest_among_guests(
+        &mut self,
+        index: usize,
+        to: Point,
+    ) -> Result<(), Blocker> {
+        let id = self.guests_from + index;
+        self.check_way_among_guests(id, self.centers[id], to)?;
+
+        self.centers[id] = to;
+        self.grid.relocate(id, to);
+        Ok(())
+    }
+
+    fn check_way_among_guests(&self, id: usize, from: Point, to: Point) -> Result<(), Blocker> {
+        let blocker = if self.solids.is_some() {
+            let way = Sweep::straight(self.footprint_of(id), from, to);
+            if !way.footprint.is_inside(to, self.field.size_m) {
+                return Err(Blocker::Edge);
+            }
+            self.first_blocker(&way, id)
+        } else {
+            if !self.field.contains(to) {
+                return Err(Blocker::Edge);
+            }
+            let first = self.first_hit(to, id);
+            first.map(|other| Blocker::Body(self.body(other)))
+        };
+
+        // Guests have the highest numbers, so where the first hit is one, there is no other body.
+        match blocker {
+            None | Some(Blocker::Body(Body::Guest(_))) => Ok(()),
+            Some(other) => Err(other),
+        }
+    }
+
     /// Removes all guests.
     pub(crate) fn remove_guests(&mut self) {
         while self.centers.len() > self.guests_from {

@@ -32,7 +32,7 @@ pub(crate) struct Grid {
     heads: Vec<u32>,
     /// For each body: the next one in the same cell.
     next: Vec<u32>,
-    /// For each body: its cell.
+    /// For each body: its cell; [`NONE`] while it is not on the field.
     cell: Vec<u32>,
 }
 
@@ -62,6 +62,33 @@ impl Grid {
         self.heads[cell] = id;
     }
 
+    /// Gives the next number to a body that is not on the field.
+    pub(crate) fn push_absent(&mut self) {
+        self.next.push(NONE);
+        self.cell.push(NONE);
+    }
+
+    /// Whether a body is on the field.
+    pub(crate) fn contains(&self, id: usize) -> bool {
+        self.cell[id] != NONE
+    }
+
+    /// Puts a body on the field that is not there.
+    pub(crate) fn insert(&mut self, id: usize, center: Point) {
+        let cell = self.cell_of(center);
+
+        self.next[id] = self.heads[cell];
+        self.cell[id] = cell as u32;
+        self.heads[cell] = id as u32;
+    }
+
+    /// Takes a body off the field.
+    pub(crate) fn remove(&mut self, id: usize) {
+        self.unlink(id);
+        self.next[id] = NONE;
+        self.cell[id] = NONE;
+    }
+
     /// Removes the body with the highest number.
     pub(crate) fn pop(&mut self) {
         if !self.next.is_empty() {
@@ -79,9 +106,7 @@ impl Grid {
         }
 
         self.unlink(id);
-        self.next[id] = self.heads[cell];
-        self.cell[id] = cell as u32;
-        self.heads[cell] = id as u32;
+        self.insert(id, center);
     }
 
     /// Calls `visit` for every body whose center is within `reach_m` of `center` along both axes.
@@ -98,7 +123,9 @@ impl Grid {
 
         // Bodies much larger than a cell, or a large range.
         if (right - left + 1) * (top - bottom + 1) > self.next.len().max(CELLS_AROUND) {
-            (0..self.next.len()).for_each(visit);
+            (0..self.next.len())
+                .filter(|id| self.contains(*id))
+                .for_each(visit);
             return;
         }
 

@@ -1,8 +1,8 @@
-//! How guests move: in a straight line for a while, then along a new one.
+//! How the guests of the paper move: in a straight line for a while, then along a new one.
 
-use crate::bodies::{Blocker, Bodies};
 use crate::hall;
 use crate::point::Point;
+use crate::walk::{Floor, Walk};
 use rand::{Rng, RngExt};
 use std::f64::consts::TAU;
 
@@ -25,10 +25,10 @@ pub struct Course {
 
 impl Course {
     /// Draws direction, speed and duration, in this order.
-    fn draw(guests: &hall::Guests, tick_s: f64, rng: &mut impl Rng) -> Self {
+    fn draw(guests: &hall::Guests, tick_s: f64, mut rng: &mut dyn Rng) -> Self {
         let direction_rad = rng.random::<f64>() * TAU;
-        let speed_mps = guests.speed_mps.sample(rng);
-        let duration_s = guests.duration_s.sample(rng);
+        let speed_mps = guests.speed_mps.sample(&mut rng);
+        let duration_s = guests.duration_s.sample(&mut rng);
 
         Self {
             direction_rad,
@@ -55,18 +55,17 @@ fn whole_ticks(duration_s: f64, tick_s: f64) -> u64 {
     ((duration_s / tick_s - 1e-9).ceil() as u64).max(1)
 }
 
-/// The guests' courses and the results of their last steps, by index.
+/// The random walk of the paper: the guests' courses, by index.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Crowd {
+pub(crate) struct RandomWalk {
     guests: hall::Guests,
     tick_s: f64,
     courses: Vec<Course>,
-    blockers: Vec<Option<Blocker>>,
 }
 
-impl Crowd {
+impl RandomWalk {
     /// Draws the first course of every guest, in index order.
-    pub(crate) fn new(guests: hall::Guests, tick_s: f64, rng: &mut impl Rng) -> Self {
+    pub(crate) fn new(guests: hall::Guests, tick_s: f64, rng: &mut dyn Rng) -> Self {
         let courses = (0..guests.count)
             .map(|_| Course::draw(&guests, tick_s, rng))
             .collect();
@@ -75,40 +74,28 @@ impl Crowd {
             guests,
             tick_s,
             courses,
-            blockers: vec![None; guests.count],
         }
     }
 
     pub(crate) fn courses(&self) -> &[Course] {
         &self.courses
     }
+}
 
-    pub(crate) fn blockers(&self) -> &[Option<Blocker>] {
-        &self.blockers
-    }
-
-    /// Moves every guest by one step, in index order. A guest whose course is over draws a new one first.
-    ///
-    /// `directions` are those of guests that react; guests without an entry walk on.
-    pub(crate) fn advance(
-        &mut self,
-        bodies: &mut Bodies,
-        directions: &[Option<Point>],
-        rng: &mut impl Rng,
-    ) {
-        let guests = self.courses.iter_mut().zip(&mut self.blockers);
-
-        for (index, (course, blocker)) in guests.enumerate() {
+impl Walk for RandomWalk {
+    /// A guest whose course is over draws a new one first.
+    fn advance(&mut self, floor: &mut Floor<'_>, rng: &mut dyn Rng) {
+        for (index, course) in self.courses.iter_mut().enumerate() {
             if course.ticks_left == 0 {
                 *course = Course::draw(&self.guests, self.tick_s, rng);
             }
 
             course.ticks_left -= 1;
-            let step_m = match directions.get(index) {
-                Some(Some(direction)) => *direction * (course.speed_mps * self.tick_s),
-                _ => course.step_m,
+            let step_m = match floor.direction(index) {
+                Some(direction) => direction * (course.speed_mps * self.tick_s),
+                None => course.step_m,
             };
-            *blocker = bodies.advance_guest(index, step_m).err();
+            floor.step(index, step_m);
         }
     }
 }

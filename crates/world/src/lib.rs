@@ -6,7 +6,7 @@
 //!
 //! The rules are those of the paper (CARS, 2002, section "Obstacles"). Every body occupies a square of the same
 //! size, unless the hall gives it another [`Shape`] (chosen here, as are walls). Guests walk in a straight line for a while, then choose a new one, unless they react to a robot
-//! ([`Reaction`], chosen here). A body whose proposed location collides is not advanced. How a robot reacts to a collision is up to the robot and not part of this crate.
+//! ([`Reaction`], chosen here), or walk as recorded people did ([`Recorded`], chosen here). A body whose proposed location collides is not advanced. How a robot reacts to a collision is up to the robot and not part of this crate.
 //!
 //! # One tick
 //!
@@ -78,7 +78,9 @@ mod shapes;
 mod sight;
 mod solids;
 mod sweep;
+mod tracks;
 mod triangular;
+mod walk;
 mod wheels;
 
 pub use bodies::{Blocker, Body, Near};
@@ -87,12 +89,14 @@ pub use footprint::Footprint;
 pub use guests::Course;
 pub use hall::{Field, Guests, Hall};
 pub use limits::{BODIES_MAX, BODY_MIN_M, SIDE_MAX_M, TOLERANCE_M, WALLS_MAX};
-pub use motion::{MoveOutcome, World};
+pub use motion::{GuestWalk, MoveOutcome, World};
 pub use placing::{Placer, Region};
 pub use point::Point;
 pub use reactions::{Reaction, Response};
 pub use shape::{Shape, Wall};
 pub use shapes::Shapes;
 pub use sight::{Opaque, is_hidden};
+pub use tracks::{Recorded, Track, Waypoint};
 pub use triangular::Triangular;
+pub use walk::Passage;
 pub use wheels::{Pose, Velocity, Wheels};

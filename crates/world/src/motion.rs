@@ -3,13 +3,15 @@
 use crate::bodies::{Blocker, Bodies, Body, Near};
 use crate::error::HallError;
 use crate::footprint::Footprint;
-use crate::guests::{Course, Crowd};
+use crate::guests::{Course, RandomWalk};
 use crate::hall::{Field, Hall};
 use crate::limits::TOLERANCE_M;
-use crate::placing::place;
+use crate::placing::{place, place_absent};
 use crate::point::Point;
 use crate::reactions::{Reaction, directions};
 use crate::shape::{Shape, Wall};
+use crate::tracks::{Recorded, RecordedWalk};
+use crate::walk::{Floor, GuestOutcomes, Passage, Walk};
 use crate::wheels::{DriveStep, Pose, Velocity, Wheels};
 use rand::Rng;
 use std::collections::BTreeMap;
@@ -40,11 +42,38 @@ pub enum MoveOutcome {
 pub struct World<R> {
     bodies: Bodies,
     crowd: Crowd,
+    outcomes: GuestOutcomes,
     /// Robots with wheels, by index.
     driven: BTreeMap<usize, Driven>,
     tick_s: f64,
     stride_m: f64,
     rng: R,
+}
+
+/// What moves the guests.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum GuestWalk {
+    /// The random walk of the paper, by [`Hall::guests`].
+    #[default]
+    Random,
+    /// Recorded people, in the place of [`Hall::guests`].
+    Recorded(Recorded),
+}
+
+/// The guests, as what moves them has them.
+#[derive(Clone, Debug, PartialEq)]
+enum Crowd {
+    Random(RandomWalk),
+    Recorded(RecordedWalk),
+}
+
+impl Crowd {
+    fn walk(&mut self) -> &mut dyn Walk {
+        match self {
+            Self::Random(walk) => walk,
+            Self::Recorded(walk) => walk,
+        }
+    }
 }
 
 /// A robot with wheels.
@@ -66,11 +95,30 @@ impl<R: Rng> World<R> {
     ///
     /// Returns the first [`HallError`] found. Numbers and counts are checked first, then obstacles, robots and
     /// guests.
-    pub fn new(hall: &Hall, mut rng: R) -> Result<Self, HallError> {
+    pub fn new(hall: &Hall, rng: R) -> Result<Self, HallError> {
+        Self::with_guests(hall, GuestWalk::Random, rng)
+    }
+
+    /// As [`Self::new`], with guests who are moved by something else than the random walk. Nothing is drawn for recorded ones.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::new`].
+    pub fn with_guests(hall: &Hall, walk: GuestWalk, mut rng: R) -> Result<Self, HallError> {
         hall.check()?;
 
-        let bodies = place(hall, &mut rng)?;
-        let crowd = Crowd::new(hall.guests, hall.tick_s, &mut rng);
+        let (mut bodies, mut crowd) = match walk {
+            GuestWalk::Random => {
+                let bodies = place(hall, &mut rng)?;
+                let walk = RandomWalk::new(hall.guests, hall.tick_s, &mut rng);
+                (bodies, Crowd::Random(walk))
+            }
+            GuestWalk::Recorded(recorded) => {
+                let count = recorded.tracks.len();
+                let bodies = place_absent(hall, count)?;
+                (bodies, Crowd::Recorded(RecordedWalk::new(recorded)))
+            }
+        };
 
         let mut driven = BTreeMap::new();
         for (&index, wheels) in &hall.shapes.wheels {
@@ -86,9 +134,17 @@ impl<R: Rng> World<R> {
             driven.insert(index, robot);
         }
 
+        let mut outcomes = GuestOutcomes {
+            blockers: vec![None; bodies.guests().len()],
+            ..GuestOutcomes::default()
+        };
+        let mut floor = Floor::new(&mut bodies, &[], &mut outcomes, hall.tick_s);
+        crowd.walk().begin(&mut floor);
+
         Ok(Self {
             bodies,
             crowd,
+            outcomes,
             driven,
             tick_s: hall.tick_s,
             stride_m: hall.max_speed_mps * hall.tick_s,
@@ -153,8 +209,14 @@ impl<R: Rng> World<R> {
             [] => Vec::new(),
             _ => directions(&self.bodies, reactions, &headings),
         };
-        self.crowd
-            .advance(&mut self.bodies, &directions, &mut self.rng);
+        self.outcomes.passages.clear();
+        let mut floor = Floor::new(
+            &mut self.bodies,
+            &directions,
+            &mut self.outcomes,
+            self.tick_s,
+        );
+        self.crowd.walk().advance(&mut floor, &mut self.rng);
 
         verdicts
     }
@@ -283,10 +345,43 @@ impl<R> World<R> {
         self.bodies.robots()
     }
 
-    /// Centers of the guests, m, by index.
+    /// Centers of the guests, m, by index. One that [`Self::is_present`] denies is where it has been last.
     #[must_use]
     pub fn guests(&self) -> &[Point] {
         self.bodies.guests()
+    }
+
+    /// Whether a guest is on the field.
+    #[must_use]
+    pub fn is_present(&self, guest: usize) -> bool {
+        self.bodies.is_present(guest)
+    }
+
+    /// Whether guests enter and leave; otherwise all are on the field all the time.
+    #[must_use]
+    pub fn has_passages(&self) -> bool {
+        match self.crowd {
+            Crowd::Random(_) => false,
+            Crowd::Recorded(_) => true,
+        }
+    }
+
+    /// The guests that are on the field and their centers, m, in index order.
+    pub fn present_guests(&self) -> impl Iterator<Item = (usize, Point)> + '_ {
+        let all = self.guests().iter().copied().enumerate();
+        all.filter(|(guest, _)| self.is_present(*guest))
+    }
+
+    /// Who has entered the field or left it in the last tick, or entered before the first one, in the order in which it happened.
+    #[must_use]
+    pub fn passages(&self) -> &[Passage] {
+        &self.outcomes.passages
+    }
+
+    /// In how many ticks so far recorded people were kept from where the record has them, summed over people.
+    #[must_use]
+    pub fn held_ticks(&self) -> u64 {
+        self.outcomes.held_ticks
     }
 
     /// The walls, in the hall's order.
@@ -318,10 +413,13 @@ impl<R> World<R> {
         self.bodies.half_max_m()
     }
 
-    /// The guests' courses, by index.
+    /// The guests' courses, by index; none of guests that are not on a random walk.
     #[must_use]
     pub fn courses(&self) -> &[Course] {
-        self.crowd.courses()
+        match &self.crowd {
+            Crowd::Random(walk) => walk.courses(),
+            Crowd::Recorded(_) => &[],
+        }
     }
 
     /// What blocked each guest in the last tick, by index.
@@ -329,7 +427,7 @@ impl<R> World<R> {
     /// `None` if the guest advanced, or if no tick has run yet.
     #[must_use]
     pub fn guest_blockers(&self) -> &[Option<Blocker>] {
-        self.crowd.blockers()
+        &self.outcomes.blockers
     }
 
     /// All bodies whose center is at most `range_m` from `point`, in the order of [`Body`](crate::Body): by kind,

@@ -86,6 +86,15 @@ pub(crate) fn place(hall: &Hall, rng: &mut impl Rng) -> Result<Bodies, HallError
     Ok(bodies)
 }
 
+/// Places all bodies of the hall but the guests, of which there are so many that enter later.
+pub(crate) fn place_absent(hall: &Hall, guests: usize) -> Result<Bodies, HallError> {
+    let mut bodies = place_given(hall, guests)?;
+    for _ in 0..guests {
+        bodies.push_absent_guest();
+    }
+    Ok(bodies)
+}
+
 /// Places the obstacles and robots of the hall, with room for guests.
 fn place_given(hall: &Hall, guests: usize) -> Result<Bodies, HallError> {
     let (obstacles, robots) = (hall.obstacles.len(), hall.robots.len());

@@ -11,6 +11,7 @@ mod motion;
 mod near;
 mod placing;
 mod reactions;
+mod recorded;
 mod shapes;
 mod sight;
 mod wheels;
