@@ -51,12 +51,8 @@ impl std::str::FromStr for Override {
         }
 
         for part in &path {
-            let base = split_range(part)?.map_or(*part, |(base, _)| base);
-            if !is_key(base) {
-                return Err(format!(
-                    "{text:?} is not of the form path=value: {part:?} is not a key"
-                ));
-            }
+            check_part(part)
+                .map_err(|reason| format!("{text:?} is not of the form path=value: {reason}"))?;
         }
 
         Ok(Self::new(&path, parse_value(value)))
@@ -69,10 +65,16 @@ fn parse_value(text: &str) -> toml::Value {
     value.unwrap_or_else(|| toml::Value::String(text.trim().to_owned()))
 }
 
-/// Whether a part of a path is a bare key of TOML, or a pattern of such keys. All keys of our files and all names of robots are.
-fn is_key(part: &str) -> bool {
-    part.chars()
-        .all(|c| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '*'))
+/// Refuses a part of a path that is neither a bare key of TOML nor a pattern of such keys. All keys of our files and all names of
+/// robots are.
+fn check_part(part: &str) -> Result<(), String> {
+    let base = split_range(part)?.map_or(part, |(base, _)| base);
+    let is_key = base
+        .chars()
+        .all(|c| c.is_ascii_alphanumeric() || matches!(c, '_' | '-' | '*'));
+    is_key
+        .then_some(())
+        .ok_or_else(|| format!("{part:?} is not a key"))
 }
 
 /// Whether a list has elements with a count.
