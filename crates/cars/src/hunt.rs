@@ -233,9 +233,11 @@ fn in_words(report: &HuntReport) -> String {
         }
     }
     for (goal, plans) in &report.goals {
-        text += &match plans {
-            0 => format!("never reached: {goal}\n"),
-            plans => format!("reached in {plans} of {} plans: {goal}\n", report.plans),
+        let is_reached_without = report.reached_without_faults.contains(goal);
+        text += &match (plans, is_reached_without) {
+            (0, false) => format!("never reached: {goal}\n"),
+            (0, true) => format!("reached without faults, and in no plan: {goal}\n"),
+            (plans, _) => format!("reached in {plans} of {} plans: {goal}\n", report.plans),
         };
     }
     for finding in &report.findings {

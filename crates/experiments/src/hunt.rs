@@ -161,6 +161,8 @@ pub struct HuntReport {
     pub never_asked: BTreeSet<String>,
     /// What some run should reach, with the number of plans in whose runs it was reached.
     pub goals: BTreeMap<String, u64>,
+    /// What of it the run without faults reaches.
+    pub reached_without_faults: BTreeSet<String>,
     /// What was found, one for each cause for which an expectation fails.
     pub findings: Vec<Finding>,
     /// Number of plans that failed and were not shrunk, because there were too many findings already.
@@ -172,7 +174,10 @@ pub struct HuntReport {
 impl HuntReport {
     /// What some run should reach, and none has.
     pub fn never_reached(&self) -> impl Iterator<Item = &str> {
-        let goals = self.goals.iter().filter(|(_, plans)| **plans == 0);
+        let goals = self
+            .goals
+            .iter()
+            .filter(|(goal, plans)| **plans == 0 && !self.reached_without_faults.contains(*goal));
         goals.map(|(name, _)| name.as_str())
     }
 }
@@ -206,9 +211,13 @@ pub fn hunt(
     let baseline = baseline.result;
     let mut wanted = wanted(subject, &baseline, &options.expect)?;
     let mut goals = BTreeMap::new();
+    let mut reached_without_faults = BTreeSet::new();
     for expectation in &subject.scenario.expectations {
         if expectation.is_goal() && wanted.remove(&expectation.name) {
             goals.insert(expectation.name.clone(), 0);
+            if baseline.has_reached(&expectation.name) {
+                reached_without_faults.insert(expectation.name.clone());
+            }
         }
     }
     let ground = Ground::new(
@@ -250,6 +259,7 @@ pub fn hunt(
             expectations: wanted.clone(),
             never_asked: wanted.clone(),
             goals,
+            reached_without_faults,
             findings: Vec::new(),
             not_shrunk: 0,
             coverage: Coverage::default(),
@@ -396,9 +406,7 @@ impl Hunt<'_> {
                 .never_asked
                 .retain(|name| not_asked.contains(name));
             for (goal, plans) in &mut self.report.goals {
-                let expectation = goal.clone();
-                let reached = Feature::Reached { expectation };
-                *plans += u64::from(played.features.contains_key(&reached));
+                *plans += u64::from(played.has_reached(goal));
             }
             self.report.coverage.add(played.features.keys());
             if !played.failed.is_empty() {

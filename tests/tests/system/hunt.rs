@@ -407,3 +407,27 @@ fn what_was_never_reached_is_named() {
     let (status, printed) = hunt(&[goal("serves", "SERVE")]);
     assert_eq!(status, Some(0), "{printed}");
 }
+
+/// The run without faults is a run, too: what it alone reaches is reached.
+#[test]
+fn what_only_the_run_without_faults_reaches_is_reached() {
+    let lab = Lab::new();
+    // One command is sent in the last tick but one, and each plan loses it.
+    let expect = "expect=[{ name = 'arrives', reach = { event = 'command_delivered' } }]";
+    let args = ["hunt", HALL, "--plans", "8", "--kinds", "lose"];
+    let sets = ["--set", "duration=29.5 s", "--set", expect];
+    let hunt = [&args[..], &sets].concat();
+
+    let printed = lab.ok(&hunt);
+    assert!(
+        printed.contains("\nreached without faults, and in no plan: arrives\n"),
+        "{printed}"
+    );
+    let report = lab.ok(&[&hunt[..], &["--json"]].concat());
+    let report: Value = serde_json::from_str(&report).unwrap();
+    assert_eq!(report["goals"], serde_json::json!({ "arrives": 0 }));
+    assert_eq!(
+        report["reached_without_faults"],
+        serde_json::json!(["arrives"])
+    );
+}

@@ -47,6 +47,15 @@ pub struct TrialResult {
     pub features: BTreeMap<Feature, Tick>,
 }
 
+impl TrialResult {
+    /// Whether the run has reached a goal.
+    pub(super) fn has_reached(&self, goal: &str) -> bool {
+        let expectation = goal.to_owned();
+        self.features
+            .contains_key(&Feature::Reached { expectation })
+    }
+}
+
 /// An expectation that failed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FailedExpectation {

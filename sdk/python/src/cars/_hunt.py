@@ -63,8 +63,14 @@ class Hunt:
 
     @property
     def goals(self) -> dict[str, int]:
-        """What some run should ``reach``, with the number of plans in whose runs it was reached; 0 for what never was."""
+        """What some run should ``reach``, with the number of plans in whose runs it was reached."""
         return dict(self.report["goals"])
+
+    @property
+    def never_reached(self) -> list[str]:
+        """What some run should ``reach``, and neither a plan nor the run without faults has."""
+        without_faults = self.report["reached_without_faults"]
+        return [goal for goal, plans in self.goals.items() if plans == 0 and goal not in without_faults]
 
 
 def _texts(name: str, value: Union[str, Iterable[str], None]) -> list[str]:
