@@ -119,6 +119,38 @@ fn a_command_that_is_printed_can_be_typed() {
     );
 }
 
+/// With `--explain` the run of each finding is recorded among the runs, and asked about.
+#[test]
+fn a_hunt_explains_what_it_finds() {
+    let lab = Lab::new();
+    let expect = "expect=[{ name = 'all arrives', never = { event = 'command_dropped' } }]";
+    let mut hunt = Command::new(programs().join("cars"));
+    hunt.current_dir(lab.out())
+        .arg("hunt")
+        .arg(root().join(HALL))
+        .args(["--plans", "8", "--kinds", "lose", "--explain"])
+        .args(["--set", "duration=120 s", "--set", expect]);
+    let output = hunt.output().unwrap();
+    let printed = String::from_utf8_lossy(&output.stdout);
+    let notes = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{printed}{notes}");
+
+    let command = printed
+        .lines()
+        .find_map(|line| line.trim().strip_prefix("cars why "));
+    let (run, asked) = command.unwrap().split_once(' ').unwrap();
+    assert_eq!(asked, "'all arrives'");
+    assert!(
+        notes.contains(&format!("cars why {run} all arrives")),
+        "{notes}"
+    );
+    assert!(printed.contains("\"all arrives\" fails. "), "{printed}");
+    let without = "Without command 1 (refill) from Butler to Leguin was lost it is 0 %";
+    assert!(printed.contains(without), "{printed}");
+    let answers = std::fs::read_dir(lab.out().join("runs").join(run).join("why"));
+    assert_eq!(answers.unwrap().count(), 2, "the answer and its forks");
+}
+
 #[test]
 fn a_fault_lasts_for_some_time() {
     let (status, printed) = Lab::new().cars_without_out(&["hunt", HALL, "--longest", "0 s"]);

@@ -1,12 +1,18 @@
 //! What an experiment expects of its runs decides about its exit status.
 
-use system_tests::{Lab, root};
+use std::process::Command;
+
+use system_tests::{Lab, programs, root};
 
 use super::{HALL, cars};
 
 /// The exit status of an experiment that expects this, and what it says.
 fn judged(expect: &str) -> (i32, String) {
-    let lab = Lab::new();
+    judged_in(&Lab::new(), expect)
+}
+
+/// The same, with the experiment in a lab.
+fn judged_in(lab: &Lab, expect: &str) -> (i32, String) {
     let scenario = root().join(HALL);
     let text = format!(
         "question = '?'\nscenario = {scenario:?}\nduration = '60 s'\nseeds = 3\n[[arm]]\nname = 'it'\n\
@@ -58,4 +64,42 @@ fn the_exit_status_is_that_of_the_worst_verdict_of_the_experiment() {
     let (status, notes) = judged(&format!("{undecided}{fails}{passes}"));
     assert_eq!(status, 1, "{notes}");
     assert!(notes.contains("fail: nobody speaks: in "), "{notes}");
+}
+
+/// The commands for the worst unit can be typed as they are printed.
+#[test]
+fn what_decided_the_worst_unit_is_found_by_the_printed_commands() {
+    let lab = Lab::new();
+    let (status, notes) = judged_in(
+        &lab,
+        "[[expect]]\nname = 'nobody is stopped'\nnever = { event = 'blocked', robot = 'Butler' }\n",
+    );
+    assert_eq!(status, 1, "{notes}");
+    let (_, commands) = notes.split_once("cars experiment replay ").unwrap();
+    let (replay, why) = commands.split_once(" cars why ").unwrap();
+    let (why, _) = why.split_once("' ").unwrap();
+
+    let cars = programs().join("cars");
+    let typed = |command: &str| {
+        let line = format!("{} {command}", cars.display());
+        let mut shell = Command::new("sh");
+        let output = shell
+            .args(["-c", &line])
+            .current_dir(lab.out())
+            .output()
+            .unwrap();
+        let printed = String::from_utf8_lossy(&output.stdout).into_owned();
+        (
+            output.status.success(),
+            format!("{line}: {printed}{output:?}"),
+        )
+    };
+    let (is_recorded, printed) = typed(&format!("experiment replay {replay}"));
+    assert!(is_recorded, "{printed}");
+    let (is_answered, printed) = typed(&format!("why {why}' --budget 200"));
+    assert!(is_answered, "{printed}");
+    assert!(
+        printed.contains("\"nobody is stopped\" fails. "),
+        "{printed}"
+    );
 }
