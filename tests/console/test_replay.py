@@ -26,8 +26,8 @@ class Replay:
         endpoint = f"tcp/127.0.0.1:{free_port()}"
         self.processes.start("cars", "replay", RUN, "--paused", "--listen", endpoint, "--out", self.out)
         eventually("replay", (self.out / RUN / "endpoint").exists)
-        environment = {"CARS_RUN": RUN, "CARS_CONNECT": endpoint}
-        self.address = start_console(self.processes, environment=environment)
+        self.environment = {"CARS_RUN": RUN, "CARS_CONNECT": endpoint}
+        self.address = start_console(self.processes, environment=self.environment)
 
     def cars(self, *arguments):
         command = [BIN / "cars", *arguments, "--out", self.out]

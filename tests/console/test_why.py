@@ -8,6 +8,7 @@ from playwright.sync_api import expect
 
 from lab import BIN, PATIENCE_S, ROOT, eventually, scrub, start_console, until
 from test_access import axe, violations  # noqa: F401, a fixture
+from test_replay import RUN, replay  # noqa: F401, a fixture
 
 SENTENCE = (
     '"a call is answered or escalated" fails. It was decided at 30 s (tick 60): 12 % (9 to 15), n = 400 -> 94 % (91 to 96), n = 400, '
@@ -135,6 +136,21 @@ def test_a_run_in_progress_has_its_answer_when_it_is_over(launch, open_page):
     write(run.run_folder, "a", answer(run.run_folder))
     page.get_by_test_id("why-mark").first.click()
     until(page, "window.carsConsole.frame()?.tick === 60")
+
+
+@pytest.mark.thorough
+def test_a_replay_has_the_answer_about_its_run(replay, open_page):  # noqa: F811
+    recorded = replay.out / RUN
+    write(recorded, "a", answer(recorded))
+    page = open_page(start_console(replay.processes, "--folder", recorded, environment=replay.environment))
+    expect(page.get_by_test_id("why-sentence")).to_have_text(SENTENCE)
+    expect(page.get_by_test_id("why-mark")).to_have_count(2)
+
+    # A click shows the tick of the recording; the replay stays where it is.
+    page.get_by_test_id("why-mark").first.click()
+    until(page, "window.carsConsole.frame()?.tick === 60")
+    page.get_by_test_id("why-jump").nth(1).click()
+    until(page, "window.carsConsole.frame()?.tick === 120")
 
 
 @pytest.mark.thorough
