@@ -1,5 +1,6 @@
 """Every control of the page changes the real simulator."""
 
+import pytest
 from playwright.sync_api import expect
 
 from lab import PATIENCE_S, eventually, start_console, until
@@ -59,6 +60,7 @@ def test_step_start_pause_speed_and_init(launch, open_page):
     shows(page, "paused", 1)
 
 
+@pytest.mark.thorough
 def test_fast_clicks_on_step_are_all_counted(launch, open_page):
     run = launch()
     page = open_page(run.address)
@@ -71,6 +73,7 @@ def test_fast_clicks_on_step_are_all_counted(launch, open_page):
     assert run.status()["tick"] == 10
 
 
+@pytest.mark.thorough
 def test_stop_asks_for_confirmation_and_the_last_frame_stays(launch, open_page):
     run = launch(options=("--speed", "20"))
     page = open_page(run.address)
@@ -107,6 +110,7 @@ def test_two_browsers_see_the_same_run(launch, open_page):
     shows(one, "ready", 0)
 
 
+@pytest.mark.thorough
 def test_a_reloaded_page_shows_the_same_again(launch, open_page):
     run = launch()
     page = open_page(run.address)
@@ -125,6 +129,7 @@ def test_a_reloaded_page_shows_the_same_again(launch, open_page):
     expect(page.get_by_test_id("log").locator(".line")).to_have_count(lines)
 
 
+@pytest.mark.thorough
 def test_a_console_that_comes_late_shows_the_whole_log(launch, open_page):
     run = launch()
     page = open_page(run.address)

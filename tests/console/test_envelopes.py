@@ -10,8 +10,9 @@ from lab import eventually, newest, scrub, start_console, until
 pytestmark = pytest.mark.thorough
 
 
-@pytest.mark.parametrize("speed", [1, 5, "max"])
-@pytest.mark.parametrize("network", ["", 'network.commands={ delay="3 s" }', "network.commands={ loss=0.5 }"])
+@pytest.mark.parametrize(
+    "speed, network", [("max", ""), (1, 'network.commands={ delay="3 s" }'), (5, "network.commands={ loss=0.5 }")]
+)
 def test_envelopes_are_where_the_log_says(launch, open_page, processes, speed, network):
     chance = random.Random(f"{speed} {network}")
     options = ["--set", "seed=7", "--set", 'duration="100 s"', "--speed", str(speed), "--stay"]

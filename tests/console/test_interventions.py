@@ -184,7 +184,7 @@ def test_a_robots_menu_opens_on_the_plan_and_by_a_key(launch, open_page, screens
             page.context.close()
 
 
-@pytest.mark.parametrize("width, height", [(1440, 900), (1280, 720), (820, 1180)])
+@pytest.mark.parametrize("width, height", [(1440, 900), (820, 1180)])
 def test_the_plan_is_seen_and_goes_on_while_one_experiments(launch, open_page, width, height):
     run = launch(options=("--speed", "5", "--set", "guests.count=20"))
     page = open_page(run.address, width=width, height=height)

@@ -53,7 +53,7 @@ def test_the_run_waits_for_its_browser_and_begins_there(launched, open_page, fak
     ended(run)
 
 
-@pytest.mark.parametrize(("width", "height"), [(1024, 700), (1280, 720), (1440, 900)])
+@pytest.mark.parametrize(("width", "height"), [(1024, 700), (1440, 900)])
 def test_most_of_the_plan_is_seen_beside_the_guide(launched, open_page, fake_browser, width, height, screenshots):
     run = launched("--open", "--duration", "30 s")
     page = open_page(run.address, width=width, height=height)

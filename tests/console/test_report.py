@@ -10,7 +10,7 @@ from lab import BIN, ROOT
 
 pytestmark = pytest.mark.thorough
 
-SIZES = [(1280, 900), (375, 812)]
+SIZES = [(1280, 900, "light"), (375, 812, "dark")]
 
 
 def cars(*args, folder):
@@ -29,8 +29,7 @@ def report(tmp_path_factory):
     return file.as_uri()
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width, height", SIZES)
+@pytest.mark.parametrize("width, height, scheme", SIZES)
 def test_a_report_opens_offline_and_fits(report, open_page, screenshots, width, height, scheme):
     # The page of a context that is offline loads files only.
     page = open_page(report, width, height, scheme, offline=True)

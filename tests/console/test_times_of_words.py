@@ -59,7 +59,7 @@ def test_charts_open_on_what_moves(launch, open_page):
     assert not variable.input_value().endswith("_s"), variable.input_value()
 
 
-@pytest.mark.parametrize("width, height", [(1024, 700), (1280, 720), (1440, 900)])
+@pytest.mark.parametrize("width, height", [(1024, 700), (1440, 900)])
 def test_the_choice_of_units_has_its_label(launch, open_page, width, height):
     page = open_page(launch().address, width, height)
     label = page.locator(".plan-bar .field.inline > span")

@@ -293,6 +293,7 @@ def test_processes_play_one_unit_after_another(place: Place, programs: None) -> 
     assert dict(here.report) == {**there.report, "scenario": here.report["scenario"]}
 
 
+@pytest.mark.thorough
 def test_an_edited_program_of_a_launch_file_plays_again(place: Place, programs: None) -> None:
     def units() -> int:
         place.play("edited", processes=place.launch(), jobs=1)
@@ -303,6 +304,7 @@ def test_an_edited_program_of_a_launch_file_plays_again(place: Place, programs: 
     assert [units(), units()] == [12, 12]
 
 
+@pytest.mark.thorough
 def test_a_robot_that_keeps_something_over_init_gets_fresh_processes(place: Place, programs: None) -> None:
     launch = place.launch("Keeps")
     with pytest.warns(UserWarning, match="keeps something over `init`"):
