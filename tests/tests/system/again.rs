@@ -548,6 +548,7 @@ fn a_run_whose_launcher_was_killed_or_that_was_stopped_is_resumed() {
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn an_epoch_after_init_is_resumed_and_the_one_before_is_kept() {
     let lab = Lab::new();
     let run = "second-epoch";
@@ -761,6 +762,7 @@ const NOT_REQUIRED: &str = "required = false";
 
 /// The clock goes on without a robot that died, and its successor takes part: no part of the scenario.
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn a_run_whose_robot_was_killed_and_came_back_is_resumed_as_often_as_it_is_killed() {
     let (hall, mut launch) = Unattended::start("killed-robot", RESTARTS, 10, &[]);
     send(launch.process("cars-leguin"), Signal::SIGKILL);
@@ -786,6 +788,7 @@ fn a_run_whose_robot_was_killed_and_came_back_is_resumed_as_often_as_it_is_kille
 /// A process that was stopped goes on where it was, after ticks that it has missed. Some of them it does too late. However long
 /// this machine takes to let it go on, it is not lost: neither by the number of these ticks nor by its link.
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn a_run_whose_robots_were_stopped_for_some_ticks_is_resumed() {
     let shipped = std::fs::read_to_string(root().join("configs/zenoh/robot.json5")).unwrap();
     let patient = shipped.replace("lease: 2000,", "lease: 60000,");
@@ -830,6 +833,7 @@ fn a_run_whose_robots_were_stopped_for_some_ticks_is_resumed() {
 
 /// Its link was given up, as that of a robot that is cut off, and the same process returns.
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn a_run_whose_robot_was_silent_until_it_was_lost_is_resumed() {
     let (hall, mut launch) = Unattended::start("silent-robot", NOT_REQUIRED, 10, &[]);
     let leguin = launch.process("cars-leguin");
@@ -849,6 +853,7 @@ fn a_run_whose_robot_was_silent_until_it_was_lost_is_resumed() {
 
 /// No tick was missed: the record has nothing but the further incarnation.
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn a_run_whose_robot_was_replaced_between_two_ticks_is_resumed() {
     for (run, policy) in [("replaced", "continue"), ("replaced-awaited", "wait")] {
         let on_late = format!("on_late={policy}");
@@ -875,6 +880,7 @@ fn a_run_whose_robot_was_replaced_between_two_ticks_is_resumed() {
 
 /// Whether the loss is in the first tick, in the last one, or before it.
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn a_robot_that_had_not_come_back_takes_part_after_the_last_tick_of_the_record() {
     for (run, before, after) in [
         ("lost-in-the-first-tick", 0, 4),
@@ -901,6 +907,7 @@ fn a_robot_that_had_not_come_back_takes_part_after_the_last_tick_of_the_record()
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn a_run_that_lost_a_robot_in_each_of_two_epochs_is_resumed() {
     let run = "lost-in-two-epochs";
     let (hall, mut launch) = Unattended::start(run, RESTARTS, 10, &[]);

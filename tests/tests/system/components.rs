@@ -369,11 +369,13 @@ impl Notes {
     }
 }
 
-fn assert_components(seeds: u64) {
+#[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
+fn every_component_varies_in_its_direction() {
     let mut all = Notes::default();
     for file in [HALL, CROWD, PARTITION, PANTRY] {
         let mut notes = Notes::default();
-        let runs = watch_seeds(seeds, file, &[], |run: &mut Notes, change| {
+        let runs = watch_seeds(64, file, &[], |run: &mut Notes, change| {
             for robot in ["Butler", "Leguin"] {
                 run.add_tick(file, robot, Tick::of(change, robot));
             }
@@ -410,15 +412,4 @@ fn assert_components(seeds: u64) {
             "{what}: {means:?}"
         );
     }
-}
-
-#[test]
-fn every_component_varies_in_its_direction() {
-    assert_components(10);
-}
-
-#[test]
-#[ignore = "thorough: with `-- --include-ignored`"]
-fn every_component_varies_in_its_direction_over_64_seeds() {
-    assert_components(64);
 }

@@ -337,6 +337,7 @@ for line in sys.stdin:
 "#;
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn a_program_that_does_not_flush_is_told_so() {
     if !has_python("the kit with a robot in Python") {
         return;

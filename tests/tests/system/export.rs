@@ -468,6 +468,7 @@ fn a_trace_has_every_tick_every_report_and_what_held_the_clock_up() {
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn a_trace_of_a_run_in_one_process_states_what_it_lacks() {
     let lab = Lab::new();
     lab.ok(&["run", HALL, "--run", "local", "--duration", "5 s"]);

@@ -344,6 +344,7 @@ fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn the_numbers_of_an_experiment_are_those_of_its_runs() {
     let lab = Lab::new();
     let args = ["--seeds", "8", "--duration", "200 s"];

@@ -171,6 +171,7 @@ fn play(lab: &Lab, run: &str, robot: &str, tick: u64, way: Way) {
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn a_robot_that_is_killed_by_hand_or_from_outside_is_executed_again() {
     let lab = Lab::new();
     for (run, way) in [("by-hand", Way::ByHand("crash")), ("outside", Way::Outside)] {
@@ -212,6 +213,7 @@ fn until_epoch(lab: &Lab, run: &str, epoch: u64) {
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn init_ends_the_faults_of_processes_and_begins_as_a_fresh_start_does() {
     let lab = Lab::new();
     for kind in ["crash", "hang"] {

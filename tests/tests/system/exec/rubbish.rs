@@ -117,6 +117,7 @@ const MISHAPS: &[(&str, &str, &[&str])] = &[
 ];
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn every_mishap_is_named_and_ends_the_robot() {
     std::thread::scope(|scope| {
         for (name, lines, expected) in MISHAPS {

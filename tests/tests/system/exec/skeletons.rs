@@ -383,6 +383,7 @@ fn a_new_robot_is_the_same_in_every_language_that_counts_alike() {
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn a_new_robot_in_bash_plays() {
     let mut bash = Command::new("bash");
     if has("Bash", bash.arg("--version"), "install Bash 4 or newer") {

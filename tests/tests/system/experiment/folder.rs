@@ -213,6 +213,7 @@ fn units_that_are_played_one_by_one_merge_to_the_same() {
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn only_what_is_new_or_has_changed_is_played() {
     let short = Short::new();
     let folder = short.out("grown");
@@ -317,6 +318,7 @@ fn a_damaged_unit_is_named_and_played_again() {
 
 /// Nothing is played under a wrong name, and what has been played is not lost.
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn a_plan_that_is_damaged_or_lost_is_made_again_and_its_units_are_used() {
     let short = Short::new();
     let whole = short.out("whole");
@@ -368,6 +370,7 @@ fn a_plan_that_is_damaged_or_lost_is_made_again_and_its_units_are_used() {
 
 /// Every bit of a plan counts, or changes nothing.
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn no_flipped_bit_of_a_plan_plays_anything_else() {
     let short = Short::new();
     let folder = short.out("bits");
@@ -434,6 +437,7 @@ done
 "#;
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn a_unit_that_fails_ends_nothing_and_is_played_again_on_request() {
     let lab = Lab::new();
     let robot = lab.write("robot.sh", WINGS);
@@ -679,6 +683,7 @@ fn the_number_of_robots_is_a_factor() {
 
 /// Whatever ends an experiment, its processes end, too.
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn a_killed_experiment_leaves_no_process() {
     let lab = Lab::new();
     let short = Short::text();

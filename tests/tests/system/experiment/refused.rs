@@ -114,6 +114,7 @@ fn cars_check_reads_experiments() {
 
 /// What only the scenario or a robot knows is refused before anything runs, too, at its place in the experiment file.
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn what_the_scenario_or_a_robot_refuses_is_shown_where_the_experiment_says_it() {
     const GOOD: &str = r#"question = "?"
 duration = "300 s"
