@@ -673,7 +673,10 @@ fn the_configuration_of_cargo_has_only_what_builds_and_tests_here_need() {
     let text = std::fs::read_to_string(system_tests::root().join(".cargo/config.toml")).unwrap();
     let config: toml::Table = text.parse().unwrap();
     let tables: Vec<&String> = config.keys().collect();
-    assert_eq!(tables, ["env"]);
+    assert_eq!(tables, ["env", "profile"]);
+    let of_tests = "release.package.system-tests = { opt-level = 1 }";
+    let of_tests: toml::Table = of_tests.parse().unwrap();
+    assert_eq!(config["profile"].as_table(), Some(&of_tests));
 
     let variables = config["env"].as_table().unwrap();
     let variables: Vec<&str> = variables.keys().map(String::as_str).collect();
