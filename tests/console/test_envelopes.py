@@ -88,3 +88,5 @@ def test_the_text_of_a_broadcast_is_written_once(launch, open_page):
     assert len(page.evaluate(NAMED, [*broadcasts, *received])) == 2, "one that is under way, and one that has arrived"
     single = [flight(4, "B", 1, "refill"), flight(5, "B", 2, "hurry"), flight(5, "B", 1, None, "dropped")]
     assert page.evaluate(NAMED, single) == ["B hurry sent", "B refill dropped"]
+    single[2]["because"] = "too weak by fading"
+    assert page.evaluate(NAMED, single) == ["B hurry sent", "B refill, too weak by fading dropped"]

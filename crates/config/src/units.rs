@@ -3,7 +3,7 @@
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// Units with their dimensions and their values in SI units.
-const UNITS: [(&str, Dimension, f64); 19] = [
+const UNITS: [(&str, Dimension, f64); 27] = [
     ("m", Dimension::Length, 1.0),
     ("cm", Dimension::Length, 0.01),
     ("km", Dimension::Length, 1000.0),
@@ -28,6 +28,14 @@ const UNITS: [(&str, Dimension, f64); 19] = [
         Dimension::TurnAcceleration,
         std::f64::consts::PI / 180.0,
     ),
+    ("Hz", Dimension::Frequency, 1.0),
+    ("kHz", Dimension::Frequency, 1e3),
+    ("MHz", Dimension::Frequency, 1e6),
+    ("GHz", Dimension::Frequency, 1e9),
+    ("bit/s", Dimension::BitRate, 1.0),
+    ("kbit/s", Dimension::BitRate, 1e3),
+    ("Mbit/s", Dimension::BitRate, 1e6),
+    ("Gbit/s", Dimension::BitRate, 1e9),
 ];
 
 /// What a quantity measures.
@@ -47,6 +55,10 @@ pub enum Dimension {
     Acceleration,
     /// Radians per second squared.
     TurnAcceleration,
+    /// Hertz.
+    Frequency,
+    /// Bits per second.
+    BitRate,
 }
 
 impl Dimension {
@@ -59,6 +71,8 @@ impl Dimension {
             Self::TurnRate => "a turn rate such as \"90 deg/s\"",
             Self::Acceleration => "an acceleration such as \"0.5 m/s2\"",
             Self::TurnAcceleration => "a turn acceleration such as \"180 deg/s2\"",
+            Self::Frequency => "a frequency such as \"2.4 GHz\"",
+            Self::BitRate => "a bit rate such as \"250 kbit/s\"",
         }
     }
 }
@@ -155,6 +169,14 @@ quantity_type! {
 quantity_type! {
     /// A turn acceleration, radians per second squared.
     TurnAcceleration, Dimension::TurnAcceleration, "rad/s2"
+}
+quantity_type! {
+    /// A frequency, hertz.
+    Frequency, Dimension::Frequency, "Hz"
+}
+quantity_type! {
+    /// A bit rate, bits per second.
+    BitRate, Dimension::BitRate, "bit/s"
 }
 
 #[cfg(test)]

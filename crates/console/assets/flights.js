@@ -9,14 +9,14 @@
  * @typedef {object} Shown
  * @property {string} from
  * @property {string} to
- * @property {string} text of the command, empty if its sending is not known
+ * @property {string} text of the command, with why it was lost; empty if its sending is not known
  * @property {boolean} isNamed whether its text is written beside it: once for commands with the same text of one sender to several robots,
  *   as those of a broadcast are, and once for those to one robot that share a fate
  * @property {Fate} fate up to the tick that is shown
  * @property {number} progress part of the way that it has gone
  * @property {number} faded 0 in the tick that decided its fate, 1 when that is no longer shown
  */
-/** When it was sent, and what became of its copies. @typedef {{tick: number, fate: Fate}} End */
+/** What became of a copy, when, and why it was lost. @typedef {{tick: number, fate: Fate, because?: string | null}} End */
 /** @typedef {{from: string, to: string, text: string, sent: number, ends: End[]}} Command */
 
 /** How long it is shown what became of a command, in simulated time. The server tells of as long a time before a range of ticks. */
@@ -36,13 +36,13 @@ export class Flights {
 
   /** Takes in what happened to commands, in any order and as often as it is told. @param {Flight[]} flights */
   push(flights) {
-    for (const { tick, from, to, seq, command, fate } of flights) {
+    for (const { tick, from, to, seq, command, fate, because } of flights) {
       const key = JSON.stringify([from, to, seq]);
       const known = this.commands.get(key) ?? { from, to, text: "", sent: -Infinity, ends: [] };
       this.commands.set(key, known);
       known.text ||= command ?? "";
       if (fate === "sent") known.sent = tick;
-      else if (!known.ends.some((end) => end.tick === tick && end.fate === fate)) known.ends.push({ tick, fate });
+      else if (!known.ends.some((end) => end.tick === tick && end.fate === fate)) known.ends.push({ tick, fate, because });
     }
 
     for (const key of this.commands.keys()) {
@@ -66,7 +66,8 @@ export class Flights {
       if (sent > tick || age_s === Infinity || (last && age_s >= TOLD_S)) continue;
 
       const progress = !last ? age_s / (age_s + HALF_WAY_S) : last.fate === "dropped" ? LOST_AT : 1;
-      shown.push({ from, to, text, fate: last?.fate ?? "sent", progress, faded: last ? age_s / TOLD_S : 0, isNamed: false });
+      const words = text && last?.because ? `${text}, ${last.because}` : text;
+      shown.push({ from, to, text: words, fate: last?.fate ?? "sent", progress, faded: last ? age_s / TOLD_S : 0, isNamed: false });
     }
     nameOnce(shown);
     return shown;

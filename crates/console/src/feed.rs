@@ -460,6 +460,7 @@ mod tests {
             seq: tick,
             command: "x".to_owned(),
             fate: Fate::Sent,
+            because: None,
         };
 
         WorldFrame {

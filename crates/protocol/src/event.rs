@@ -146,9 +146,9 @@ pub enum Event {
         to: RobotName,
         /// Its number among the sender's.
         seq: Seq,
-        /// Tick at which it will arrive.
+        /// Tick at which it will arrive, or leave the queue of its sender's radio.
         until: Tick,
-        /// `Scripted` if the scenario names this command; none by chance.
+        /// `Scripted` if the scenario names this command, `Queue` if it waits for others of its sender; none by chance.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         because: Option<Cause>,
     },
@@ -375,6 +375,18 @@ pub enum Cause {
     Unknown,
     /// The scenario names this command.
     Scripted,
+    /// It arrives with too little power after the distance.
+    Distance,
+    /// Walls between the two leave too little power.
+    Wall,
+    /// Bodies between the two leave too little power.
+    Body,
+    /// Shadowing leaves too little power.
+    Shadowing,
+    /// Fading leaves too little power.
+    Fading,
+    /// Messages before it wait in the queue of its sender's radio.
+    Queue,
 }
 
 impl std::fmt::Display for Cause {
@@ -388,6 +400,12 @@ impl std::fmt::Display for Cause {
             Self::Overflow => "because too much arrives at once",
             Self::Unknown => "because there is no such robot",
             Self::Scripted => "as the scenario has it",
+            Self::Distance => "too weak over the distance",
+            Self::Wall => "too weak behind a wall",
+            Self::Body => "too weak behind a body",
+            Self::Shadowing => "too weak by shadowing",
+            Self::Fading => "too weak by fading",
+            Self::Queue => "in the queue of the sender's radio",
         })
     }
 }
@@ -475,16 +493,21 @@ impl Event {
     /// The command that the event is about, and its fate, as frames show it; `None` for other events.
     #[must_use]
     pub fn flight(&self, tick: Tick) -> Option<Flight> {
-        let (from, to, seq, command, fate) = match self {
+        let (from, to, seq, command, fate, because) = match self {
             Self::CommandSent {
                 from,
                 to,
                 seq,
                 command,
                 ..
-            } => (from, to, seq, command.as_str(), Fate::Sent),
-            Self::CommandDelivered { from, to, seq } => (from, to, seq, "", Fate::Delivered),
-            Self::CommandDropped { from, to, seq, .. } => (from, to, seq, "", Fate::Dropped),
+            } => (from, to, seq, command.as_str(), Fate::Sent, None),
+            Self::CommandDelivered { from, to, seq } => (from, to, seq, "", Fate::Delivered, None),
+            Self::CommandDropped {
+                from,
+                to,
+                seq,
+                because,
+            } => (from, to, seq, "", Fate::Dropped, Some(because.to_string())),
             _ => return None,
         };
 
@@ -495,6 +518,7 @@ impl Event {
             seq: *seq,
             command: command.to_owned(),
             fate,
+            because,
         })
     }
 

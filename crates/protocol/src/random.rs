@@ -29,6 +29,12 @@ pub fn reseeded(seed: u64, of: &str) -> u64 {
     stream(seed, &format!("reseed/{of}")).next_u64() & MAX_SEED
 }
 
+/// A number of 64 bits that belongs to a name, for what derives further numbers from it.
+#[must_use]
+pub fn key(seed: u64, name: &str) -> u64 {
+    stream(seed, name).next_u64()
+}
+
 /// The next draw as a number from 0 up to but not including 1: its upper 53 bits over 2^53.
 pub fn unit(stream: &mut Stream) -> f64 {
     (stream.next_u64() >> 11) as f64 / (1_u64 << 53) as f64

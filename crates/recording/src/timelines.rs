@@ -96,5 +96,6 @@ fn sending(command: &CommandSpan) -> Flight {
         seq: command.seq,
         command: command.text.clone(),
         fate: Fate::Sent,
+        because: None,
     }
 }

@@ -13,7 +13,7 @@ use super::fault::Fault;
 use super::guests::GuestRules;
 use super::lateness::Lateness;
 use super::layers::LayerSpec;
-use super::network::Network;
+use super::network::{Network, Radio};
 use super::reseed::Reseed;
 use super::sensing::Sensing;
 use super::sites::{SiteSpec, start_states};
@@ -207,7 +207,7 @@ impl Scenario {
             field_m: self.field_m,
             body_m: self.body_m,
             inradius_m: inradii_m(&self.robots),
-            radio_range_m: self.network.radio.map(|radio| radio.range_m),
+            radio_range_m: self.network.radio.as_ref().and_then(Radio::reach_m),
             roster: self.roster(),
             sites: start_states(&self.sites),
             layers: self.layers.keys().cloned().collect(),

@@ -1,6 +1,7 @@
 //! `[network]`: loss, delay and partitions of the network between the robots.
 
 use protocol::{RobotName, Tick};
+use radio::{RadioModel, Transmitter};
 use world::Triangular;
 
 /// The network between the robots. Every message draws its own random numbers from the seed.
@@ -16,15 +17,31 @@ pub struct Network {
     pub partitions: Vec<Partition>,
     /// Single commands of which the scenario says what becomes of them.
     pub named: Vec<NamedCommand>,
-    /// How far the robots' radios reach; `None` for any distance.
+    /// The robots' radios; `None` where distance and the length of messages do not matter.
     pub radio: Option<Radio>,
 }
 
-/// The radios of the robots.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// The radios of the robots, which are all the same.
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Radio {
-    /// Greatest distance between the centers of two robots at which a message passes, meters.
-    pub range_m: f64,
+    /// Greatest distance between the centers of two robots at which a message passes, whatever its power, meters; `None` for any.
+    pub range_m: Option<f64>,
+    /// What power messages arrive with; `None` if all have enough.
+    pub model: Option<RadioModel>,
+    /// How fast commands are sent; `None` if that takes no time.
+    pub transmitter: Option<Transmitter>,
+}
+
+impl Radio {
+    /// The distance up to which messages pass without anything in their way, shadowing and fading, meters; `None` for any distance.
+    #[must_use]
+    pub fn reach_m(&self) -> Option<f64> {
+        let nominal_m = self.model.as_ref().map(RadioModel::nominal_range_m);
+        match (self.range_m, nominal_m) {
+            (Some(range_m), Some(nominal_m)) => Some(range_m.min(nominal_m)),
+            (range_m, nominal_m) => range_m.or(nominal_m),
+        }
+    }
 }
 
 /// A single command to which something happens, whatever chance decides. Commands are counted over the epoch, whatever incarnation

@@ -12,6 +12,7 @@ pub(super) mod mood;
 mod network;
 mod numbers;
 mod place;
+mod radio_table;
 mod reseed;
 mod sensing;
 mod site;
@@ -56,6 +57,7 @@ pub(super) use expect::Expectations;
 use super::change::Parent;
 use super::checked::{self, DEFAULT_SEED, RecordContents, RobotSpec, inradii_m, to_wire, to_world};
 use super::lateness::Lateness;
+use super::network::Radio;
 use super::placing::{self, PlacingCause, PlacingError};
 use super::sites::start_states;
 
@@ -277,7 +279,7 @@ impl ScenarioFile {
             field_m: size.0.map(|length| length.0),
             body_m: body.0,
             inradius_m: inradii_m(&robots),
-            radio_range_m: network.radio.map(|radio| radio.range_m),
+            radio_range_m: network.radio.as_ref().and_then(Radio::reach_m),
             roster: robots.keys().cloned().collect(),
             sites: start_states(&sites),
             layers: layers.keys().cloned().collect(),

@@ -8,11 +8,13 @@ use std::iter::{repeat_with, zip};
 
 use protocol::event::{Cause, Event};
 use protocol::messages::{CommandText, Cut, Delivery, Payload, Point};
-use protocol::random::{Stream, stream, unit};
+use protocol::random::{Stream, key, stream, unit};
 use protocol::{RobotName, Seq, Tick};
+use radio::{LinkGeometry, LossTerm, RadioModel, SendQueue, Transmitter};
 
 use scenario::Network;
-use scenario::network::{Burst, Channel, Counted, NamedFate, ticks};
+use scenario::network::{Burst, Channel, Counted, NamedFate, Radio, ticks};
+use world::Crossed;
 
 /// A command that a robot or the operator has sent.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -79,6 +81,17 @@ impl SentCommand {
         }
     }
 
+    /// Size of what its radio sends beside the overhead, bytes: its text and its payload as JSON.
+    fn content_bytes(&self) -> usize {
+        let payload = self.text.payload.as_ref();
+        self.text.command.len() + payload.map_or(0, |payload| payload.as_json().len())
+    }
+
+    /// Whether it is sent in the same transmission as the command before: a broadcast, whose targets are in the order of names.
+    fn is_sent_with(&self, before: &Self) -> bool {
+        self.from == before.from && self.to > before.to && self.text == before.text
+    }
+
     /// Size of its delivery in the news of its target, bytes.
     fn encoded_bytes(&self) -> usize {
         let text_bytes = serde_json::to_string(&self.text.command).map_or(0, |json| json.len());
@@ -103,6 +116,9 @@ const DELIVERY_BYTES: usize = 64;
 const FIELD_BYTES: usize = ",\"payload\":".len();
 /// Most bytes of commands that arrive at a robot in a tick, so that its news fit into a message.
 const MAX_DELIVERED_BYTES: usize = 512 * 1024;
+
+/// How much later than at the end of a tick a transmission may end to count as ended, ticks: its time is a sum of rounded numbers.
+const TICK_TOLERANCE: f64 = 1e-9;
 
 /// A pair of robots, in the direction of the message.
 type Pair = (RobotName, RobotName);
@@ -148,23 +164,44 @@ pub struct Medium {
     seed: u64,
     /// Seed of the streams of links with bursts, which last.
     burst_seed: u64,
+    /// Seed of shadowing, which belongs to places: it stays when chance is drawn anew.
+    shadowing_seed: u64,
     tick_s: f64,
     network: Network,
     roster: Vec<RobotName>,
     /// Commands of the last tick, on which nothing is decided yet.
     sent: Vec<SentCommand>,
+    /// The queue of each sender's radio.
+    queues: BTreeMap<RobotName, SendQueue>,
+    /// Commands that wait in these queues, with what the scenario says of each, by the tick in which they are transmitted.
+    waiting: BTreeMap<Tick, Vec<(SentCommand, NamedFates)>>,
     /// Commands under way with their numbers of copies, by tick of arrival.
     arrivals: BTreeMap<Tick, Vec<(SentCommand, usize)>>,
     /// States of the links with bursts.
     bursts: BTreeMap<(MessageKind, Pair), BurstState>,
     /// Links that are cut now.
     cut: BTreeMap<Pair, Scope>,
-    /// Where the robots of the roster stand now, if that matters.
-    places: Vec<Point>,
     /// Number of commands sent so far on each link, and of those with texts that the scenario names.
     counts: BTreeMap<Counted, u64>,
     /// What is decided in the next tick whatever is drawn.
     forced: Vec<ForcedVerdict>,
+}
+
+/// Where messages pass in a tick.
+struct Surroundings<'a> {
+    /// Where the robots of the roster stand; empty if that does not matter.
+    places: Vec<Point>,
+    /// What is between two of them, by their numbers.
+    crossed: &'a dyn Fn(usize, usize) -> Crossed,
+}
+
+/// What the queue of a radio makes of a command.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Transmission {
+    /// Its last bit is sent before this tick begins.
+    Before(Tick),
+    /// It has no room.
+    NoRoom,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -215,14 +252,16 @@ impl Medium {
         let mut medium = Self {
             seed,
             burst_seed: seed,
+            shadowing_seed: seed,
             tick_s,
             network: Network::default(),
             roster,
             sent: Vec::new(),
+            queues: BTreeMap::new(),
+            waiting: BTreeMap::new(),
             arrivals: BTreeMap::new(),
             bursts: BTreeMap::new(),
             cut: BTreeMap::new(),
-            places: Vec::new(),
             counts: BTreeMap::new(),
             forced: Vec::new(),
         };
@@ -280,19 +319,35 @@ impl Medium {
         self.sent.push(command);
     }
 
-    /// The decisions at the beginning of `tick`, in which the robots of the roster stand at these places.
+    /// The decisions at the beginning of `tick`, in which the robots of the roster stand at these places and nothing is between them.
     pub fn decide(&mut self, tick: Tick, places: Vec<Point>) -> NetworkDecisions {
+        self.decide_among(tick, places, &|_, _| Crossed::default())
+    }
+
+    /// The decisions at the beginning of `tick`, in which the robots of the roster stand at these places. `crossed` is what is
+    /// between two robots, by their numbers in the roster.
+    pub fn decide_among(
+        &mut self,
+        tick: Tick,
+        places: Vec<Point>,
+        crossed: &dyn Fn(usize, usize) -> Crossed,
+    ) -> NetworkDecisions {
+        let around = Surroundings { places, crossed };
         let mut decision = NetworkDecisions::default();
-        self.places = places;
         // Cuts come first, so that a command which is sent or arrives in the tick in which a cut begins is lost. Bursts advance before
         // any command draws. What arrives in this tick includes what was decided in it.
         self.update_cuts(tick, &mut decision.events);
         self.advance_bursts();
-        for command in std::mem::take(&mut self.sent) {
-            self.dispatch(tick, command, &mut decision.events);
+        for (command, named) in self.waiting.remove(&tick).unwrap_or_default() {
+            self.transmit(tick, command, named, &around, &mut decision.events);
+        }
+        let sent = std::mem::take(&mut self.sent);
+        let transmissions = self.queue(tick, &sent);
+        for (command, transmission) in zip(sent, transmissions) {
+            self.dispatch(tick, command, transmission, &around, &mut decision.events);
         }
         self.deliver(tick, &mut decision);
-        self.decide_queries(tick, &mut decision);
+        self.decide_queries(tick, &around, &mut decision);
         self.forced.clear();
         decision
     }
@@ -381,8 +436,45 @@ impl Medium {
         }
     }
 
-    /// Decides the fate of a command. Afterwards only a cut while it is under way can change it.
-    fn dispatch(&mut self, tick: Tick, command: SentCommand, events: &mut Vec<Event>) {
+    /// Puts commands into the queues of their senders' radios. A broadcast is transmitted once.
+    fn queue(&mut self, tick: Tick, sent: &[SentCommand]) -> Vec<Transmission> {
+        let radio = self.network.radio.as_ref();
+        let Some(transmitter) = radio.and_then(|radio| radio.transmitter) else {
+            return vec![Transmission::Before(tick); sent.len()];
+        };
+
+        let mut transmissions: Vec<Transmission> = Vec::with_capacity(sent.len());
+        for (index, command) in sent.iter().enumerate() {
+            let before = index.checked_sub(1).map(|before| &sent[before]);
+            let transmission = match (before, transmissions.last()) {
+                (Some(before), Some(shared)) if command.is_sent_with(before) => *shared,
+                _ => self.queue_one(tick, command, &transmitter),
+            };
+            transmissions.push(transmission);
+        }
+        transmissions
+    }
+
+    fn queue_one(&mut self, tick: Tick, command: &SentCommand, by: &Transmitter) -> Transmission {
+        // Robots send at the end of a tick, so all of the next one is time to transmit before their commands arrive as usual.
+        let now_s = tick.saturating_sub(1) as f64 * self.tick_s;
+        let queue = self.queues.entry(command.from.clone()).or_default();
+        let Some(sent_s) = queue.offer(now_s, command.content_bytes(), by) else {
+            return Transmission::NoRoom;
+        };
+        let at = (sent_s / self.tick_s - TICK_TOLERANCE).ceil() as Tick;
+        Transmission::Before(at.max(tick))
+    }
+
+    /// Decides what becomes of a command that was sent in the last tick.
+    fn dispatch(
+        &mut self,
+        tick: Tick,
+        command: SentCommand,
+        transmission: Transmission,
+        around: &Surroundings<'_>,
+        events: &mut Vec<Event>,
+    ) {
         if self.roster.binary_search(&command.to).is_err() {
             events.push(command.dropped(Cause::Unknown));
             return;
@@ -394,8 +486,39 @@ impl Medium {
             return;
         }
 
-        let forced = self.forced_verdict(&command);
         let named = self.named_fates(&command);
+        let is_forced = self.forced_verdict(&command).is_some();
+        match transmission {
+            // Whether it is forced or named, it has taken its time.
+            _ if is_forced || named.is_lost => self.transmit(tick, command, named, around, events),
+            Transmission::NoRoom => events.push(command.dropped(Cause::Queue)),
+            Transmission::Before(until) if until > tick => {
+                events.push(Event::CommandDelayed {
+                    from: command.from.clone(),
+                    to: command.to.clone(),
+                    seq: command.seq,
+                    until,
+                    because: Some(Cause::Queue),
+                });
+                self.waiting
+                    .entry(until)
+                    .or_default()
+                    .push((command, named));
+            }
+            Transmission::Before(_) => self.transmit(tick, command, named, around, events),
+        }
+    }
+
+    /// Decides the fate of a command that its sender has transmitted. Afterwards only a cut while it is under way can change it.
+    fn transmit(
+        &mut self,
+        tick: Tick,
+        command: SentCommand,
+        named: NamedFates,
+        around: &Surroundings<'_>,
+        events: &mut Vec<Event>,
+    ) {
+        let forced = self.forced_verdict(&command);
         let is_lost = named.is_lost && forced.is_none();
         if is_lost || forced == Some(NetworkVerdict::IsLost(command.seq)) {
             events.push(command.dropped(Cause::Scripted));
@@ -420,7 +543,12 @@ impl Medium {
             None => 0.0,
         };
         let pair = (from.clone(), to.clone());
-        if let Some(because) = self.loss(MessageKind::Commands, &channel, &pair, loss) {
+        let by_rule = self.loss(MessageKind::Commands, &channel, &pair, loss, around);
+        let lost = by_rule.or_else(|| {
+            let name = format!("radio/{}/{from}/{to}/{seq}", tick - 1);
+            self.radio_loss(&pair, &name, around)
+        });
+        if let Some(because) = lost {
             events.push(command.dropped(because));
             return;
         }
@@ -494,13 +622,20 @@ impl Medium {
         fates
     }
 
-    /// The cause for which a message is lost, if it is. `drawn` is its random number.
-    fn loss(&self, kind: MessageKind, channel: &Channel, pair: &Pair, drawn: f64) -> Option<Cause> {
+    /// The cause for which a rule loses a message, if one does. `drawn` is its random number.
+    fn loss(
+        &self,
+        kind: MessageKind,
+        channel: &Channel,
+        pair: &Pair,
+        drawn: f64,
+        around: &Surroundings<'_>,
+    ) -> Option<Cause> {
         let cut = self.cut.get(pair).copied().unwrap_or_default();
         if cut.contains(kind) {
             return Some(Cause::Partition);
         }
-        if self.is_out_of_range(pair) {
+        if self.is_out_of_range(pair, around) {
             return Some(Cause::OutOfRange);
         }
         if drawn < channel.loss {
@@ -512,16 +647,65 @@ impl Medium {
         (drawn < burst.loss).then_some(Cause::Burst)
     }
 
-    /// Whether two robots of the roster are farther apart than their radios reach.
-    fn is_out_of_range(&self, (from, to): &Pair) -> bool {
-        let Some(radio) = self.network.radio else {
-            return false;
-        };
-        let place = |robot| self.places.get(self.roster.binary_search(robot).ok()?);
-        match (place(from), place(to)) {
-            (Some(from), Some(to)) => from.distance_m(*to) > radio.range_m,
+    /// Whether two robots of the roster are farther apart than their radios may reach.
+    fn is_out_of_range(&self, pair: &Pair, around: &Surroundings<'_>) -> bool {
+        let range_m = self.network.radio.as_ref().and_then(|radio| radio.range_m);
+        let ends = self.ends(pair, around);
+        match (range_m, ends) {
+            (Some(range_m), Some([(_, from), (_, to)])) => from.distance_m(to) > range_m,
             _ => false,
         }
+    }
+
+    /// The numbers and the places of two robots in the order of their names, which is the same for both directions; `None` where
+    /// places do not matter.
+    fn ends(&self, (from, to): &Pair, around: &Surroundings<'_>) -> Option<[(usize, Point); 2]> {
+        let end = |robot| {
+            let index = self.roster.binary_search(robot).ok()?;
+            Some((index, *around.places.get(index)?))
+        };
+        Some([end(from.min(to))?, end(from.max(to))?])
+    }
+
+    /// Why a message has too little power, if it has. Its fading is drawn from the stream with this name.
+    fn radio_loss(&self, pair: &Pair, name: &str, around: &Surroundings<'_>) -> Option<Cause> {
+        let model = self.network.radio.as_ref()?.model.as_ref()?;
+        let [(first, one), (second, other)] = self.ends(pair, around)?;
+        let distance_m = one.distance_m(other);
+        // What is between the two is looked for only where it costs power.
+        let crossed = if model.walls_db > 0.0 || model.bodies_db > 0.0 {
+            (around.crossed)(first, second)
+        } else {
+            Crossed::default()
+        };
+        let geometry = LinkGeometry {
+            distance_m,
+            walls: crossed.walls,
+            bodies: crossed.bodies,
+        };
+
+        let shadowing_db = self.shadowing_db(model, [(first, one), (second, other)]);
+        let mut chance = stream(self.seed, name);
+        let gain = model.fading.gain(distance_m, || unit(&mut chance));
+        let reception = model.reception(geometry, shadowing_db, gain);
+        reception.lost.map(cause)
+    }
+
+    /// The loss by shadowing between two robots, dB. A function of the seed, their names and their places.
+    fn shadowing_db(
+        &self,
+        model: &RadioModel,
+        [(first, one), (second, other)]: [(usize, Point); 2],
+    ) -> f64 {
+        let Some(shadowing) = model.shadowing else {
+            return 0.0;
+        };
+        let (first, second) = (&self.roster[first], &self.roster[second]);
+        let key = key(
+            self.shadowing_seed,
+            &format!("radio/shadowing/{first}/{second}"),
+        );
+        shadowing.loss_db(key, [[one.x, one.y], [other.x, other.y]])
     }
 
     fn deliver(&mut self, tick: Tick, decision: &mut NetworkDecisions) {
@@ -568,10 +752,22 @@ impl Medium {
     }
 
     /// Decides once for each asker, target and tick whether queries are answered, for which both directions are needed.
-    fn decide_queries(&self, tick: Tick, decision: &mut NetworkDecisions) {
-        decision.in_range = self.in_range();
+    fn decide_queries(
+        &self,
+        tick: Tick,
+        around: &Surroundings<'_>,
+        decision: &mut NetworkDecisions,
+    ) {
+        decision.in_range = self.in_range(around);
+        // Those that fading alone keeps from being asked in this tick.
+        let mut faded = BTreeSet::new();
+        if let Some(in_range) = &mut decision.in_range
+            && self.has_radio_model()
+        {
+            faded = self.decide_receptions(tick, around, in_range);
+        }
         let is_drawn = self.network.touches_queries();
-        if self.cut.is_empty() && !is_drawn {
+        if self.cut.is_empty() && !is_drawn && faded.is_empty() {
             return;
         }
 
@@ -590,7 +786,8 @@ impl Medium {
             };
             let pair = (asker.clone(), target.clone());
             let channel = self.channel(MessageKind::Queries, &pair);
-            let lost = self.loss(MessageKind::Queries, &channel, &pair, drawn);
+            let by_rule = self.loss(MessageKind::Queries, &channel, &pair, drawn, around);
+            let lost = by_rule.or(faded.contains(&pair).then_some(Cause::Fading));
             let is_forced = self.forced.iter().any(|forced| {
                 forced.verdict == NetworkVerdict::IsAnswered
                     && forced.from == asker
@@ -601,7 +798,7 @@ impl Medium {
             }
 
             // A partition has its own events: only random losses are recorded.
-            if let Some(because @ (Cause::Loss | Cause::Burst)) = lost
+            if let Some(because @ (Cause::Loss | Cause::Burst | Cause::Fading)) = lost
                 && !answer_is_cut
             {
                 decision.events.push(Event::QueryLost {
@@ -614,11 +811,43 @@ impl Medium {
         }
     }
 
-    /// The robots that the radio of each reaches. Costs the pairs that are near in x, not all pairs.
-    fn in_range(&self) -> Option<BTreeMap<RobotName, Vec<RobotName>>> {
-        let radio = self.network.radio?;
+    /// Whether messages need power.
+    fn has_radio_model(&self) -> bool {
+        let radio = self.network.radio.as_ref();
+        radio.is_some_and(|radio| radio.model.is_some())
+    }
+
+    /// Leaves in the lists of each robot those whose answer it would receive in this tick, or fail to receive by fading alone: these
+    /// are returned. The question and the answer have the same fading, because they follow each other at once.
+    fn decide_receptions(
+        &self,
+        tick: Tick,
+        around: &Surroundings<'_>,
+        in_range: &mut BTreeMap<RobotName, Vec<RobotName>>,
+    ) -> BTreeSet<Pair> {
+        let mut faded = BTreeSet::new();
+        for (asker, targets) in in_range {
+            targets.retain(|target| {
+                let pair = (asker.clone(), target.clone());
+                let name = format!("radio/query/{tick}/{asker}/{target}");
+                match self.radio_loss(&pair, &name, around) {
+                    None => true,
+                    Some(Cause::Fading) => faded.insert(pair),
+                    Some(_) => false,
+                }
+            });
+        }
+        faded
+    }
+
+    /// The robots that the radio of each may reach: those within its range. Costs the pairs that are near in x, not all pairs.
+    fn in_range(&self, around: &Surroundings<'_>) -> Option<BTreeMap<RobotName, Vec<RobotName>>> {
+        let radio = self.network.radio.as_ref();
+        let radio = radio.filter(|radio| radio.range_m.is_some() || radio.model.is_some())?;
+        let Radio { range_m, .. } = radio;
+        let range_m = range_m.unwrap_or(f64::INFINITY);
         let mut from_left: Vec<(&RobotName, Point)> =
-            zip(&self.roster, self.places.iter().copied()).collect();
+            zip(&self.roster, around.places.iter().copied()).collect();
         from_left.sort_by(|(_, one), (_, other)| one.x.total_cmp(&other.x));
 
         let mut in_range: BTreeMap<RobotName, Vec<RobotName>> =
@@ -627,9 +856,9 @@ impl Medium {
             let right = &from_left[index + 1..];
             let near = right
                 .iter()
-                .take_while(|(_, other)| other.x - at.x <= radio.range_m);
+                .take_while(|(_, other)| other.x - at.x <= range_m);
             for (other, other_at) in near {
-                if at.distance_m(*other_at) <= radio.range_m {
+                if at.distance_m(*other_at) <= range_m {
                     for (from, to) in [(*one, *other), (*other, *one)] {
                         in_range.entry(from.clone()).or_default().push(to.clone());
                     }
@@ -656,6 +885,17 @@ impl Medium {
             });
         }
         cuts
+    }
+}
+
+/// The cause of a loss, as events name it.
+fn cause(term: LossTerm) -> Cause {
+    match term {
+        LossTerm::Distance => Cause::Distance,
+        LossTerm::Walls => Cause::Wall,
+        LossTerm::Bodies => Cause::Body,
+        LossTerm::Shadowing => Cause::Shadowing,
+        LossTerm::Fading => Cause::Fading,
     }
 }
 

@@ -273,7 +273,9 @@ impl Simulation {
         self.layers.pass_tick();
 
         let places = self.world.robots().iter().copied().map(to_wire);
-        let decision = self.medium.decide(self.now, places.collect());
+        let places = places.collect();
+        let crossed = |one, other| self.world.crossed(one, other);
+        let decision = self.medium.decide_among(self.now, places, &crossed);
         self.events.extend(decision.events);
         self.arriving = decision.delivered;
         self.in_range = decision.in_range;

@@ -147,13 +147,13 @@ impl Timeline {
                 ..
             } => self.change_command(from, *seq, |command| {
                 command.until = Some(*until);
-                command.is_named |= because.is_some();
+                command.is_named |= *because == Some(Cause::Scripted);
             }),
             Event::CommandDuplicated {
                 from, seq, because, ..
             } => self.change_command(from, *seq, |command| {
                 command.is_doubled = true;
-                command.is_named |= because.is_some();
+                command.is_named |= *because == Some(Cause::Scripted);
             }),
             Event::CommandDelivered { from, seq, .. } => {
                 let end = CommandEnd { tick, lost: None };

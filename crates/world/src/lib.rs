@@ -95,7 +95,7 @@ pub use point::Point;
 pub use reactions::{Reaction, Response};
 pub use shape::{Shape, Wall};
 pub use shapes::Shapes;
-pub use sight::{Opaque, is_hidden};
+pub use sight::{Crossed, Opaque, is_hidden};
 pub use tracks::{Recorded, Track, Waypoint};
 pub use triangular::Triangular;
 pub use walk::Passage;

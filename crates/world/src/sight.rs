@@ -116,7 +116,42 @@ pub fn is_hidden<'a>(from: Point, to: Point, opaque: impl IntoIterator<Item = &'
     })
 }
 
+/// What the straight line between two robots crosses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct Crossed {
+    /// Number of walls.
+    pub walls: u32,
+    /// Number of bodies of other robots and of guests.
+    pub bodies: u32,
+}
+
 impl<R> World<R> {
+    /// What the straight line between the centers of two robots crosses, the same in both directions. Obstacles do not count.
+    #[must_use]
+    pub fn crossed(&self, one: usize, other: usize) -> Crossed {
+        let (first, second) = (one.min(other), one.max(other));
+        let (from, to) = (self.robots()[first], self.robots()[second]);
+        let middle = from + (to - from) * 0.5;
+        // A little more, because the half of a distance is rounded.
+        let range_m = from.distance_m(to) * 0.5 + TOLERANCE_M;
+        let is_crossed = |opaque: &Opaque| opaque.entered_after(from, to).is_some();
+
+        let walls = self.walls_near(middle, range_m).filter(is_crossed).count();
+        let mut bodies = 0;
+        for (body, opaque) in self.bodies_near(middle, range_m) {
+            let is_between = match body {
+                Body::Robot(index) => index != first && index != second,
+                Body::Guest(_) => true,
+                Body::Obstacle(_) => false,
+            };
+            bodies += u32::from(is_between && is_crossed(&opaque));
+        }
+        Crossed {
+            walls: walls as u32,
+            bodies,
+        }
+    }
+
     /// The walls and the fixed obstacles that may hide something within `range_m` of a place; obstacles with their index.
     #[must_use]
     pub fn opaque_near(&self, from: Point, range_m: f64) -> Vec<(Option<usize>, Opaque)> {

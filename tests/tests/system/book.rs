@@ -225,7 +225,7 @@ fn the_examples_of_files_are_right() {
     for page in ["first-experiment.md", "auction.md", "swarm.md"] {
         files.extend(examples(page));
     }
-    assert_eq!(files.len(), 29);
+    assert_eq!(files.len(), 30);
 
     let lab = Lab::new();
     // A drawing that one of them names.

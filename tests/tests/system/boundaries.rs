@@ -69,6 +69,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "config",
             "lockstep",
             "observe",
+            "pictures",
             "protocol",
             "recording",
             "terminal",

@@ -787,6 +787,10 @@ export interface HeldProcess {
  */
 export interface Flight {
   /**
+   * Why the medium lost it, in words; only where it did.
+   */
+  because?: string | null;
+  /**
    * What it says; only where it was sent just now.
    */
   command?: string;

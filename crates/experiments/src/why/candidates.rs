@@ -130,9 +130,8 @@ fn left_out(trunk: &Trunk, tick: Tick, event: &Event) -> Option<(u8, String, Cou
             from,
             to,
             seq,
-            because:
-                Cause::Loss | Cause::Burst | Cause::Partition | Cause::OutOfRange | Cause::Scripted,
-        } => Some((
+            because,
+        } if is_of_network(*because) => Some((
             1,
             format!("{} was lost", command(from, to, *seq)),
             arrives(from, to, *seq),
@@ -195,6 +194,11 @@ fn named(trunk: &Trunk, tick: Tick, by: &RobotName, target: &RobotName, number: 
         }
     }
     format!("command {number} from {by} to {target}")
+}
+
+/// Whether the network lost a message, and not its target or its sender.
+fn is_of_network(because: Cause) -> bool {
+    !matches!(because, Cause::Missed | Cause::Overflow | Cause::Unknown)
 }
 
 /// Whether it is the fate of a command that the scenario names by its number.

@@ -37,6 +37,12 @@ pub(crate) fn cause(cause: Cause) -> &'static str {
         Cause::Overflow => "too much",
         Cause::Unknown => "no such robot",
         Cause::Scripted => "scripted",
+        Cause::Distance => "distance",
+        Cause::Wall => "wall",
+        Cause::Body => "body",
+        Cause::Shadowing => "shadowing",
+        Cause::Fading => "fading",
+        Cause::Queue => "queue",
     }
 }
 

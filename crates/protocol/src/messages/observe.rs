@@ -136,6 +136,9 @@ pub struct Flight {
     pub command: String,
     /// What became of it.
     pub fate: Fate,
+    /// Why the medium lost it, in words; only where it did.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub because: Option<String>,
 }
 
 /// What became of a command.

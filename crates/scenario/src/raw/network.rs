@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use config::units::{Length, Time};
+use config::units::Time;
 use config::{FileError, Source};
 use protocol::RobotName;
 use serde::{Deserialize, Serialize};
@@ -11,9 +11,10 @@ use world::Triangular;
 
 use super::super::checked::RobotSpec;
 use super::super::network::{
-    Burst, Channel, Counted, LinkRule, NamedCommand, NamedFate, Network, Partition, Radio, ticks,
+    Burst, Channel, Counted, LinkRule, NamedCommand, NamedFate, Network, Partition, ticks,
 };
 use super::numbers::Range;
+use super::radio_table::RadioTable;
 use super::times;
 use super::times::Times;
 use super::unplaced::unplaced;
@@ -28,7 +29,7 @@ const MAX_ENTRIES: usize = 10_000;
 pub(super) struct NetworkTable {
     commands: Option<Spanned<ChannelTable>>,
     queries: Option<Spanned<ChannelTable>>,
-    radio: Option<RadioTable>,
+    radio: Option<Spanned<RadioTable>>,
     #[serde(default, rename = "link", skip_serializing_if = "Vec::is_empty")]
     links: Vec<Spanned<LinkTable>>,
     #[serde(default, rename = "partition", skip_serializing_if = "Vec::is_empty")]
@@ -63,12 +64,6 @@ struct BurstTable {
     enter: f64,
     leave: f64,
     loss: Option<f64>,
-}
-
-#[derive(Debug, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
-struct RadioTable {
-    range: Spanned<Length>,
 }
 
 #[derive(Debug, Deserialize, Serialize)]
@@ -160,7 +155,10 @@ pub(super) fn check(
     let mut network = Network {
         commands: checker.commands(raw.commands)?.unwrap_or_default(),
         queries: checker.queries(raw.queries)?.unwrap_or_default(),
-        radio: raw.radio.map(|radio| checker.radio(&radio)).transpose()?,
+        radio: match raw.radio {
+            Some(radio) => Some(radio.get_ref().check(radio.span(), source)?),
+            None => None,
+        },
         ..Network::default()
     };
     for link in raw.links {
@@ -243,14 +241,6 @@ impl Checker<'_> {
             text: raw.text,
         };
         self.named(command, NamedFate::Late(by))
-    }
-
-    fn radio(&self, raw: &RadioTable) -> Result<Radio, FileError> {
-        let Length(range_m) = *raw.range.get_ref();
-        if range_m > 0.0 && range_m.is_finite() {
-            return Ok(Radio { range_m });
-        }
-        Err(self.refuse(raw.range.span(), "a radio reaches farther than 0 m"))
     }
 
     fn commands(&self, raw: Option<Spanned<ChannelTable>>) -> Result<Option<Channel>, FileError> {
@@ -371,8 +361,12 @@ impl Checker<'_> {
 }
 
 impl NetworkTable {
-    /// Remarks about the times of its partitions.
+    /// Remarks about its radio, and about the times of its partitions.
     pub(super) fn remark(&self, times: &mut Times<'_>) {
+        if let Some(radio) = &self.radio {
+            let remark = radio.get_ref().remark(times.source);
+            times.remarks.extend(remark);
+        }
         for partition in &self.partitions {
             let partition = partition.get_ref();
             times.begins("partition", &partition.from);
@@ -405,9 +399,7 @@ impl NetworkTable {
         Some(unplaced(Self {
             commands: Some(unplaced(network.commands.into())),
             queries: Some(unplaced(network.queries.into())),
-            radio: network.radio.map(|radio| RadioTable {
-                range: unplaced(Length(radio.range_m)),
-            }),
+            radio: network.radio.as_ref().map(|radio| unplaced(radio.into())),
             links: links.map(unplaced).collect(),
             partitions: partitions.map(unplaced).collect(),
             lose,

@@ -13,7 +13,7 @@ const TOLERANCE: f64 = 1e-6;
 
 /// Remarks about the times of a scenario.
 pub(super) struct Times<'a> {
-    source: &'a Source,
+    pub(super) source: &'a Source,
     tick_s: f64,
     /// Last tick of the run.
     last: Tick,

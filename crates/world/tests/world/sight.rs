@@ -107,6 +107,32 @@ fn shaped(obstacles: &[Point], robots: &[Point], shapes: Shapes) -> World<Xoshir
 }
 
 #[test]
+fn a_line_between_robots_crosses_walls_and_bodies_that_are_on_it() {
+    let wall = |x: f64| Wall {
+        from: Point::new(x, 0.0),
+        to: Point::new(x, 6.0),
+    };
+    let robots = [(1.0, 5.0), (9.0, 5.0), (5.0, 5.2), (5.0, 9.0), (1.0, 9.0)];
+    let robots = robots.map(|(x, y)| Point::new(x, y));
+    let shapes = Shapes {
+        walls: vec![wall(3.0), wall(7.0)],
+        ..Shapes::default()
+    };
+    // An obstacle is no body of a robot or guest.
+    let world = shaped(&[Point::new(8.0, 5.0)], &robots, shapes);
+    let crossed = |one, other| {
+        let crossed = world.crossed(one, other);
+        assert_eq!(crossed, world.crossed(other, one));
+        (crossed.walls, crossed.bodies)
+    };
+    assert_eq!(crossed(0, 1), (2, 1));
+    assert_eq!(crossed(0, 2), (1, 0), "neither end counts");
+    assert_eq!(crossed(2, 3), (0, 0));
+    assert_eq!(crossed(3, 4), (0, 0), "beside both walls");
+    assert_eq!(crossed(0, 0), (0, 0));
+}
+
+#[test]
 fn a_ray_ends_at_the_next_body_at_the_edge_or_at_its_range() {
     let robots = [Point::new(3.0, 5.0), Point::new(3.0, 8.0)];
     let world = world(&[Point::new(6.0, 5.0), Point::new(8.0, 5.0)], &robots);
