@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use lab::branch::{Branch, Trunk};
 use lab::folder::recorded_epoch;
@@ -224,4 +225,50 @@ fn rest_of_guests(run: &Branch, kind: &str) -> String {
         branch.step().unwrap();
     }
     format!("{:?}", branch.simulation().world().guests())
+}
+
+/// 200 forks at each of 40 ticks of a hall of ten minutes.
+#[test]
+#[ignore = "thorough: it measures time on an idle machine; with `-- --include-ignored`"]
+fn eight_thousand_forks_take_less_than_five_minutes() {
+    let out = tempfile::tempdir().unwrap();
+    let changes = Changes {
+        duration_s: Some(600.0),
+        ..Changes::default()
+    };
+    let scenario = Scenario::load(&root().join("configs/hors_doeuvres.toml"), &changes).unwrap();
+    let folder = RunFolder::at(out.path().join("hall"));
+    let lock = folder.create(&scenario).unwrap();
+    execute(scenario.clone(), &"hall".parse().unwrap(), &folder, None).unwrap();
+    drop(lock);
+
+    let begun = Instant::now();
+    let files = recorded_epoch(&folder, None).unwrap();
+    let mut trunk = Trunk::open(&files, scenario, project_robots(), true).unwrap();
+    let last = trunk.last();
+    let mut ticks = 0;
+    for index in 0..40 {
+        trunk.go_to(last * index / 40).unwrap();
+        let played = std::thread::scope(|scope| {
+            let threads = [0, 100].map(|first| {
+                let base = trunk.snapshot().unwrap();
+                scope.spawn(move || {
+                    let mut ticks = 0;
+                    for number in first..first + 100 {
+                        let mut branch = base.snapshot().unwrap().into_branch().unwrap();
+                        let from = branch.tick();
+                        branch.reseed(number + 1, &[]);
+                        branch.play().unwrap();
+                        ticks += branch.tick() - from;
+                    }
+                    ticks
+                })
+            });
+            threads.map(|thread| thread.join().unwrap())
+        });
+        ticks += played[0] + played[1];
+    }
+    let took = begun.elapsed();
+    println!("8000 forks, {ticks} ticks: {took:?}");
+    assert!(took < Duration::from_secs(300), "{took:?}");
 }
