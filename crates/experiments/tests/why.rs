@@ -8,6 +8,7 @@
     reason = "a test that cannot set up its subject fails"
 )]
 
+use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -257,7 +258,7 @@ fn last(recorded: &Recorded, robot: &str, variable: &str) -> f64 {
         .unwrap()
 }
 
-/// The first of these runs in which a robot ends with a number that is wanted. Names differ, so that chance does.
+/// The first of these runs in which a robot ends with a number that is wanted. Names and seeds differ, so that chance does.
 fn first(
     text: impl Fn(&str) -> String,
     (stem, number): (&str, usize),
@@ -265,13 +266,19 @@ fn first(
     is_wanted: impl Fn(f64) -> bool,
 ) -> (Recorded, String) {
     let name = format!("{stem}{number}");
-    for seed in 0..1000 {
+    for seed in seeds(number) {
         let recorded = record(&text(&name), seed);
         if is_wanted(last(&recorded, &name, variable)) {
             return (recorded, name);
         }
     }
     panic!("no run of {name} has the outcome");
+}
+
+/// The seeds of the runs of a number.
+fn seeds(number: usize) -> Range<u64> {
+    let first = 1000 * number as u64;
+    first..first + 1000
 }
 
 /// How often the intervals of a run with three heads miss what is true, of how many; the jumps must be where the coins are thrown.
@@ -406,7 +413,9 @@ fn finds_the_crash(number: usize) -> bool {
     );
     // Without the crash the run has three heads in the end, and so two of them before it.
     let has_three = |seed: &u64| last(&record(&text, *seed), &name, "heads") == 3.0;
-    let seed = (0..1000).find(has_three).expect("some run has three heads");
+    let seed = seeds(number)
+        .find(has_three)
+        .expect("some run has three heads");
     let crash =
         format!("[[fault]]\nrobot = \"{name}\"\ndo = \"crash\"\nat = \"35 s\"\nuntil = \"37 s\"\n");
     let recorded = record(&(text + &crash), seed);
