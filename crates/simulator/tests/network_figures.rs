@@ -170,6 +170,35 @@ fn consensus_by_loss() -> Vec<Measured> {
     points
 }
 
+/// The mean number of ticks until all robots know a rumor: that of the Markov chain of their number. Each that knows it sends it to one
+/// other one by chance; sends one after the other give the same number.
+fn mean_of_rumor(robots: usize, arrives: f64) -> f64 {
+    let mut shares = vec![0.0; robots + 1];
+    shares[1] = 1.0;
+    let mut mean = 0.0;
+    while shares[robots] < 1.0 - 1e-9 {
+        mean += 1.0 - shares[robots];
+        let mut next = vec![0.0; robots + 1];
+        for (know, share) in shares.iter().enumerate() {
+            let mut now = vec![0.0; robots + 1];
+            now[know] = *share;
+            for _ in 0..know {
+                for count in (1..robots).rev() {
+                    let moved =
+                        now[count] * arrives * (robots - count) as f64 / (robots - 1) as f64;
+                    now[count] -= moved;
+                    now[count + 1] += moved;
+                }
+            }
+            for (count, share) in now.iter().enumerate() {
+                next[count] += share;
+            }
+        }
+        shares = next;
+    }
+    mean
+}
+
 fn rumor_by_robots() -> Vec<Measured> {
     let arrives: f64 = 0.7;
     let mut points = Vec::new();
@@ -181,9 +210,8 @@ fn rumor_by_robots() -> Vec<Measured> {
             Some(other + usize::from(other >= from))
         };
         let times = ticks_until_all_know(&mut medium, robots, 200, anyone);
-        let n = robots as f64;
-        let law = libm::log(n) / libm::log(1.0 + arrives) + libm::log(n) / arrives;
-        points.push(Measured::mean(n, &times, law));
+        let law = mean_of_rumor(robots, arrives);
+        points.push(Measured::mean(robots as f64, &times, law));
     }
     points
 }
