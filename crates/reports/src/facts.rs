@@ -15,6 +15,8 @@ use timeline::{
     Counts, LinkCounts, Period, RobotCounts, Span, StateKind, StateOrder, StateSpan, Timeline,
 };
 
+use super::loss::LossByDistance;
+
 /// Parts of the floor along its longer side.
 const PARTS: f64 = 50.0;
 /// State variables that are shown over time.
@@ -45,6 +47,8 @@ pub(super) struct RunFacts {
     pub(super) robots: BTreeMap<RobotName, RobotFacts>,
     /// Commands by sender and target.
     pub(super) links: BTreeMap<(RobotName, RobotName), LinkCounts>,
+    /// What the radio lost, by distance.
+    pub(super) loss: LossByDistance,
     /// Faults, absences, cuts and changes, in the order of their beginnings.
     pub(super) disturbances: Vec<ScenarioEffect>,
     /// The verdicts about expectations, in the order in which they were decided.
@@ -105,6 +109,7 @@ impl RunFacts {
             facts.last_tick = entry.tick;
             for event in &entry.events {
                 counts.add(event);
+                facts.loss.add(entry.tick, event);
                 facts.add_event(entry.tick, event);
             }
             for span in timeline.tick(entry.tick, &entry.events) {
@@ -280,6 +285,7 @@ impl RunFacts {
             let ticks = recording.read(next, last.min(next + AT_ONCE))?;
             for tick in &ticks {
                 self.add_courses(tick);
+                self.loss.measure(tick.frame.tick, &tick.frame.robots);
                 for robot in &tick.frame.robots {
                     let column = (robot.location.x / part_m).clamp(0.0, PARTS - 1.0);
                     let row = (robot.location.y / part_m).clamp(0.0, PARTS - 1.0);

@@ -10,6 +10,7 @@ mod facts;
 mod figures;
 mod floor;
 mod limits;
+mod loss;
 mod quantity;
 mod runs;
 mod study;

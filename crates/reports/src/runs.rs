@@ -18,6 +18,7 @@ use super::decided::{decisions, write_decisions};
 use super::facts::RunFacts;
 use super::floor::occupancy;
 use super::limits::panels;
+use super::loss::LossByDistance;
 use super::transitions::transitions;
 use super::words::counted;
 use experiments::shell;
@@ -452,6 +453,9 @@ fn write_disturbances(page: &mut Page, runs: &[ReportedRun]) {
         counted(runs.len(), "run")
     );
     page.table(caption, &links_table(runs));
+    if let Some(figure) = LossByDistance::figure(runs.iter().map(|run| &run.facts.loss)) {
+        page.figure(figure);
+    }
 
     let mut table = Table::new("Run | what | of | from, s | until, s");
     for run in runs {
@@ -546,17 +550,17 @@ fn links_table(runs: &[ReportedRun]) -> Table {
         links.entry(link).or_default().add(counts);
     }
 
-    let mut table = Table::new("Link | sent | arrived | lost | held back | doubled");
+    let mut table = Table::new("Link | sent | arrived | lost | why | held back | doubled");
     for ((from, to), counts) in links {
         let mut row = vec![format!("{from} → {to}").into()];
-        let counts = [
-            counts.sent,
-            counts.delivered,
-            counts.lost(),
-            counts.delayed,
-            counts.duplicated,
-        ];
-        row.extend(counts.map(Cell::Count));
+        let causes: Vec<String> = counts
+            .dropped
+            .iter()
+            .map(|(because, count)| format!("{count} {because}"))
+            .collect();
+        row.extend([counts.sent, counts.delivered, counts.lost()].map(Cell::Count));
+        row.push(causes.join(", ").into());
+        row.extend([counts.delayed, counts.duplicated].map(Cell::Count));
         table.row(row);
     }
     table
