@@ -11,6 +11,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("world", &[]),
     ("radio", &[]),
     ("affect", &[]),
+    ("crowd", &[]),
     ("protocol", &[]),
     ("lockstep", &["protocol"]),
     ("config", &["protocol"]),
@@ -387,7 +388,7 @@ fn one_file_names_the_middleware() {
 #[test]
 fn the_pure_crates_know_no_clock_no_network_and_no_files() {
     for (name, dependencies) in dependencies() {
-        if ["world", "radio", "affect", "lockstep", "pictures"].contains(&name.as_str()) {
+        if ["world", "radio", "crowd", "affect", "lockstep", "pictures"].contains(&name.as_str()) {
             for impure in ["tokio", "tracing", "zenoh", "clap", "nix"] {
                 assert!(
                     !dependencies.contains(impure),
@@ -395,7 +396,7 @@ fn the_pure_crates_know_no_clock_no_network_and_no_files() {
                 );
             }
         }
-        if ["world", "radio"].contains(&name.as_str()) {
+        if ["world", "radio", "crowd"].contains(&name.as_str()) {
             assert!(
                 !dependencies.contains("serde"),
                 "the environment is not a message"

@@ -1,0 +1,263 @@
+//! The collision-free speed model.
+
+use crate::model::{NearWall, Neighbor, Surroundings, WalkingModel};
+use crate::vector::Vector;
+
+/// The collision-free speed model: direction from repulsion, speed from the gap in front. [D] Tordeux, Chraibi, Seyfried 2016,
+/// "Collision-free speed model for pedestrian dynamics", eq. 1 to 4.
+///
+/// Direction: e = unit(e0 - sum a exp((l - s)/D) n), with the distance s to each neighbor in direction n, and l the sum of both
+/// radii. Speed: V = min(v0, max(0, (s - l)/T)), with the distance s to the closest neighbor in front. No step is longer than the
+/// gap, so in continuous time nobody touches anybody.
+///
+/// The default parameters are calibrated to the line of Weidmann (1993) between 0.5 and 3 persons per m² in a corridor of 2 m, with
+/// Weidmann's spread of desired speeds, and, in a hurry, to the flow through a gate of 0.5 m. Two rules are added, because people of
+/// different speeds overtake each other, and pass each other sideways: `turns` and `breadth`. [I]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CollisionFree {
+    /// T, the time gap to who is in front, s. [D] 1.0, here calibrated.
+    pub time_gap_s: f64,
+    /// T of people in a hurry, s. [I] Calibrated to the flow through the gate.
+    pub hurried_gap_s: f64,
+    /// a, strength of the repulsion by neighbors. [D] 5.
+    pub repulsion: f64,
+    /// D, range of the repulsion by neighbors, m. [D] 0.1.
+    pub range_m: f64,
+    /// Strength of the repulsion by walls. [D] 5, in JuPedSim.
+    pub wall_repulsion: f64,
+    /// Range of the repulsion by walls, m. [D] 0.02, in JuPedSim.
+    pub wall_range_m: f64,
+    /// Share of l within which a neighbor beside the way ahead is in front. [D] 1.
+    pub breadth: f64,
+    /// Number of directions to each side, 15 degrees apart, that people who are slowed down look at, and of which they take the
+    /// one in which they come closest to where they want to go. Up to 6. [D] 0; the rule is that of Moussaïd, Helbing, Theraulaz
+    /// 2011, "How simple rules determine pedestrian behavior", with the gap as the free distance. [I]
+    pub turns: usize,
+    /// Radius of bodies, m. [D] 0.15 (l = 0.3 m), here calibrated.
+    pub radius_m: f64,
+}
+
+/// Ranges of repulsion after which it is left out: a exp(-8) is 0.002. [I]
+const RANGES: f64 = 8.0;
+
+/// Cosine and sine of 15, 30, …, 90 degrees.
+const TURNS: [(f64, f64); 6] = [
+    (0.965_925_826_289_068_3, 0.258_819_045_102_520_76),
+    (0.866_025_403_784_438_6, 0.5),
+    (
+        std::f64::consts::FRAC_1_SQRT_2,
+        std::f64::consts::FRAC_1_SQRT_2,
+    ),
+    (0.5, 0.866_025_403_784_438_6),
+    (0.258_819_045_102_520_76, 0.965_925_826_289_068_3),
+    (0.0, 1.0),
+];
+
+impl CollisionFree {
+    /// The parameters of the source. [D]
+    #[must_use]
+    pub const fn published() -> Self {
+        Self {
+            time_gap_s: 1.0,
+            hurried_gap_s: 1.0,
+            repulsion: 5.0,
+            range_m: 0.1,
+            wall_repulsion: 5.0,
+            wall_range_m: 0.02,
+            breadth: 1.0,
+            turns: 0,
+            radius_m: 0.15,
+        }
+    }
+
+    fn direction(&self, seen: &Surroundings<'_>) -> Vector {
+        let mut sum = seen.toward;
+        for other in seen.others {
+            let contact_m = seen.person.radius_m + other.radius_m;
+            let ranges = (other.distance_m - contact_m) / self.range_m;
+            if ranges < RANGES {
+                let strength = self.repulsion * libm::exp(-ranges);
+                sum += other.offset * (-strength / other.distance_m);
+            }
+        }
+        for wall in seen.walls {
+            sum += self.from_wall(seen.person.radius_m, wall);
+        }
+        sum.unit()
+    }
+
+    fn from_wall(&self, radius_m: f64, wall: &NearWall) -> Vector {
+        let ranges = (wall.distance_m - radius_m) / self.wall_range_m;
+        if ranges < RANGES && wall.distance_m > 0.0 {
+            let strength = self.wall_repulsion * libm::exp(-ranges);
+            wall.offset * (-strength / wall.distance_m)
+        } else {
+            Vector::ZERO
+        }
+    }
+
+    /// The velocity of a person who walks in a direction, m/s.
+    fn velocity_in(&self, seen: &Surroundings<'_>, direction: Vector) -> Vector {
+        let gap_m = self.gap_m(seen.person.radius_m, seen.others, direction);
+        direction * (gap_m / self.time_gap_s).clamp(0.0, seen.desired_mps)
+    }
+
+    /// The way to the closest wall in a direction, m; infinite if there is none.
+    fn wall_gap_m(&self, seen: &Surroundings<'_>, direction: Vector) -> f64 {
+        let mut gap_m = f64::INFINITY;
+        for wall in seen.walls {
+            let approach_m = direction.dot(wall.offset);
+            if approach_m > 0.0 {
+                let free_m = (wall.distance_m - seen.person.radius_m).max(0.0);
+                gap_m = gap_m.min(free_m * wall.distance_m / approach_m);
+            }
+        }
+        gap_m
+    }
+
+    /// The gap to who is in front in a direction, m; infinite if nobody is.
+    fn gap_m(&self, radius_m: f64, others: &[Neighbor], direction: Vector) -> f64 {
+        let mut gap_m = f64::INFINITY;
+        for other in others {
+            let contact_m = radius_m + other.radius_m;
+            let is_in_front = direction.dot(other.offset) > 0.0
+                && direction.cross(other.offset).abs() <= self.breadth * contact_m;
+            if is_in_front {
+                gap_m = gap_m.min(other.distance_m - contact_m);
+            }
+        }
+        gap_m
+    }
+}
+
+impl Default for CollisionFree {
+    fn default() -> Self {
+        Self {
+            time_gap_s: 1.15,
+            hurried_gap_s: 0.56,
+            repulsion: 2.0,
+            range_m: 0.1,
+            wall_repulsion: 1.0,
+            wall_range_m: 0.1,
+            breadth: 0.8,
+            turns: 2,
+            radius_m: 0.18,
+        }
+    }
+}
+
+impl WalkingModel for CollisionFree {
+    fn reach_m(&self) -> f64 {
+        // Who walks at 1.5 m/s sees what slows them down; beyond it only faster people would begin to slow down earlier.
+        let braking_m = 2.0 * self.radius_m + 1.5 * self.time_gap_s;
+        let repelled_m = 2.0 * self.radius_m + RANGES * self.range_m;
+        braking_m.max(repelled_m)
+    }
+
+    fn longest_step_s(&self) -> f64 {
+        0.05
+    }
+
+    fn body_radius_m(&self) -> f64 {
+        self.radius_m
+    }
+
+    fn hurried(&self) -> Self {
+        Self {
+            time_gap_s: self.hurried_gap_s,
+            ..*self
+        }
+    }
+
+    fn velocity(&self, seen: &Surroundings<'_>) -> Vector {
+        if seen.desired_mps <= 0.0 {
+            return Vector::ZERO;
+        }
+        let direction = self.direction(seen);
+        let mut best = self.velocity_in(seen, direction);
+        let mut best_mps = best.dot(seen.toward);
+        if best.length() >= seen.desired_mps {
+            return best;
+        }
+        for (cosine, sine) in TURNS.iter().take(self.turns) {
+            for sine in [*sine, -sine] {
+                let turned = Vector::new(
+                    direction.x * cosine - direction.y * sine,
+                    direction.x * sine + direction.y * cosine,
+                );
+                let free_mps = self.wall_gap_m(seen, turned) / self.time_gap_s;
+                let velocity = self.velocity_in(seen, turned).at_most(free_mps);
+                let mps = velocity.dot(seen.toward);
+                if mps > best_mps {
+                    best = velocity;
+                    best_mps = mps;
+                }
+            }
+        }
+        best
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pedestrians::Pedestrian;
+
+    fn velocity(model: &CollisionFree, others: &[Neighbor]) -> Vector {
+        let person = Pedestrian::at(Vector::ZERO);
+        model.velocity(&Surroundings {
+            person: &person,
+            toward: Vector::new(1.0, 0.0),
+            desired_mps: 1.34,
+            others,
+            walls: &[],
+            step_s: 0.05,
+        })
+    }
+
+    fn at(x: f64, y: f64) -> Neighbor {
+        let offset = Vector::new(x, y);
+        Neighbor {
+            offset,
+            distance_m: offset.length(),
+            radius_m: 0.18,
+            velocity: Vector::ZERO,
+        }
+    }
+
+    #[test]
+    fn the_speed_is_the_gap_over_the_time_gap() {
+        let model = CollisionFree::published();
+        // Beyond the ranges of repulsion the direction is the desired one.
+        let alone = velocity(&model, &[]);
+        assert_eq!(alone, Vector::new(1.34, 0.0));
+        let behind = velocity(&model, &[at(1.36, 0.0)]);
+        assert!((behind.x - 1.0).abs() < 1e-12 && behind.y == 0.0);
+        let far = velocity(&model, &[at(1.9, 0.0)]);
+        assert_eq!(far, alone, "a gap of more than v0 T");
+    }
+
+    #[test]
+    fn who_is_behind_or_beside_slows_nobody_down() {
+        let model = CollisionFree::published();
+        for other in [at(-1.3, 0.0), at(0.9, 0.97)] {
+            assert!((velocity(&model, &[other]).length() - 1.34).abs() < 1e-12);
+        }
+        assert!(
+            velocity(&model, &[at(1.3, 0.35)]).length() < 1.3,
+            "in front"
+        );
+    }
+
+    #[test]
+    fn who_touches_somebody_in_front_stands() {
+        let model = CollisionFree::default();
+        // The repulsion turns them around, and then nobody is in front.
+        let push = CollisionFree {
+            repulsion: 0.0,
+            ..model
+        };
+        assert_eq!(velocity(&push, &[at(0.36, 0.0)]), Vector::ZERO);
+        assert!(velocity(&model, &[at(0.36, 0.0)]).x < 0.0);
+    }
+}
