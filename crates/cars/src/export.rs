@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use export::{ExportError, emotionml, shiviz, tables, trace};
+use export::{ExportError, emotionml, shiviz, tables, trace, trajectories};
 use lab::LabError;
 use lab::folder::{find, recorded_epoch, recorded_epochs, recording, run_name};
 use protocol::{Epoch, RobotName, Tick};
@@ -63,6 +63,9 @@ struct ExportFormat {
     /// The emotions of the robots as EmotionML 1.0.
     #[arg(long)]
     emotionml: bool,
+    /// Where guests and robots were, `id frame x/m y/m z/m` as PedPy and JuPedSim read it.
+    #[arg(long)]
+    trajectories: bool,
 }
 
 /// Exports a run.
@@ -128,6 +131,10 @@ impl ExportArgs {
         let files = recorded_epoch(folder, self.epoch)?;
         if self.format.trace {
             return Ok(trace::write(&recording(&files)?, self.from, self.to, out)?);
+        }
+        if self.format.trajectories {
+            trajectories::write(recording(&files)?, out)?;
+            return Ok(Vec::new());
         }
         let run = run_name(folder);
         let robot = self.robot.as_ref();

@@ -1,4 +1,4 @@
-//! The files that come with the programs: launch files, scenarios, experiments, parameters of robots, faults of links. They are
+//! The files that come with the programs: launch files, scenarios, experiments, parameters of robots, people, faults of links. They are
 //! read like any file, at paths below a folder that is in the programs and not on the disk.
 
 use std::path::{Component, Path, PathBuf};
@@ -46,6 +46,8 @@ const FILES: &[(&str, &str)] = &texts![
     "configs/museum.toml",
     "configs/pantry.toml",
     "configs/partition.toml",
+    "configs/people/reception.txt",
+    "configs/recorded_hall.toml",
     "configs/recruitment.toml",
     "configs/robots/butler.toml",
     "configs/robots/leguin.toml",
@@ -57,6 +59,7 @@ const FILES: &[(&str, &str)] = &texts![
     "launch/hors_doeuvres.toml",
     "launch/museum.toml",
     "launch/partition.toml",
+    "launch/recorded_hall.toml",
     "launch/swarm.toml",
     "launch/three_robots.toml",
 ];
@@ -146,7 +149,7 @@ mod tests {
             let name = format!("{below}/{}", entry.file_name().to_str().unwrap());
             if entry.path().is_dir() {
                 collect(folder, &name, found);
-            } else if name.ends_with(".toml") {
+            } else if name.ends_with(".toml") || name.ends_with(".txt") {
                 found.insert(name);
             }
         }

@@ -41,14 +41,34 @@ export class Motion {
     const leap = last?.epoch === frame.epoch ? frame.tick - last.tick : Infinity;
     if (leap === 0) return;
 
-    const isGlide = !isCalm && leap > 0 && leap <= MOST_TICKS && last?.guests.length === frame.guests.length;
-    this.from_m = isGlide ? this.now_m.slice() : flat(frame.guests);
+    const hasNumbers = Boolean(frame.guest_numbers?.length || last?.guest_numbers?.length);
+    const areSame = hasNumbers || last?.guests.length === frame.guests.length;
+    const isGlide = !isCalm && leap > 0 && leap <= MOST_TICKS && areSame;
+    this.from_m = isGlide && !hasNumbers ? this.now_m.slice() : flat(frame.guests);
+    if (isGlide && last && hasNumbers) this.takePlaces(this.from_m, last, frame);
     this.robotsFrom = isGlide ? new Map(this.robotsNow) : new Map();
-    if (this.now_m.length !== this.from_m.length) this.now_m = this.from_m.slice();
+    if (hasNumbers || this.now_m.length !== this.from_m.length) this.now_m = this.from_m.slice();
     this.length_ms = isGlide ? length_ms(frame, leap, now_ms - this.arrivedAt_ms) : 0;
     this.arrivedAt_ms = now_ms;
     this.isMoving = true;
     this.farthest_m = isGlide ? this.farthest(frame) : 0;
+  }
+
+  /**
+   * Sets where guests begin to glide that were on the field in the last frame, by their numbers. Those that have entered are where the
+   * frame has them.
+   * @param {Float64Array} from_m
+   * @param {WorldFrame} last
+   * @param {WorldFrame} frame
+   */
+  takePlaces(from_m, last, frame) {
+    const before = new Map(last.guest_numbers?.map((number, i) => [number, i]));
+    frame.guest_numbers?.forEach((number, i) => {
+      const at = before.get(number);
+      if (at === undefined) return;
+      from_m[2 * i] = this.now_m[2 * at];
+      from_m[2 * i + 1] = this.now_m[2 * at + 1];
+    });
   }
 
   /** @param {WorldFrame} frame */

@@ -24,7 +24,7 @@ import { hasGuessedNames, orderNames } from "./palette.js";
  *   body_m: number, display_unit: "m" | "ft", obstacles: [number, number][], layers: WorldFrame["layers"], static_world?: WorldFrame["static_world"], ticks: number, is_finished: boolean, number: number, epochs: number[]}} Recorded
  */
 /**
- * @typedef {{tick: number, robots: RobotFrame[], guests_mm: number[], guest_moods: WorldFrame["guest_moods"], cuts: Cut[], faults: HeldProcess[],
+ * @typedef {{tick: number, robots: RobotFrame[], guests_mm: number[], guest_numbers: number[], guest_moods: WorldFrame["guest_moods"], cuts: Cut[], faults: HeldProcess[],
  *   awaiting: Awaited[], expectations: Standing[], sites: WorldFrame["sites"],
  *   layers: WorldFrame["layers"], measures?: Record<string, number>}} RecordedTick
  */
@@ -533,6 +533,7 @@ export class Player {
       phase: live ? live.phase : this.isPlaying ? "running" : record.tick >= this.last ? "ended" : "paused",
       awaiting: record.awaiting,
       guests,
+      guest_numbers: record.guest_numbers,
       guest_moods: record.guest_moods,
       flights: [],
       cuts: record.cuts,

@@ -481,6 +481,7 @@ mod tests {
             display_unit: DisplayUnit::default(),
             robots: Vec::new(),
             guests: vec![[1.0, 2.0]],
+            guest_numbers: Vec::new(),
             guest_moods: BTreeMap::new(),
             obstacles: Vec::new(),
             static_world: None,

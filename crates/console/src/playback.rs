@@ -243,6 +243,7 @@ impl RecordedEpoch {
             if every.is_some() {
                 recorded.panels.clear();
                 recorded.frame.guests_mm.clear();
+                recorded.frame.guest_numbers.clear();
                 recorded.frame.layers.clear();
             }
             for (robot, panel) in &recorded.panels {
@@ -330,6 +331,7 @@ fn add_tick(
         ("tick", &to_json(&tick)),
         ("robots", &robots.into_json()),
         ("guests_mm", &to_json(&recorded.frame.guests_mm)),
+        ("guest_numbers", &to_json(&recorded.frame.guest_numbers)),
         ("guest_moods", &to_json(&recorded.frame.guest_moods)),
         ("cuts", &to_json(&recorded.frame.cuts)),
         ("faults", &to_json(&faults)),

@@ -1,5 +1,5 @@
 //! Runs as files for other programs: tables of events and states ([`tables`]), a log for ShiViz ([`shiviz`]), a trace of
-//! wall-clock time ([`trace`]) and emotions ([`emotionml`]). A record is read tick by tick, so the length of a run does not
+//! wall-clock time ([`trace`]), emotions ([`emotionml`]) and trajectories ([`trajectories`]). A record is read tick by tick, so the length of a run does not
 //! matter.
 
 pub mod csv;
@@ -8,6 +8,7 @@ pub mod emotionml;
 pub mod shiviz;
 pub mod tables;
 pub mod trace;
+pub mod trajectories;
 
 use config::FileError;
 use record::RecordError;

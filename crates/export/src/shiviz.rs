@@ -109,6 +109,8 @@ impl Hosts {
             | Event::DoneLate { .. }
             | Event::Blocked { .. }
             | Event::Guest { .. }
+            | Event::GuestEntered { .. }
+            | Event::GuestLeft { .. }
             | Event::SiteRefused { .. }
             | Event::LayerRefused { .. }
             | Event::CommandDropped { .. }

@@ -415,6 +415,11 @@ fn event_cells(event: &Event) -> Vec<Column<'_>> {
             ("robot", robot.as_str().into()),
             ("text", text.as_str().into()),
         ],
+        Event::GuestEntered { guest, at } | Event::GuestLeft { guest, at } => vec![
+            ("x_m", at.x.into()),
+            ("y_m", at.y.into()),
+            ("guest", (*guest).into()),
+        ],
         Event::Guest { guest, mood } => {
             vec![("guest", (*guest).into()), ("mood", json_name(mood))]
         }

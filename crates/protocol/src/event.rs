@@ -222,6 +222,20 @@ pub enum Event {
         /// Its mood now.
         mood: GuestMood,
     },
+    /// A guest has entered the field. Guests of runs in which none enters are there from the beginning.
+    GuestEntered {
+        /// Which, counted from 0.
+        guest: u32,
+        /// Where, meters.
+        at: Point,
+    },
+    /// A guest has left the field.
+    GuestLeft {
+        /// Which, counted from 0.
+        guest: u32,
+        /// From where, meters.
+        at: Point,
+    },
     /// A robot changed a variable of a site.
     SiteChanged {
         /// Who.
@@ -457,6 +471,8 @@ impl Event {
             Self::Changed { .. } => "changed",
             Self::Say { .. } => "say",
             Self::Guest { .. } => "guest",
+            Self::GuestEntered { .. } => "guest_entered",
+            Self::GuestLeft { .. } => "guest_left",
             Self::SiteChanged { .. } => "site_changed",
             Self::SiteRefused { .. } => "site_refused",
             Self::LayerChanged { .. } => "layer_changed",
@@ -726,6 +742,8 @@ impl Event {
             | Self::Blocked { .. }
             | Self::QueryLost { .. }
             | Self::Guest { .. }
+            | Self::GuestEntered { .. }
+            | Self::GuestLeft { .. }
             | Self::Tick { .. } => None,
         }
     }

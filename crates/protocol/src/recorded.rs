@@ -103,7 +103,10 @@ pub struct Frame {
     pub robots: Vec<PlacedRobot>,
     /// Centers of the guests in whole millimeters, x and y in turn.
     pub guests_mm: Vec<i64>,
-    /// Guests that are not content, by their index, by mood.
+    /// The number of each of them, which it keeps; left out where guests do not enter and leave: then they are counted from 0.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub guest_numbers: Vec<u32>,
+    /// Guests that are not content, by their index in `guests_mm`, by mood.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub guest_moods: BTreeMap<GuestMood, Vec<u32>>,
     /// The states of sites that are others than at the start, by name of the site.

@@ -41,6 +41,9 @@ pub struct Summary {
     pub time_s: f64,
     /// Number of guests.
     pub guests: usize,
+    /// What guests did that enter and leave; left out where none does.
+    #[serde(default, skip_serializing_if = "GuestPassages::is_empty")]
+    pub guest_motion: GuestPassages,
     /// Digest of the run.
     pub digest: String,
     /// The robots.
@@ -74,6 +77,23 @@ pub struct ExpectationVerdict {
     pub tick: Tick,
     /// Why, in words.
     pub because: String,
+}
+
+/// What guests did that enter and leave.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct GuestPassages {
+    /// How often a guest entered the field, those included that were there at the beginning.
+    pub entered: u64,
+    /// How often one left it.
+    pub left: u64,
+    /// Ticks in which a body kept a recorded person from where the record has it, summed over people.
+    pub held_ticks: u64,
+}
+
+impl GuestPassages {
+    fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
 }
 
 /// Metrics of one robot.
@@ -127,11 +147,14 @@ pub struct HeldUp {
 }
 
 /// Paths of the numbers of a summary; `*` is any name or word.
-const NUMBERS: [&str; 30] = [
+const NUMBERS: [&str; 33] = [
     "seed",
     "ticks",
     "time_s",
     "guests",
+    "guest_motion.entered",
+    "guest_motion.left",
+    "guest_motion.held_ticks",
     "robots.*.emotions_s.*",
     "robots.*.behaviors_s.*",
     "robots.*.entered.*",
@@ -210,6 +233,7 @@ impl Summary {
             ticks: 0,
             time_s: 0.0,
             guests: scenario.guests.count,
+            guest_motion: GuestPassages::default(),
             digest: String::new(),
             robots: robots.collect(),
             network: NetworkSummary::default(),
@@ -244,6 +268,8 @@ impl Summary {
                 };
                 self.expectations.insert(expectation.clone(), judged);
             }
+            Event::GuestEntered { .. } => self.guest_motion.entered += 1,
+            Event::GuestLeft { .. } => self.guest_motion.left += 1,
             Event::End {
                 reason,
                 because,

@@ -206,7 +206,11 @@ impl RunFacts {
                 change.set,
                 Period::since(change.tick),
             ),
-            Span::Missed(_) | Span::QueriesLost(_) | Span::Command(_) | Span::Joined(_) => return,
+            Span::Missed(_)
+            | Span::QueriesLost(_)
+            | Span::Guest(_)
+            | Span::Command(_)
+            | Span::Joined(_) => return,
         };
 
         self.disturbances.push(ScenarioEffect {

@@ -6,11 +6,11 @@ use observe::{Expectation, RunSetting, ScenarioMeasure, TickCondition};
 use protocol::messages::{DisplayUnit, Parameters, Point};
 use protocol::{RobotName, Tick};
 use serde::{Deserialize, Serialize};
-use world::{Field, Guests, Hall, Region, Shape, Shapes, Wall, Wheels};
+use world::{Field, GuestWalk, Guests, Hall, Region, Shape, Shapes, Wall, Wheels};
 
 use super::change::{Change, Parent};
 use super::fault::Fault;
-use super::guests::GuestRules;
+use super::guests::{GuestRules, RecordedGuests};
 use super::lateness::Lateness;
 use super::layers::LayerSpec;
 use super::network::{Network, Radio};
@@ -55,8 +55,10 @@ pub struct Scenario {
     pub max_speed_mps: f64,
     /// How robots sense.
     pub sensing: Sensing,
-    /// The moving obstacles.
+    /// The moving obstacles. The number of recorded ones is that of the record.
     pub guests: Guests,
+    /// The record of those that do not walk at random.
+    pub recorded_guests: Option<RecordedGuests>,
     /// What they do beside walking.
     pub guest_rules: GuestRules,
     /// The fixed obstacles.
@@ -220,7 +222,16 @@ impl Scenario {
         self.robots.keys().cloned().collect()
     }
 
-    /// The initial environment; robots are in the order of their names.
+    /// What moves the guests.
+    #[must_use]
+    pub fn guest_walk(&self) -> GuestWalk {
+        match &self.recorded_guests {
+            Some(recorded) => GuestWalk::Recorded(recorded.walk()),
+            None => GuestWalk::Random,
+        }
+    }
+
+    /// The initial environment; robots are in the order of their names. Recorded guests are no part of it.
     #[must_use]
     pub fn hall(&self) -> Hall {
         self.hall_of(
@@ -235,13 +246,17 @@ impl Scenario {
         obstacles: &[&Obstacle],
         robots: impl Iterator<Item = &'a RobotSpec>,
     ) -> Hall {
+        let mut guests = self.guests;
+        if self.recorded_guests.is_some() {
+            guests.count = 0;
+        }
         let mut hall = Hall {
             field: Field {
                 size_m: (self.field_m[0], self.field_m[1]),
                 body_m: self.body_m,
             },
             obstacles: Vec::new(),
-            guests: self.guests,
+            guests,
             robots: Vec::new(),
             shapes: Shapes {
                 walls: self.walls.clone(),

@@ -1,9 +1,43 @@
-//! What guests do beside walking, if a scenario says so: they see the faces that robots show, and ask robots for what
-//! these serve. Not documented in the paper \[I\].
+//! How guests walk if not at random, and what they do beside walking, if a scenario says so: they see the faces that robots show,
+//! and ask robots for what these serve. Not documented in the paper \[I\].
 
 use std::collections::BTreeSet;
+use std::num::NonZeroU64;
+use std::sync::Arc;
 
 use protocol::Tick;
+use world::{Recorded, Track};
+
+/// Guests who walk as recorded people did.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordedGuests {
+    /// The file or the run as the scenario names it.
+    pub from: String,
+    /// Where each person was, in the hall. Times are from the first frame of the record on.
+    pub tracks: Arc<Vec<Track>>,
+    /// Length of the record, milliseconds.
+    pub length_ms: NonZeroU64,
+    /// Time of the record at tick 0, milliseconds; drawn from the guests' stream if there is none.
+    pub start_ms: Option<u64>,
+    /// Whether it begins again at its end.
+    pub repeats: bool,
+    /// How fast a person that had to wait goes back to where the record has it, m/s.
+    pub catch_up_mps: f64,
+}
+
+impl RecordedGuests {
+    /// The same for the environment.
+    pub(crate) fn walk(&self) -> Recorded {
+        let thousand = NonZeroU64::MIN.saturating_add(999);
+        let period_us = self.length_ms.saturating_mul(thousand);
+        Recorded {
+            tracks: self.tracks.clone(),
+            start_us: self.start_ms.map(|start_ms| start_ms.saturating_mul(1000)),
+            period_us: self.repeats.then_some(period_us),
+            catch_up_mps: self.catch_up_mps,
+        }
+    }
+}
 
 /// What guests do beside walking. By default nothing, as in the paper.
 #[derive(Debug, Clone, Default, PartialEq)]

@@ -18,6 +18,7 @@ pub mod roster;
 mod sensing;
 mod setup;
 mod sites;
+mod tracks;
 
 use std::path::Path;
 
@@ -35,7 +36,7 @@ pub use checked::{
 };
 pub use checked::{to_wire, to_world};
 pub use fault::{Fault, FaultEnd, Interruption};
-pub use guests::GuestRules;
+pub use guests::{GuestRules, RecordedGuests};
 pub use lateness::Lateness;
 pub use layers::{LayerSpec, Peak};
 pub use network::Network;

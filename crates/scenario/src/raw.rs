@@ -18,6 +18,7 @@ mod sensing;
 mod site;
 mod solids;
 mod times;
+mod tracks;
 mod unplaced;
 pub(super) mod words;
 
@@ -40,7 +41,7 @@ use change::{ChangeTable, ParentTable};
 use drawn::DrawnTable;
 use drive::DriveTable;
 use fault::FaultTable;
-use guests::GuestsTable;
+use guests::{GuestsTable, RecordSetting};
 use layer::LayerTable;
 use network::NetworkTable;
 use numbers::positive;
@@ -50,6 +51,7 @@ use sensing::SensingTable;
 use site::SiteTable;
 use solids::{Fixed, FloorPlanTable, ObstacleTable, Size, WallTable};
 use times::Times;
+use tracks::TracksTable;
 use unplaced::unplaced;
 
 pub(super) use expect::Expectations;
@@ -115,6 +117,7 @@ pub(super) struct ScenarioFile {
     floor_plan: Option<Spanned<FloorPlanTable>>,
     #[serde(default, rename = "robot", skip_serializing_if = "Vec::is_empty")]
     robots: Vec<Spanned<RawRobot>>,
+    tracks: Option<Spanned<TracksTable>>,
 }
 
 #[derive(Debug, Deserialize, Serialize)]
@@ -240,7 +243,6 @@ impl ScenarioFile {
         let sensing = sensing::check(self.sensing.as_ref(), source)?;
         let guests = self.guests.as_ref().map(Spanned::get_ref);
         let guest_rules = guests::rules(guests, tick_s, source)?;
-        let guests = guests::walks(guests, source)?;
         let mut fixed = Fixed::read(&self.obstacles, &self.walls, source)?;
         if let Some(plan) = &self.floor_plan {
             fixed.add_plan(plan, folders.map(|folders| folders.files), source)?;
@@ -250,6 +252,18 @@ impl ScenarioFile {
         let field = self.field.as_ref().map(Spanned::get_ref);
         let size = field.and_then(|field| field.size).unwrap_or(FIELD);
         let body = field.and_then(|field| field.body).unwrap_or(BODY);
+        let [width, height] = size.0;
+        let record_setting = RecordSetting {
+            folders,
+            tracks: self.tracks.as_ref(),
+            field: world::Field {
+                size_m: (width.0, height.0),
+                body_m: body.0,
+            },
+            source,
+        };
+        let recorded_guests = guests::recorded(guests, record_setting)?;
+        let guests = guests::walks(self.guests.as_ref(), recorded_guests.as_ref(), source)?;
         let max_speed = field.and_then(|field| field.max_speed);
         let display_unit = field.and_then(|field| field.display_unit);
 
@@ -297,6 +311,7 @@ impl ScenarioFile {
             max_speed_mps: max_speed.unwrap_or(MAX_SPEED).0,
             sensing,
             guests,
+            recorded_guests,
             guest_rules,
             obstacles: fixed
                 .obstacles
@@ -651,6 +666,7 @@ impl From<&checked::Scenario> for ScenarioFile {
             sensing: Some(SensingTable::from(&scenario.sensing)),
             guests: Some(unplaced(GuestsTable::of(
                 &scenario.guests,
+                scenario.recorded_guests.as_ref(),
                 &scenario.guest_rules,
                 tick_s,
             ))),
@@ -671,6 +687,10 @@ impl From<&checked::Scenario> for ScenarioFile {
             // The record has what is on it, and does not need the drawing.
             floor_plan: None,
             robots: robots.collect(),
+            tracks: scenario
+                .recorded_guests
+                .as_ref()
+                .map(|recorded| unplaced(TracksTable::of(recorded))),
         }
     }
 }

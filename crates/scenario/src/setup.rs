@@ -131,12 +131,18 @@ impl Scenario {
     fn guests_of(&self, setup: &Setup, errors: &mut Errors) -> Guests {
         let speed_mps = errors.triangular("guest_speed_mps", &setup.guest_speed_mps);
         let duration_s = errors.triangular("guest_duration_s", &setup.guest_duration_s);
-        if let Err(reason) = check_guests(setup.guests as usize) {
+        let count = setup.guests as usize;
+        if let Err(reason) = check_guests(count) {
+            errors.add("guests", &reason);
+        } else if self.recorded_guests.is_some() && count != self.guests.count {
+            let recorded = self.guests.count;
+            let reason =
+                format!("the guests of this run are recorded: there are {recorded} of them");
             errors.add("guests", &reason);
         }
 
         Guests {
-            count: setup.guests as usize,
+            count,
             speed_mps: speed_mps.unwrap_or(self.guests.speed_mps),
             duration_s: duration_s.unwrap_or(self.guests.duration_s),
         }

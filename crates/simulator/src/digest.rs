@@ -69,6 +69,11 @@ impl TickDigest {
         self.number(y_m);
     }
 
+    /// Adds that a guest is on the field.
+    pub fn guest(&mut self, guest: usize) {
+        self.integer(guest as u64);
+    }
+
     /// Adds heading and velocity of a robot with wheels.
     pub fn pose(&mut self, pose: &Pose) {
         self.number(pose.heading_rad);

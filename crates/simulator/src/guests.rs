@@ -64,10 +64,17 @@ impl GuestState {
         })
     }
 
-    /// The guests that are not content, by mood.
-    pub(crate) fn moods(&self) -> BTreeMap<GuestMood, Vec<u32>> {
+    /// Those of these guests that are not content, by their index among them, by mood.
+    pub(crate) fn moods(
+        &self,
+        present: impl Iterator<Item = usize>,
+    ) -> BTreeMap<GuestMood, Vec<u32>> {
         let mut moods: BTreeMap<GuestMood, Vec<u32>> = BTreeMap::new();
-        for (index, guest) in (0..).zip(&self.guests) {
+        if self.rules.requests.is_none() {
+            return moods;
+        }
+
+        for (index, guest) in (0..).zip(present.map(|guest| &self.guests[guest])) {
             if guest.mood != GuestMood::Content {
                 moods.entry(guest.mood).or_default().push(index);
             }

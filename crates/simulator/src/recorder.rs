@@ -603,11 +603,12 @@ fn set_frame(frame: &mut Frame, simulation: &Simulation, record: &TickRecord) {
     }
 
     frame.guests_mm.clear();
-    for guest in simulation.world().guests() {
+    for (_, guest) in simulation.world().present_guests() {
         frame.guests_mm.push((guest.x * 1000.0).round() as i64);
         frame.guests_mm.push((guest.y * 1000.0).round() as i64);
     }
 
+    frame.guest_numbers = simulation.guest_numbers();
     frame.guest_moods = simulation.guest_moods();
     frame.tick = record.tick;
     frame.sites = simulation.sites().changed();

@@ -150,7 +150,8 @@ impl Simulation {
     /// # Errors
     /// [`HallError`] if its bodies cannot be placed.
     pub fn new(scenario: Scenario, epoch: Epoch) -> Result<Self, HallError> {
-        let world = World::new(&scenario.hall(), stream(scenario.seed, "guests"))?;
+        let walk = scenario.guest_walk();
+        let world = World::with_guests(&scenario.hall(), walk, stream(scenario.seed, "guests"))?;
         let names = scenario.roster();
         let mut medium = Medium::new(
             scenario.seed,
@@ -170,7 +171,7 @@ impl Simulation {
             blocked: vec![false; names.len()],
             tick: 0,
             now: 0,
-            guests: GuestState::new(scenario.guest_rules.clone(), scenario.guests.count),
+            guests: GuestState::new(scenario.guest_rules.clone(), world.guests().len()),
             sites: Sites::new(&scenario),
             layers: Layers::new(&scenario),
             world,
@@ -252,6 +253,7 @@ impl Simulation {
             });
         }
 
+        self.note_passages();
         // No body has moved yet, so there are no verdicts.
         self.compose_news(&[]);
     }
@@ -270,6 +272,7 @@ impl Simulation {
         let reactions = self.reactions();
         let verdicts = self.world.advance_with(&self.proposals(), &reactions);
         self.note_moves(&verdicts);
+        self.note_passages();
         self.layers.pass_tick();
 
         let places = self.world.robots().iter().copied().map(to_wire);
@@ -490,8 +493,15 @@ impl Simulation {
 
         // Where all bodies stand, then what each robot reported: what the run is compared by.
         let mut digest = self.digest.tick(self.now);
-        for body in self.world.robots().iter().chain(self.world.guests()) {
-            digest.place(body.x, body.y);
+        for robot in self.world.robots() {
+            digest.place(robot.x, robot.y);
+        }
+        for (guest, at) in self.world.present_guests() {
+            // Who is on the field counts only where that can change, so that all other digests are as ever.
+            if self.world.has_passages() {
+                digest.guest(guest);
+            }
+            digest.place(at.x, at.y);
         }
         for index in 0..self.names.len() {
             if let Some(pose) = self.world.pose(index) {
@@ -772,6 +782,19 @@ impl Simulation {
         });
         let changes = self.guests.take(self.now, reported, &self.world);
         self.events.extend(changes);
+    }
+
+    /// Records who has entered the field and who has left it.
+    fn note_passages(&mut self) {
+        for passage in self.world.passages() {
+            let guest = u32::try_from(passage.guest).unwrap_or(u32::MAX);
+            let at = to_wire(passage.at);
+            self.events.push(if passage.enters {
+                Event::GuestEntered { guest, at }
+            } else {
+                Event::GuestLeft { guest, at }
+            });
+        }
     }
 
     fn note_moves(&mut self, verdicts: &[MoveOutcome]) {
@@ -1387,10 +1410,23 @@ impl Simulation {
         pose(&self.world, self.index(name)?)
     }
 
-    /// Guests that are not content, by their index, by mood.
+    /// The numbers of the guests that are on the field, in their order; empty where guests do not enter and leave.
+    #[must_use]
+    pub fn guest_numbers(&self) -> Vec<u32> {
+        if !self.world.has_passages() {
+            return Vec::new();
+        }
+        let present = self.world.present_guests();
+        present
+            .map(|(guest, _)| u32::try_from(guest).unwrap_or(u32::MAX))
+            .collect()
+    }
+
+    /// Guests that are not content, by their index among those that are on the field, by mood.
     #[must_use]
     pub fn guest_moods(&self) -> BTreeMap<GuestMood, Vec<u32>> {
-        self.guests.moods()
+        let present = self.world.present_guests();
+        self.guests.moods(present.map(|(guest, _)| guest))
     }
 
     /// The sites.

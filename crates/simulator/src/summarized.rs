@@ -28,6 +28,7 @@ impl Simulation {
         summary.finish(self.tick(), tick_s, self.digest(), |robot| {
             self.state_variables(robot).cloned()
         });
+        summary.guest_motion.held_ticks = self.world().held_ticks();
         summary.measures = self.measurements().measured();
     }
 }

@@ -107,6 +107,8 @@ impl Counts {
             | Event::Changed { .. }
             | Event::Say { .. }
             | Event::Guest { .. }
+            | Event::GuestEntered { .. }
+            | Event::GuestLeft { .. }
             | Event::SiteChanged { .. }
             | Event::SiteRefused { .. }
             | Event::LayerChanged { .. }

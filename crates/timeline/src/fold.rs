@@ -8,8 +8,8 @@ use protocol::{Event, RobotName, Seq, Tick};
 
 use crate::names::StateOrder;
 use crate::span::{
-    Absence, ChangeSpan, CommandEnd, CommandSpan, CutSpan, FaultSpan, Joined, MissedTicks, Period,
-    QueriesLost, Span, StateKind, StateSpan,
+    Absence, ChangeSpan, CommandEnd, CommandSpan, CutSpan, FaultSpan, GuestVisit, Joined,
+    MissedTicks, Period, QueriesLost, Span, StateKind, StateSpan,
 };
 
 /// What is in progress after an event of a run. Memory is bounded by what is in progress, whatever the length of the run.
@@ -21,6 +21,8 @@ pub struct Timeline {
     cuts: BTreeMap<(RobotName, RobotName), CutSpan>,
     /// The last lost queries of each pair.
     queries: BTreeMap<(RobotName, RobotName), QueriesLost>,
+    /// Since when guests are on the field that have entered.
+    guests: BTreeMap<u32, Tick>,
     /// The last change of each part of the scenario, by its path.
     set: BTreeMap<String, String>,
     names: StateOrder,
@@ -166,6 +168,13 @@ impl Timeline {
                 let end = CommandEnd { tick, lost };
                 self.change_command(from, *seq, |command| command.ends.push(end))
             }
+            Event::GuestEntered { guest, .. } => {
+                // One that enters again without having left ends a visit all the same.
+                let over = self.end_visit(*guest, tick);
+                self.guests.insert(*guest, tick);
+                over
+            }
+            Event::GuestLeft { guest, .. } => self.end_visit(*guest, tick),
             Event::Changed { set, .. } => vec![Span::Change(ChangeSpan {
                 tick,
                 before: self.replace_setting(set),
@@ -200,6 +209,10 @@ impl Timeline {
         spans.extend(self.commands.values().cloned().map(Span::Command));
         spans.extend(self.cuts.values().cloned().map(Span::Cut));
         spans.extend(self.queries.values().cloned().map(Span::QueriesLost));
+        for (&guest, &begin) in &self.guests {
+            let period = Period::since(begin);
+            spans.push(Span::Guest(GuestVisit { guest, period }));
+        }
         spans
     }
 
@@ -346,6 +359,15 @@ impl Timeline {
             faults.push((kind, tick));
         }
         over
+    }
+
+    fn end_visit(&mut self, guest: u32, tick: Tick) -> Vec<Span> {
+        let Some(begin) = self.guests.remove(&guest) else {
+            return Vec::new();
+        };
+        let end = Some(tick);
+        let period = Period { begin, end };
+        vec![Span::Guest(GuestVisit { guest, period })]
     }
 
     fn heal(&mut self, from: &RobotName, to: &RobotName, tick: Tick) -> Vec<Span> {

@@ -55,6 +55,8 @@ pub enum Span {
     Cut(CutSpan),
     /// A robot could not have queried another one, by chance.
     QueriesLost(QueriesLost),
+    /// A guest that had entered was on the field.
+    Guest(GuestVisit),
     /// A command was sent.
     Command(CommandSpan),
     /// A robot joined after the beginning of the run: a moment.
@@ -139,6 +141,15 @@ pub struct QueriesLost {
     /// Why.
     pub because: Cause,
     /// When; it always has an end so far.
+    pub period: Period,
+}
+
+/// A time in which a guest that had entered was on the field.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct GuestVisit {
+    /// Which guest, counted from 0.
+    pub guest: u32,
+    /// When. It has no tick if the guest left in the tick in which it entered.
     pub period: Period,
 }
 

@@ -145,6 +145,7 @@ fn in_words(span: &Span) -> String {
             }
             text
         }
+        Span::Guest(visit) => format!("guest {} {}", visit.guest, when(visit.period)),
         Span::Joined(joined) => format!("joined {:?} in {}", joined.generation, joined.tick),
         Span::Change(change) => format!("{} after {:?}", change.set, change.before),
     }

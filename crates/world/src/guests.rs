@@ -2,7 +2,7 @@
 
 use crate::hall;
 use crate::point::Point;
-use crate::walk::{Floor, Walk};
+use crate::walk::{GuestFloor, GuestWalker};
 use rand::{Rng, RngExt};
 use std::f64::consts::TAU;
 
@@ -82,9 +82,9 @@ impl RandomWalk {
     }
 }
 
-impl Walk for RandomWalk {
+impl GuestWalker for RandomWalk {
     /// A guest whose course is over draws a new one first.
-    fn advance(&mut self, floor: &mut Floor<'_>, rng: &mut dyn Rng) {
+    fn advance(&mut self, floor: &mut GuestFloor<'_>, rng: &mut dyn Rng) {
         for (index, course) in self.courses.iter_mut().enumerate() {
             if course.ticks_left == 0 {
                 *course = Course::draw(&self.guests, self.tick_s, rng);

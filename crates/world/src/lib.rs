@@ -96,7 +96,7 @@ pub use reactions::{Reaction, Response};
 pub use shape::{Shape, Wall};
 pub use shapes::Shapes;
 pub use sight::{Crossed, Opaque, is_hidden};
-pub use tracks::{Recorded, Track, Waypoint};
+pub use tracks::{Recorded, Track, TrackPoint};
 pub use triangular::Triangular;
 pub use walk::Passage;
 pub use wheels::{Pose, Velocity, Wheels};

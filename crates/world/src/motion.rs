@@ -11,7 +11,7 @@ use crate::point::Point;
 use crate::reactions::{Reaction, directions};
 use crate::shape::{Shape, Wall};
 use crate::tracks::{Recorded, RecordedWalk};
-use crate::walk::{Floor, GuestOutcomes, Passage, Walk};
+use crate::walk::{GuestFloor, GuestOutcomes, GuestWalker, Passage};
 use crate::wheels::{DriveStep, Pose, Velocity, Wheels};
 use rand::Rng;
 use std::collections::BTreeMap;
@@ -68,7 +68,7 @@ enum Crowd {
 }
 
 impl Crowd {
-    fn walk(&mut self) -> &mut dyn Walk {
+    fn walk(&mut self) -> &mut dyn GuestWalker {
         match self {
             Self::Random(walk) => walk,
             Self::Recorded(walk) => walk,
@@ -99,7 +99,7 @@ impl<R: Rng> World<R> {
         Self::with_guests(hall, GuestWalk::Random, rng)
     }
 
-    /// As [`Self::new`], with guests who are moved by something else than the random walk. Nothing is drawn for recorded ones.
+    /// As [`Self::new`], with guests who are moved by something else than the random walk. For recorded ones at most their start is drawn.
     ///
     /// # Errors
     ///
@@ -138,8 +138,8 @@ impl<R: Rng> World<R> {
             blockers: vec![None; bodies.guests().len()],
             ..GuestOutcomes::default()
         };
-        let mut floor = Floor::new(&mut bodies, &[], &mut outcomes, hall.tick_s);
-        crowd.walk().begin(&mut floor);
+        let mut floor = GuestFloor::new(&mut bodies, &[], &mut outcomes, hall.tick_s);
+        crowd.walk().begin(&mut floor, &mut rng);
 
         Ok(Self {
             bodies,
@@ -210,7 +210,7 @@ impl<R: Rng> World<R> {
             _ => directions(&self.bodies, reactions, &headings),
         };
         self.outcomes.passages.clear();
-        let mut floor = Floor::new(
+        let mut floor = GuestFloor::new(
             &mut self.bodies,
             &directions,
             &mut self.outcomes,

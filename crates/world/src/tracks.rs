@@ -8,40 +8,38 @@ use std::num::NonZeroU64;
 use std::sync::Arc;
 
 use crate::point::Point;
-use crate::walk::{Floor, Walk};
+use crate::walk::{GuestFloor, GuestWalker};
 use rand::Rng;
 
 /// Where a person was at a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Waypoint {
+pub struct TrackPoint {
     /// When, microseconds of the record: whole numbers, so that rounding decides nothing at the ends of a track.
     pub at_us: u64,
     /// Where, m.
     pub at: Point,
 }
 
-/// Where one person was, from the first waypoint to the last.
+/// Where one person was, from the first point to the last.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Track(Vec<Waypoint>);
+pub struct Track(Vec<TrackPoint>);
 
 impl Track {
-    /// The track through these waypoints; `None` unless their times rise and all places are finite.
+    /// The track through these points; `None` unless their times rise and all places are finite.
     #[must_use]
-    pub fn new(waypoints: Vec<Waypoint>) -> Option<Self> {
-        let rise = waypoints
-            .windows(2)
-            .all(|pair| pair[0].at_us < pair[1].at_us);
-        let is_finite = waypoints.iter().all(|point| point.at.is_finite());
-        (rise && is_finite && !waypoints.is_empty()).then_some(Self(waypoints))
+    pub fn new(points: Vec<TrackPoint>) -> Option<Self> {
+        let rise = points.windows(2).all(|pair| pair[0].at_us < pair[1].at_us);
+        let is_finite = points.iter().all(|point| point.at.is_finite());
+        (rise && is_finite && !points.is_empty()).then_some(Self(points))
     }
 
-    /// The waypoints, in the order of time.
+    /// The points, in the order of time.
     #[must_use]
-    pub fn waypoints(&self) -> &[Waypoint] {
+    pub fn points(&self) -> &[TrackPoint] {
         &self.0
     }
 
-    /// Where the person was at a time, on a straight line between two waypoints; `None` before the first and after the last one.
+    /// Where the person was at a time, on a straight line between two points; `None` before the first and after the last one.
     #[must_use]
     pub fn at(&self, time_us: u64) -> Option<Point> {
         let after = self.0.partition_point(|point| point.at_us < time_us);
@@ -61,8 +59,8 @@ impl Track {
 pub struct Recorded {
     /// Where each person was.
     pub tracks: Arc<Vec<Track>>,
-    /// Time of the record at tick 0, microseconds.
-    pub start_us: u64,
+    /// Time of the record at tick 0, microseconds; drawn if there is none, which needs a period.
+    pub start_us: Option<u64>,
     /// The record begins again after so many microseconds; it is played once without it.
     pub period_us: Option<NonZeroU64>,
     /// How fast a person goes back to where the record has it, m/s.
@@ -73,7 +71,7 @@ impl Recorded {
     /// How often the record has begun again, and its time then, microseconds.
     fn time_us(&self, tick: u64, tick_s: f64) -> (u64, u64) {
         let since_start_us = (tick as f64 * tick_s * 1e6).round() as u64;
-        let time_us = self.start_us.saturating_add(since_start_us);
+        let time_us = self.start_us.unwrap_or(0).saturating_add(since_start_us);
         match self.period_us {
             Some(period_us) => (time_us / period_us, time_us % period_us),
             None => (0, time_us),
@@ -103,7 +101,7 @@ impl RecordedWalk {
     }
 
     /// Moves a person that is on the field towards where the record has it. Returns whether it is there.
-    fn move_on(&self, person: usize, recorded: Point, floor: &mut Floor<'_>) -> bool {
+    fn move_on(&self, person: usize, recorded: Point, floor: &mut GuestFloor<'_>) -> bool {
         let most_m = self.recorded.catch_up_mps * floor.tick_s();
         let here = floor.guest(person);
 
@@ -122,7 +120,7 @@ impl RecordedWalk {
     }
 
     /// Has every person be where the record has it at a tick, as far as nothing hinders it.
-    fn follow(&mut self, floor: &mut Floor<'_>) {
+    fn follow(&mut self, floor: &mut GuestFloor<'_>) {
         let (round, time_us) = self.recorded.time_us(self.tick, floor.tick_s());
         let begins_again = round != self.round;
         self.round = round;
@@ -152,12 +150,16 @@ impl RecordedWalk {
     }
 }
 
-impl Walk for RecordedWalk {
-    fn begin(&mut self, floor: &mut Floor<'_>) {
+impl GuestWalker for RecordedWalk {
+    fn begin(&mut self, floor: &mut GuestFloor<'_>, rng: &mut dyn Rng) {
+        if self.recorded.start_us.is_none() {
+            let period_us = self.recorded.period_us.unwrap_or(NonZeroU64::MIN);
+            self.recorded.start_us = Some(rng.next_u64() % period_us);
+        }
         self.follow(floor);
     }
 
-    fn advance(&mut self, floor: &mut Floor<'_>, _rng: &mut dyn Rng) {
+    fn advance(&mut self, floor: &mut GuestFloor<'_>, _rng: &mut dyn Rng) {
         self.tick += 1;
         self.follow(floor);
     }

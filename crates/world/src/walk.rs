@@ -8,12 +8,12 @@ use rand::Rng;
 /// Moves the guests, tick by tick. What a walk does is a function of its state, the floor and what it draws.
 ///
 /// A walk that needs finer steps than a tick takes them by itself, and moves each guest once.
-pub(crate) trait Walk {
+pub(crate) trait GuestWalker {
     /// Has the guests enter that are on the field at the beginning. By default guests are placed already, and stay.
-    fn begin(&mut self, _floor: &mut Floor<'_>) {}
+    fn begin(&mut self, _floor: &mut GuestFloor<'_>, _rng: &mut dyn Rng) {}
 
     /// Moves every guest by one tick, in index order. Robots have moved.
-    fn advance(&mut self, floor: &mut Floor<'_>, rng: &mut dyn Rng);
+    fn advance(&mut self, floor: &mut GuestFloor<'_>, rng: &mut dyn Rng);
 }
 
 /// What became of the guests in the last tick.
@@ -38,15 +38,15 @@ pub struct Passage {
     pub at: Point,
 }
 
-/// The field as a [`Walk`] sees it, and all that a walk can do there.
-pub(crate) struct Floor<'a> {
+/// The field as a [`GuestWalker`] sees it, and all that a walk can do there.
+pub(crate) struct GuestFloor<'a> {
     bodies: &'a mut Bodies,
     directions: &'a [Option<Point>],
     outcomes: &'a mut GuestOutcomes,
     tick_s: f64,
 }
 
-impl<'a> Floor<'a> {
+impl<'a> GuestFloor<'a> {
     /// `directions` are those of guests that react to a robot; guests without an entry do not.
     pub(crate) fn new(
         bodies: &'a mut Bodies,

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use nix::sys::signal::Signal;
+use recording::Recording;
 use serde_json::Value;
 use system_tests::processes::send;
 use system_tests::python::package;
@@ -592,4 +593,53 @@ fn an_export_that_fails_names_the_reason_and_leaves_nothing_behind() {
     assert_eq!(output.status.code(), Some(1));
     let errors = String::from_utf8_lossy(&output.stderr);
     assert!(errors.contains("No space left on device"), "{errors}");
+}
+
+/// PedPy reads where robots and guests were as the recording has it, guests who come and go included.
+#[test]
+fn pedpy_reads_trajectories_unchanged() {
+    let lab = Lab::new();
+    let hall = "configs/recorded_hall.toml";
+    lab.ok(&["run", hall, "--set", "duration=60 s", "--run", "people"]);
+    let file = lab.out().join("people.txt");
+    let path = file.to_str().unwrap();
+    lab.ok(&["export", "people", "--trajectories", "-o", path]);
+
+    let recording = Recording::open(&lab.out().join("people/run.mcap")).unwrap();
+    let mut expected = Vec::new();
+    for tick in recording.read(0, recording.len()).unwrap() {
+        let frame = &tick.frame;
+        let mut add = |id: f64, x: f64, y: f64| expected.push([id, frame.tick as f64, x, y]);
+        // Butler, Leguin, and the guests after them.
+        for (id, robot) in [1.0, 2.0].into_iter().zip(&frame.robots) {
+            let millimeters = |length_m: f64| (length_m * 1000.0).round() / 1000.0;
+            add(
+                id,
+                millimeters(robot.location.x),
+                millimeters(robot.location.y),
+            );
+        }
+        for (number, place) in frame.guest_numbers.iter().zip(frame.guests_mm.chunks(2)) {
+            let [x, y] = [place[0], place[1]].map(|mm| mm as f64 / 1000.0);
+            add(f64::from(*number) + 3.0, x, y);
+        }
+    }
+    assert!(expected.len() > 500, "{}", expected.len());
+
+    let text = std::fs::read_to_string(&file).unwrap();
+    let rows = text.lines().filter(|line| !line.starts_with('#'));
+    assert_eq!(rows.count(), expected.len());
+
+    let script = script("trajectories.py");
+    let Some(output) = python(lab.out(), &["pedpy"], &[&script, path]) else {
+        return;
+    };
+    let read: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(read["frame_rate"], 2.0);
+    let rows: Vec<[f64; 4]> = serde_json::from_value(read["rows"].clone()).unwrap();
+    assert_eq!(rows.len(), expected.len());
+    for (row, expected) in rows.iter().zip(&expected) {
+        let is_equal = row.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9);
+        assert!(is_equal, "{row:?} is not {expected:?}");
+    }
 }

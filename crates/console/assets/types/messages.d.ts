@@ -679,11 +679,15 @@ export interface WorldFrame {
    */
   flights?: Flight[];
   /**
-   * Guests that are not content, by their index, by mood.
+   * Guests that are not content, by their index in `guests`, by mood.
    */
   guest_moods?: {
     [k: string]: number[];
   };
+  /**
+   * The number of each of them, which it keeps; left out where guests do not enter and leave: then they are counted from 0.
+   */
+  guest_numbers?: number[];
   /**
    * Centers of the guests, meters.
    */

@@ -58,7 +58,10 @@ pub struct WorldFrame {
     pub robots: Vec<RobotFrame>,
     /// Centers of the guests, meters.
     pub guests: Vec<[f64; 2]>,
-    /// Guests that are not content, by their index, by mood.
+    /// The number of each of them, which it keeps; left out where guests do not enter and leave: then they are counted from 0.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub guest_numbers: Vec<u32>,
+    /// Guests that are not content, by their index in `guests`, by mood.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub guest_moods: BTreeMap<GuestMood, Vec<u32>>,
     /// Centers of the fixed obstacles, meters.

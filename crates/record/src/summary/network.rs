@@ -120,6 +120,8 @@ impl NetworkSummary {
             | Event::Blocked { .. }
             | Event::Say { .. }
             | Event::Guest { .. }
+            | Event::GuestEntered { .. }
+            | Event::GuestLeft { .. }
             | Event::SiteChanged { .. }
             | Event::SiteRefused { .. }
             | Event::LayerChanged { .. }

@@ -36,10 +36,10 @@ pub(super) fn frame(
         robots,
         // In whole millimeters, as in the recording: a tick looks the same live and recorded.
         guests: world
-            .guests()
-            .iter()
-            .map(|guest| [millimeters(guest.x), millimeters(guest.y)])
+            .present_guests()
+            .map(|(_, guest)| [millimeters(guest.x), millimeters(guest.y)])
             .collect(),
+        guest_numbers: simulation.guest_numbers(),
         obstacles: world
             .obstacles()
             .iter()
@@ -77,6 +77,7 @@ pub(super) fn empty_frame(status: &Status, field_m: [f64; 2], body_m: f64) -> Wo
         display_unit: DisplayUnit::default(),
         robots: Vec::new(),
         guests: Vec::new(),
+        guest_numbers: Vec::new(),
         guest_moods: BTreeMap::new(),
         obstacles: Vec::new(),
         static_world: None,

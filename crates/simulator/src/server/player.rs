@@ -168,6 +168,7 @@ impl Player {
         WorldFrame {
             robots: self.shown.robots.clone(),
             guests,
+            guest_numbers: frame.guest_numbers.clone(),
             guest_moods: frame.guest_moods.clone(),
             obstacles: header.obstacles.clone(),
             sites: header.sites_of(frame),

@@ -4,13 +4,15 @@ use std::num::NonZeroU64;
 use std::sync::Arc;
 
 use crate::halls::{reception, rng};
-use world::{Blocker, Body, GuestWalk, Hall, MoveOutcome, Point, Recorded, Track, Waypoint, World};
+use world::{
+    Blocker, Body, GuestWalk, Hall, MoveOutcome, Point, Recorded, Track, TrackPoint, World,
+};
 
 /// Speed back to the record, m/s: with ticks of 0.1 s, 0.2 m in a tick.
 const CATCH_UP_MPS: f64 = 2.0;
 
 fn track(waypoints: &[(f64, f64, f64)]) -> Track {
-    let points = waypoints.iter().map(|&(at_s, x, y)| Waypoint {
+    let points = waypoints.iter().map(|&(at_s, x, y)| TrackPoint {
         at_us: (at_s * 1e6).round() as u64,
         at: Point::new(x, y),
     });
@@ -20,7 +22,7 @@ fn track(waypoints: &[(f64, f64, f64)]) -> Track {
 fn recorded(tracks: Vec<Track>) -> Recorded {
     Recorded {
         tracks: Arc::new(tracks),
-        start_us: 0,
+        start_us: Some(0),
         period_us: None,
         catch_up_mps: CATCH_UP_MPS,
     }
@@ -73,7 +75,7 @@ fn a_track_has_rising_finite_times_and_straight_lines() {
     assert_eq!(at(4.0), Some(Point::new(4.0, 0.0)));
     assert_eq!(at(4.001), None);
 
-    let waypoint = |at_us, x| Waypoint {
+    let waypoint = |at_us, x| TrackPoint {
         at_us,
         at: Point::new(x, 0.0),
     };
@@ -187,7 +189,7 @@ fn a_person_whose_place_is_taken_enters_when_it_is_free() {
 fn a_record_that_repeats_begins_again_and_nobody_jumps() {
     let mut recorded = recorded(vec![track(&[(0.0, 2.0, 5.0), (0.4, 6.0, 5.0)])]);
     recorded.period_us = NonZeroU64::new(500_000);
-    recorded.start_us = 200_000;
+    recorded.start_us = Some(200_000);
     let mut world = world(&hall(&[], &[]), recorded);
     let mut places = vec![world.guests()[0].x];
     let mut events = Vec::new();
@@ -215,6 +217,24 @@ fn a_record_that_repeats_begins_again_and_nobody_jumps() {
             again
         ]
     );
+}
+
+#[test]
+fn a_start_that_is_drawn_is_one_of_the_record_and_of_the_seed() {
+    let mut recorded = recorded(vec![track(&[(0.0, 2.0, 5.0), (6.0, 8.0, 5.0)])]);
+    recorded.start_us = None;
+    recorded.period_us = NonZeroU64::new(6_000_001);
+    let hall = hall(&[], &[]);
+    let place = |seed: u64| {
+        let walk = GuestWalk::Recorded(recorded.clone());
+        World::with_guests(&hall, walk, rng(seed)).unwrap().guests()[0].x
+    };
+    let places: Vec<f64> = (0..50).map(place).collect();
+    assert_eq!(places[7], place(7));
+    assert!(places.iter().all(|x| (2.0..=8.0).contains(x)), "{places:?}");
+    for third in [2.0..4.0, 4.0..6.0, 6.0..8.0] {
+        assert!(places.iter().any(|x| third.contains(x)), "{places:?}");
+    }
 }
 
 #[test]
