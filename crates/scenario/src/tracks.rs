@@ -397,7 +397,7 @@ fn number(column: &str, text: &str) -> Result<f64, RefusedText> {
 /// The number of a person or a frame; some files have them as `1.0000000e+00`.
 fn whole(column: &str, text: &str) -> Result<u64, RefusedText> {
     let value = number(column, text)?;
-    if value >= 0.0 && value < 9e15 && value.fract() == 0.0 {
+    if (0.0..9e15).contains(&value) && value.fract() == 0.0 {
         return Ok(value as u64);
     }
     let reason = "people and frames have whole numbers, 0 or more";

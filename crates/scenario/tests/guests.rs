@@ -1,5 +1,10 @@
 //! Recorded guests: formats of files, how they lie in the hall, errors with file, line and caret, and the record.
 
+#![expect(
+    clippy::unwrap_used,
+    reason = "test helpers may panic; clippy.toml only exempts `#[test]` functions"
+)]
+
 use std::fs;
 use std::path::Path;
 

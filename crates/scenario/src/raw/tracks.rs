@@ -39,7 +39,7 @@ impl TracksTable {
     pub(super) fn read(&self, span: Span<usize>, source: &Source) -> Result<TrackSet, FileError> {
         let length_s = self.length.get_ref().0;
         let length_ms = (length_s * 1000.0).round();
-        if !(length_ms >= 1.0 && length_ms <= 1e15) {
+        if !(1.0..=1e15).contains(&length_ms) {
             let reason = "the length of a record must be more than zero";
             return Err(FileError::at(source, Some(self.length.span()), reason));
         }
