@@ -114,7 +114,11 @@ fn tick(tick: Tick) -> RecordedTick {
                 .map(|i| (i * 7919 + tick as i64 * 31) % 29_989)
                 .collect(),
             // Of the first three ticks, as where guests do not enter and leave.
-            guest_numbers: if tick < 3 { Vec::new() } else { (5..25).collect() },
+            guest_numbers: if tick < 3 {
+                Vec::new()
+            } else {
+                (5..25).collect()
+            },
             guest_moods: [(GuestMood::Waiting, vec![3, 7])].into(),
             measures: [("left".to_owned(), tick as f64 / 3.0)].into(),
             expectations: Vec::new(),
