@@ -38,26 +38,12 @@ impl LiveRun {
     }
 
     /// Holds the clock until the robots are back that take part in the next tick as further incarnations; after the last tick
-    /// of the record, until all are back. Those that a fault keeps from running come back as the scenario has it, or a person.
+    /// of the record, until all are back. Those whose processes the scenario keeps from running come back as it has it.
     pub(super) fn hold_for_rejoins(&mut self) {
         let replay_log = self.epoch.record.replay_log();
         let mut robots: BTreeSet<RobotName> = match replay_log {
-            Some(replay_log) => {
-                // The order that ends a fault is put only when nothing else holds the clock, and waits for its robot itself.
-                let due = self.epoch.simulation.faults_due();
-                let mut joined: BTreeSet<RobotName> = replay_log.joined().cloned().collect();
-                for order in due.iter().filter(|order| !order.begins) {
-                    joined.remove(&order.robot);
-                }
-                joined
-            }
-            None => {
-                let roster = self.barrier.roster();
-                roster
-                    .filter(|robot| self.orders.holding_for_a_time(robot).is_none())
-                    .cloned()
-                    .collect()
-            }
+            Some(replay_log) => replay_log.joined().cloned().collect(),
+            None => self.barrier.roster().cloned().collect(),
         };
         robots.retain(|robot| !self.barrier.is_stopped(robot));
 

@@ -40,7 +40,8 @@ impl LiveRun {
                 {
                     return Ok(Next::Wait(rest));
                 }
-                // Before faults: whether a robot is waited for that a fault stops is decided by it.
+                // Changes first: they may be about late robots, and about faults.
+                self.repeat_changes();
                 self.follow_lateness();
                 if let Some(pending_orders) = self.order_faults() {
                     self.epoch.waits_for = WaitsFor::Faults(pending_orders);
@@ -92,7 +93,7 @@ impl LiveRun {
         self.barrier.open(tick, news, &mut self.outputs);
     }
 
-    /// While a run is executed again, what was done by hand before the next tick is done again.
+    /// While a run is executed again, what was done by hand is done again.
     fn repeat_changes(&mut self) {
         let Some(replay_log) = self.epoch.record.replay_log() else {
             return;
@@ -224,8 +225,6 @@ impl LiveRun {
                 frontend.pace.ready();
                 tracing::info!("resumed after tick {}", record.tick);
             }
-            // First: a person may have ended the fault of a robot, which then comes back by an order.
-            self.repeat_changes();
             self.hold_for_rejoins();
         } else if record.tick == 0 {
             frontend.pace.ready();
