@@ -201,7 +201,7 @@ impl WalkingModel for CollisionFree {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pedestrians::Pedestrian;
+    use crate::pedestrian::Pedestrian;
 
     fn velocity(model: &CollisionFree, others: &[Neighbor]) -> Vector {
         let person = Pedestrian::at(Vector::ZERO);

@@ -1,6 +1,6 @@
 //! What a model of walking sees, and what it decides.
 
-use crate::pedestrians::Pedestrian;
+use crate::pedestrian::Pedestrian;
 use crate::vector::Vector;
 
 /// Another body: a person, a column or a robot.

@@ -7,6 +7,7 @@ use std::sync::Mutex;
 use crate::cells::{Cells, Lookup};
 use crate::itinerary::{AtEnd, Itinerary, Waypoint};
 use crate::model::{NearWall, Neighbor, Surroundings, WalkingModel};
+use crate::pedestrian::{Pedestrian, RADIUS_MAX_M};
 use crate::premises::{Disc, Premises, WallLine, permitted};
 use crate::vector::Vector;
 
@@ -26,57 +27,6 @@ const NOWHERE: u32 = u32::MAX;
 const SAME_PLACE_M: f64 = 1e-6;
 /// Walls are seen at least this far, m, so that the path of a step is inside; a step is at most this long less the radius.
 const WALL_REACH_M: f64 = 1.0;
-/// Largest radius of a body, m.
-const RADIUS_MAX_M: f64 = 0.9;
-
-/// A person of a crowd.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pedestrian {
-    /// Where the person is, m.
-    pub position: Vector,
-    /// Velocity of the last step, m/s: what was walked, which a wall may have shortened.
-    pub velocity: Vector,
-    /// Radius of the body, m.
-    pub radius_m: f64,
-    /// Speed where nothing is in the way, m/s.
-    pub desired_mps: f64,
-    /// When the person begins to walk, s: their reaction time.
-    pub starts_s: f64,
-    /// Number of the person, which [`Pedestrians::add`] gives: from 0 on.
-    pub id: u32,
-    /// The way of the person: what [`Pedestrians::add_itinerary`] returned.
-    pub itinerary: u16,
-    /// Number of waypoints that the person has reached.
-    pub reached: u16,
-}
-
-impl Pedestrian {
-    /// A person who stands at a place: radius 0.18 m, desired speed 1.34 m/s [D] Weidmann 1993, the first itinerary, no reaction
-    /// time.
-    #[must_use]
-    pub const fn at(position: Vector) -> Self {
-        Self {
-            position,
-            velocity: Vector::ZERO,
-            radius_m: 0.18,
-            desired_mps: 1.34,
-            starts_s: 0.0,
-            id: 0,
-            itinerary: 0,
-            reached: 0,
-        }
-    }
-
-    fn is_valid(&self) -> bool {
-        self.position.is_finite()
-            && self.velocity.is_finite()
-            && self.radius_m > 0.0
-            && self.radius_m <= RADIUS_MAX_M
-            && (0.0..=10.0).contains(&self.desired_mps)
-            && !self.starts_s.is_nan()
-    }
-}
-
 /// Why a crowd cannot be as asked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CrowdError {
@@ -392,7 +342,7 @@ impl<M: WalkingModel> Pedestrians<M> {
         let threads = threads.clamp(1, pieces.len().max(1));
         let pieces = Mutex::new(pieces);
         let work = || {
-            let mut scratch = Scratch::default();
+            let mut scratch = StepBuffers::default();
             let mut counts = StepCounts::default();
             loop {
                 // The lock is poisoned only if another thread has panicked, which ends the step anyway.
@@ -564,7 +514,7 @@ impl StepCounts {
 
 /// Buffers of one thread.
 #[derive(Debug, Default)]
-struct Scratch {
+struct StepBuffers {
     others: Vec<Neighbor>,
     walls: Vec<NearWall>,
     lines: Vec<WallLine>,
@@ -595,7 +545,7 @@ impl<M: WalkingModel> Frozen<'_, M> {
         person: &Pedestrian,
         next: &mut Pedestrian,
         next_cell: &mut u32,
-        scratch: &mut Scratch,
+        scratch: &mut StepBuffers,
         counts: &mut StepCounts,
     ) {
         let cell = self.cells.of(person.position);
@@ -654,7 +604,7 @@ impl<M: WalkingModel> Frozen<'_, M> {
         };
     }
 
-    fn see_walls(&self, person: &Pedestrian, cell: usize, scratch: &mut Scratch) {
+    fn see_walls(&self, person: &Pedestrian, cell: usize, scratch: &mut StepBuffers) {
         scratch.walls.clear();
         scratch.lines.clear();
         for index in self.walls_of.at(cell) {
@@ -668,7 +618,7 @@ impl<M: WalkingModel> Frozen<'_, M> {
         }
     }
 
-    fn see_others(&self, person: &Pedestrian, cell: usize, scratch: &mut Scratch) {
+    fn see_others(&self, person: &Pedestrian, cell: usize, scratch: &mut StepBuffers) {
         scratch.others.clear();
         scratch.discs.clear();
         let reach_m = self.model.reach_m();
@@ -716,7 +666,7 @@ impl<M: WalkingModel> Frozen<'_, M> {
     }
 
     /// Takes notice of another body unless a wall hides it.
-    fn see(&self, person: &Pedestrian, mut other: Neighbor, id: u32, scratch: &mut Scratch) {
+    fn see(&self, person: &Pedestrian, mut other: Neighbor, id: u32, scratch: &mut StepBuffers) {
         if scratch.others.len() >= NEIGHBORS_MAX {
             return;
         }

@@ -123,7 +123,7 @@ impl SocialForce {
 mod tests {
     use super::*;
     use crate::model::Neighbor;
-    use crate::pedestrians::Pedestrian;
+    use crate::pedestrian::Pedestrian;
 
     #[test]
     fn who_is_alone_speeds_up_as_the_closed_form_says() {

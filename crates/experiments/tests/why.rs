@@ -399,7 +399,8 @@ fn finds_the_way(number: usize) -> bool {
             .cause
             .as_ref()
             .map_or("", |cause| cause.what.as_str());
-        jump.shown.tick.abs_diff(DECISIVE + 1) <= 1
+        // Robots move before guests: where a guest stands when the robot moves is drawn in the tick before.
+        jump.shown.tick.abs_diff(DECISIVE) <= 1
             && (words == format!("a guest blocked {name}") || words == "chance of guests")
     })
 }

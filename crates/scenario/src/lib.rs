@@ -72,7 +72,7 @@ impl Scenario {
     /// [`FileError`] with file, line and caret; for a change that cannot be made, with its path.
     pub fn load(path: &Path, changes: &Changes) -> Result<Self, FileError> {
         let source = Source::read(path)?;
-        let folders = raw::Folders {
+        let folders = raw::folders::Folders {
             files: path.parent().unwrap_or(Path::new(".")),
             runs: changes.runs.as_deref().unwrap_or(Path::new(files::RUNS)),
         };
@@ -107,7 +107,7 @@ impl Scenario {
     /// # Errors
     /// [`FileError`] with line and caret.
     pub fn parse(source: &Source, folder: &Path) -> Result<Self, FileError> {
-        let folders = raw::Folders {
+        let folders = raw::folders::Folders {
             files: folder,
             runs: Path::new(files::RUNS),
         };

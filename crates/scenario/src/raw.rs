@@ -6,6 +6,7 @@ mod drawn;
 mod drive;
 mod expect;
 pub(super) mod fault;
+pub(super) mod folders;
 mod guests;
 mod layer;
 pub(super) mod mood;
@@ -24,7 +25,7 @@ pub(super) mod words;
 
 use std::collections::BTreeMap;
 use std::ops::Range as Span;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use config::bulk::member;
 use config::overrides::merge;
@@ -41,6 +42,7 @@ use change::{ChangeTable, ParentTable};
 use drawn::DrawnTable;
 use drive::DriveTable;
 use fault::FaultTable;
+use folders::Folders;
 use guests::{GuestsTable, RecordSetting};
 use layer::LayerTable;
 use network::NetworkTable;
@@ -69,15 +71,6 @@ const MAX_TICKS: f64 = 1e9;
 const MAX_DURATION_S: f64 = 18_446_744_073.0;
 /// Most robots of a scenario.
 const MAX_ROBOTS: usize = 1024;
-
-/// Where a scenario file finds what it names.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Folders<'a> {
-    /// Where its relative paths lead from.
-    pub(super) files: &'a Path,
-    /// Where its runs are.
-    pub(super) runs: &'a Path,
-}
 
 #[derive(Debug, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]

@@ -103,12 +103,12 @@ fn a_record_is_scaled_then_turned_then_moved() {
     let text = format!("# framerate: 10\n# x/cm\n{text}");
     let scenario = load(
         &text,
-        "rate = 1\nunit = \"1 mm\"\noffset = [\"3 m\", \"2 m\"]",
+        "rate = 1\nunit = \"0.1 cm\"\noffset = [\"3 m\", \"2 m\"]",
     )
     .unwrap();
     assert_eq!(
         points(&tracks(&scenario)[0]),
-        [(0, 3.0, 2.0), (1000, 3.1, 2.0)]
+        [(0, 3.1, 2.0), (1000, 3.2, 2.0)]
     );
 }
 

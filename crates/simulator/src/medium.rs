@@ -188,7 +188,7 @@ pub struct Medium {
 }
 
 /// Where messages pass in a tick.
-struct Surroundings<'a> {
+struct RadioScene<'a> {
     /// Where the robots of the roster stand; empty if that does not matter.
     places: Vec<Point>,
     /// What is between two of them, by their numbers.
@@ -332,7 +332,7 @@ impl Medium {
         places: Vec<Point>,
         crossed: &dyn Fn(usize, usize) -> Crossed,
     ) -> NetworkDecisions {
-        let around = Surroundings { places, crossed };
+        let around = RadioScene { places, crossed };
         let mut decision = NetworkDecisions::default();
         // Cuts come first, so that a command which is sent or arrives in the tick in which a cut begins is lost. Bursts advance before
         // any command draws. What arrives in this tick includes what was decided in it.
@@ -472,7 +472,7 @@ impl Medium {
         tick: Tick,
         command: SentCommand,
         transmission: Transmission,
-        around: &Surroundings<'_>,
+        around: &RadioScene<'_>,
         events: &mut Vec<Event>,
     ) {
         if self.roster.binary_search(&command.to).is_err() {
@@ -515,7 +515,7 @@ impl Medium {
         tick: Tick,
         command: SentCommand,
         named: NamedFates,
-        around: &Surroundings<'_>,
+        around: &RadioScene<'_>,
         events: &mut Vec<Event>,
     ) {
         let forced = self.forced_verdict(&command);
@@ -629,7 +629,7 @@ impl Medium {
         channel: &Channel,
         pair: &Pair,
         drawn: f64,
-        around: &Surroundings<'_>,
+        around: &RadioScene<'_>,
     ) -> Option<Cause> {
         let cut = self.cut.get(pair).copied().unwrap_or_default();
         if cut.contains(kind) {
@@ -648,7 +648,7 @@ impl Medium {
     }
 
     /// Whether two robots of the roster are farther apart than their radios may reach.
-    fn is_out_of_range(&self, pair: &Pair, around: &Surroundings<'_>) -> bool {
+    fn is_out_of_range(&self, pair: &Pair, around: &RadioScene<'_>) -> bool {
         let range_m = self.network.radio.as_ref().and_then(|radio| radio.range_m);
         let ends = self.ends(pair, around);
         match (range_m, ends) {
@@ -659,7 +659,7 @@ impl Medium {
 
     /// The numbers and the places of two robots in the order of their names, which is the same for both directions; `None` where
     /// places do not matter.
-    fn ends(&self, (from, to): &Pair, around: &Surroundings<'_>) -> Option<[(usize, Point); 2]> {
+    fn ends(&self, (from, to): &Pair, around: &RadioScene<'_>) -> Option<[(usize, Point); 2]> {
         let end = |robot| {
             let index = self.roster.binary_search(robot).ok()?;
             Some((index, *around.places.get(index)?))
@@ -668,7 +668,7 @@ impl Medium {
     }
 
     /// Why a message has too little power, if it has. Its fading is drawn from the stream with this name.
-    fn radio_loss(&self, pair: &Pair, name: &str, around: &Surroundings<'_>) -> Option<Cause> {
+    fn radio_loss(&self, pair: &Pair, name: &str, around: &RadioScene<'_>) -> Option<Cause> {
         let model = self.network.radio.as_ref()?.model.as_ref()?;
         let [(first, one), (second, other)] = self.ends(pair, around)?;
         let distance_m = one.distance_m(other);
@@ -752,12 +752,7 @@ impl Medium {
     }
 
     /// Decides once for each asker, target and tick whether queries are answered, for which both directions are needed.
-    fn decide_queries(
-        &self,
-        tick: Tick,
-        around: &Surroundings<'_>,
-        decision: &mut NetworkDecisions,
-    ) {
+    fn decide_queries(&self, tick: Tick, around: &RadioScene<'_>, decision: &mut NetworkDecisions) {
         decision.in_range = self.in_range(around);
         // Those that fading alone keeps from being asked in this tick.
         let mut faded = BTreeSet::new();
@@ -822,7 +817,7 @@ impl Medium {
     fn decide_receptions(
         &self,
         tick: Tick,
-        around: &Surroundings<'_>,
+        around: &RadioScene<'_>,
         in_range: &mut BTreeMap<RobotName, Vec<RobotName>>,
     ) -> BTreeSet<Pair> {
         let mut faded = BTreeSet::new();
@@ -841,7 +836,7 @@ impl Medium {
     }
 
     /// The robots that the radio of each may reach: those within its range. Costs the pairs that are near in x, not all pairs.
-    fn in_range(&self, around: &Surroundings<'_>) -> Option<BTreeMap<RobotName, Vec<RobotName>>> {
+    fn in_range(&self, around: &RadioScene<'_>) -> Option<BTreeMap<RobotName, Vec<RobotName>>> {
         let radio = self.network.radio.as_ref();
         let radio = radio.filter(|radio| radio.range_m.is_some() || radio.model.is_some())?;
         let Radio { range_m, .. } = radio;

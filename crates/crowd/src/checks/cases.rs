@@ -4,7 +4,8 @@ use crate::checks::published::{DENSITIES_PER_M2, SINGLE_FILE, SpeedData};
 use crate::checks::scene::{RunChance, add, add_way, crowd, flow_per_s, line, walls};
 use crate::itinerary::{AtEnd, Itinerary, Waypoint};
 use crate::model::WalkingModel;
-use crate::pedestrians::{Pedestrian, Pedestrians};
+use crate::pedestrian::Pedestrian;
+use crate::pedestrians::Pedestrians;
 use crate::premises::{Premises, WallLine};
 use crate::vector::Vector;
 

@@ -3,7 +3,8 @@
 use crate::draws::Draws;
 use crate::itinerary::Itinerary;
 use crate::model::WalkingModel;
-use crate::pedestrians::{Pedestrian, Pedestrians};
+use crate::pedestrian::Pedestrian;
+use crate::pedestrians::Pedestrians;
 use crate::premises::{Premises, WallLine};
 use crate::vector::Vector;
 

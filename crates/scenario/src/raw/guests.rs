@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use config::units::{Angle, Length, Speed, Time};
-use config::{FileError, Source};
+use config::{FileError, Source, shipped};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 use world::{Field, Point};
 
-use super::Folders;
+use super::folders::Folders;
 use super::numbers::{Range, positive, triangular};
 use super::place::{Lengths, point};
 use super::tracks::TracksTable;
@@ -315,20 +315,21 @@ impl GuestsTable {
             return Err(FileError::at(source, span, reason));
         };
         let span = from.span();
-        let Some(folders) = folders else {
-            let reason = "a scenario from outside names no record of guests: write it out as a record of a run has it, in [tracks]";
-            return Err(FileError::at(source, Some(span), reason));
-        };
-
         let placement = self.placement(source)?;
         let from = from.get_ref();
-        if let Some(run) = run_folder(from, folders) {
+        if let Some(run) = folders.and_then(|folders| run_folder(from, folders)) {
             let set = tracks::read_run(&run, &placement)
                 .map_err(|reason| FileError::at(source, Some(span.clone()), &reason))?;
             return Ok((set, span));
         }
 
-        let path = folders.files.join(from);
+        let shipped = shipped::path(shipped::SCENARIOS);
+        let folder = folders.map_or(shipped.as_path(), |folders| folders.files);
+        let path = folder.join(from);
+        if folders.is_none() && !shipped::contains(&path) {
+            let reason = "a scenario from outside names no record of guests but those that come with the programs: write it out as a record of a run has it, in [tracks]";
+            return Err(FileError::at(source, Some(span), reason));
+        }
         source.check_named(span.clone(), &path)?;
         if is_sqlite(&path) {
             let reason = "this is a database: docs/guests.md has the lines that write its trajectories as text";
