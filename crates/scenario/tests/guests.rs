@@ -100,9 +100,9 @@ fn a_record_is_scaled_then_turned_then_moved() {
     );
 
     // What the scenario says counts more than what the file says.
-    let text = format!("# framerate: 10\n# x/cm\n{text}");
+    let text = "# framerate: 10\n# id frame x/cm y/cm\n1 0 100 0\n1 1 200 0\n";
     let scenario = load(
-        &text,
+        text,
         "rate = 1\nunit = \"0.1 cm\"\noffset = [\"3 m\", \"2 m\"]",
     )
     .unwrap();
