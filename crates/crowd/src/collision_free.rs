@@ -3,7 +3,7 @@
 use crate::model::{NearWall, Neighbor, Surroundings, WalkingModel};
 use crate::vector::Vector;
 
-/// The collision-free speed model: direction from repulsion, speed from the gap in front. [D] Tordeux, Chraibi, Seyfried 2016,
+/// The collision-free speed model: direction from repulsion, speed from the gap in front. \[D\] Tordeux, Chraibi, Seyfried 2016,
 /// "Collision-free speed model for pedestrian dynamics", eq. 1 to 4.
 ///
 /// Direction: e = unit(e0 - sum a exp((l - s)/D) n), with the distance s to each neighbor in direction n, and l the sum of both
@@ -12,32 +12,32 @@ use crate::vector::Vector;
 ///
 /// The default parameters are calibrated to the line of Weidmann (1993) between 0.5 and 3 persons per m² in a corridor of 2 m, with
 /// Weidmann's spread of desired speeds, and, in a hurry, to the flow through a gate of 0.5 m. Two rules are added, because people of
-/// different speeds overtake each other, and pass each other sideways: `turns` and `breadth`. [I]
+/// different speeds overtake each other, and pass each other sideways: `turns` and `breadth`. \[I\]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CollisionFree {
-    /// T, the time gap to who is in front, s. [D] 1.0, here calibrated.
+    /// T, the time gap to who is in front, s. \[D\] 1.0, here calibrated.
     pub time_gap_s: f64,
-    /// T of people in a hurry, s. [I] Calibrated to the flow through the gate.
+    /// T of people in a hurry, s. \[I\] Calibrated to the flow through the gate.
     pub hurried_gap_s: f64,
-    /// a, strength of the repulsion by neighbors. [D] 5.
+    /// a, strength of the repulsion by neighbors. \[D\] 5.
     pub repulsion: f64,
-    /// D, range of the repulsion by neighbors, m. [D] 0.1.
+    /// D, range of the repulsion by neighbors, m. \[D\] 0.1.
     pub range_m: f64,
-    /// Strength of the repulsion by walls. [D] 5, in JuPedSim.
+    /// Strength of the repulsion by walls. \[D\] 5, in JuPedSim.
     pub wall_repulsion: f64,
-    /// Range of the repulsion by walls, m. [D] 0.02, in JuPedSim.
+    /// Range of the repulsion by walls, m. \[D\] 0.02, in JuPedSim.
     pub wall_range_m: f64,
-    /// Share of l within which a neighbor beside the way ahead is in front. [D] 1.
+    /// Share of l within which a neighbor beside the way ahead is in front. \[D\] 1.
     pub breadth: f64,
     /// Number of directions to each side, 15 degrees apart, that people who are slowed down look at, and of which they take the
-    /// one in which they come closest to where they want to go. Up to 6. [D] 0; the rule is that of Moussaïd, Helbing, Theraulaz
-    /// 2011, "How simple rules determine pedestrian behavior", with the gap as the free distance. [I]
+    /// one in which they come closest to where they want to go. Up to 6. \[D\] 0; the rule is that of Moussaïd, Helbing, Theraulaz
+    /// 2011, "How simple rules determine pedestrian behavior", with the gap as the free distance. \[I\]
     pub turns: usize,
-    /// Radius of bodies, m. [D] 0.15 (l = 0.3 m), here calibrated.
+    /// Radius of bodies, m. \[D\] 0.15 (l = 0.3 m), here calibrated.
     pub radius_m: f64,
 }
 
-/// Ranges of repulsion after which it is left out: a exp(-8) is 0.002. [I]
+/// Ranges of repulsion after which it is left out: a exp(-8) is 0.002. \[I\]
 const RANGES: f64 = 8.0;
 
 /// Cosine and sine of 15, 30, …, 90 degrees.
@@ -54,7 +54,7 @@ const TURNS: [(f64, f64); 6] = [
 ];
 
 impl CollisionFree {
-    /// The parameters of the source. [D]
+    /// The parameters of the source. \[D\]
     #[must_use]
     pub const fn published() -> Self {
         Self {
@@ -81,12 +81,12 @@ impl CollisionFree {
             }
         }
         for wall in seen.walls {
-            sum += self.from_wall(seen.person.radius_m, wall);
+            sum += self.away_from_wall(seen.person.radius_m, wall);
         }
         sum.unit()
     }
 
-    fn from_wall(&self, radius_m: f64, wall: &NearWall) -> Vector {
+    fn away_from_wall(&self, radius_m: f64, wall: &NearWall) -> Vector {
         let ranges = (wall.distance_m - radius_m) / self.wall_range_m;
         if ranges < RANGES && wall.distance_m > 0.0 {
             let strength = self.wall_repulsion * libm::exp(-ranges);

@@ -3,7 +3,7 @@
 use crate::premises::WallLine;
 use crate::vector::Vector;
 
-/// A person has reached a line at this distance, m. [I]
+/// A person has reached a line at this distance, m. \[I\]
 const REACHED_M: f64 = 0.05;
 
 /// A place on the way.

@@ -56,7 +56,7 @@ pub trait WalkingModel: Sync {
     /// Radius of the bodies for which the model's parameters were chosen, m.
     fn body_radius_m(&self) -> f64;
 
-    /// The same model for people who are in a hurry, as those in the experiment at the gate were told to be. [D] Rzezonka, Chraibi,
+    /// The same model for people who are in a hurry, as those in the experiment at the gate were told to be. \[D\] Rzezonka, Chraibi,
     /// Seyfried, Hein, Schadschneider 2022: motivation changes the time gap that people keep. Without a rule for it, the model
     /// itself.
     #[must_use]

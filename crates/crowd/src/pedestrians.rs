@@ -17,7 +17,7 @@ const PEOPLE_MAX: usize = 10_000_000;
 const PARTS_MAX: usize = 60_000;
 /// People of one piece of work: few enough to share evenly, and enough for a thread to be worth it.
 const PIECE: usize = 2_048;
-/// People and columns that one person takes notice of at most, in the order of cells. [I]
+/// People and columns that one person takes notice of at most, in the order of cells. \[I\]
 const NEIGHBORS_MAX: usize = 256;
 /// The cell of those who have left.
 const LEFT: u32 = u32::MAX;

@@ -86,13 +86,13 @@ pub struct Premises {
 ///
 /// The rule, for every model: nobody's middle crosses a wall, and nobody comes closer to a wall or a disc than their own radius,
 /// or than they are already. The proposed place is moved away from what it is too close to; where that leads nowhere, the person
-/// stays. [I]
+/// stays. \[I\]
 pub(crate) fn permitted<'a>(
     from: Vector,
     to: Vector,
     radius_m: f64,
-    walls: impl Iterator<Item = &'a WallLine> + Clone,
-    discs: impl Iterator<Item = &'a Disc> + Clone,
+    mut walls: impl Iterator<Item = &'a WallLine> + Clone,
+    mut discs: impl Iterator<Item = &'a Disc> + Clone,
 ) -> (Vector, bool) {
     let is_through_wall = walls.clone().any(|wall| wall.is_met(from, to));
     let mut place = to;
@@ -109,12 +109,8 @@ pub(crate) fn permitted<'a>(
         }
     }
 
-    let is_free = walls
-        .clone()
-        .all(|wall| beside_wall(from, place, radius_m, wall) == place)
-        && discs
-            .clone()
-            .all(|disc| beside_disc(from, place, radius_m, disc) == place);
+    let is_free = walls.all(|wall| beside_wall(from, place, radius_m, wall) == place)
+        && discs.all(|disc| beside_disc(from, place, radius_m, disc) == place);
     (if is_free { place } else { from }, is_through_wall)
 }
 

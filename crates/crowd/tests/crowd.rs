@@ -1,5 +1,7 @@
 //! Crowds: what holds for every model.
 
+#![expect(clippy::unwrap_used, reason = "helpers of tests")]
+
 use crowd::{
     AtEnd, CollisionFree, CrowdError, Disc, Itinerary, Pedestrian, Pedestrians, Premises,
     SocialForce, Surroundings, Vector, WalkingModel, WallLine, Waypoint,

@@ -1,6 +1,7 @@
 //! The simulated network against the laws of its models and of protocols over it: retries, bursts, maximum consensus, rumors.
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
+#![expect(clippy::print_stdout, reason = "a test prints what it measures")]
 
 mod common;
 
@@ -84,9 +85,8 @@ impl<F: FnMut(Tick, usize) -> Vec<usize>> Gossip<F> {
             simulation.step(&mut gossip).unwrap();
         }
         let ended = gossip.times.iter().take(count as usize);
-        ended
-            .map(|time| time.expect("all know it before the next episode"))
-            .collect()
+        // All know it before the next episode.
+        ended.map(|time| time.unwrap()).collect()
     }
 
     /// Those that received it in this tick know it. Messages of an earlier episode are void in the first tick of one.

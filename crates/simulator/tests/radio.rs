@@ -286,7 +286,7 @@ fn no_other_message_and_no_rule_changes_the_fate_of_one() {
 /// Texts of commands of so many bytes.
 fn long(from: &str, to: &str, seq: u64, bytes: usize) -> SentCommand {
     SentCommand {
-        text: CommandText::named(&"x".repeat(bytes)),
+        text: CommandText::named("x".repeat(bytes)),
         ..command(from, to, seq)
     }
 }

@@ -9,14 +9,14 @@ use crate::pedestrians::Pedestrians;
 use crate::premises::{Premises, WallLine};
 use crate::vector::Vector;
 
-/// A frame of the trajectories that cases look at, s. [I]
+/// A frame of the trajectories that cases look at, s. \[I\]
 const FRAME_S: f64 = 0.1;
-/// People who walk at this speed have started, m/s. [I]
+/// People who walk at this speed have started, m/s. \[I\]
 const STARTED_MPS: f64 = 0.05;
-/// The way is this much longer or the person beyond a wall, m, before it counts. [I]
+/// The way is this much longer or the person beyond a wall, m, before it counts. \[I\]
 const TOLERANCE_M: f64 = 1e-6;
 
-/// Ages of RiMEA 7, and the speeds between which a group's mean is, m/s. [D]
+/// Ages of RiMEA 7, and the speeds between which a group's mean is, m/s. \[D\]
 pub(crate) const AGES: [(&str, f64, f64); 4] = [
     ("20 to 30 years", 0.58, 1.61),
     ("30 to 50 years", 1.41, 1.54),
@@ -102,7 +102,7 @@ pub(crate) fn corridor<M: WalkingModel + Clone>(model: &M, chance: &mut RunChanc
     values
 }
 
-/// Single file: a corridor of 24 m that repeats itself, 0.04 m broader than a body, so that nobody walks beside anybody. [I] The
+/// Single file: a corridor of 24 m that repeats itself, 0.04 m broader than a body, so that nobody walks beside anybody. \[I\] The
 /// mean speeds at the densities of [`SINGLE_FILE`].
 pub(crate) fn single_file<M: WalkingModel + Clone>(model: &M, chance: &mut RunChance) -> Vec<f64> {
     let breadth_m = 2.0 * model.body_radius_m() + 0.2;

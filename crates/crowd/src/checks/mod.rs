@@ -76,7 +76,7 @@ pub struct CheckOptions {
 }
 
 impl Default for CheckOptions {
-    /// As IMO MSC.1/Circ.1238 asks. [D]
+    /// As IMO MSC.1/Circ.1238 asks. \[D\]
     fn default() -> Self {
         Self {
             runs: 50,

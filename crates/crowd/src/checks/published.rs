@@ -6,11 +6,11 @@ pub const DENSITIES_PER_M2: [f64; 6] = [0.5, 1.0, 1.5, 2.0, 2.5, 3.0];
 /// Measured speeds by density.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SpeedData {
-    /// A corridor of 1.8 m, periodic, 434 points; computed from the data of jpscore, `systemtest/Validation` (Zhang 2012). [D]
+    /// A corridor of 1.8 m, periodic, 434 points; computed from the data of jpscore, `systemtest/Validation` (Zhang 2012). \[D\]
     Corridor,
-    /// In one direction with open ends, 571 points; from the same place. [D]
+    /// In one direction with open ends, 571 points; from the same place. \[D\]
     Open,
-    /// The line of Weidmann 1993, over measurements of 25 authors. [D]
+    /// The line of Weidmann 1993, over measurements of 25 authors. \[D\]
     Weidmann,
 }
 
@@ -39,17 +39,17 @@ impl SpeedData {
     }
 }
 
-/// Weidmann's speed at a density, m/s: 1.34 (1 - exp(-1.913 (1/ρ - 1/5.4))), and 0 beyond 5.4 persons per m². [D]
+/// Weidmann's speed at a density, m/s: 1.34 (1 - exp(-1.913 (1/ρ - 1/5.4))), and 0 beyond 5.4 persons per m². \[D\]
 #[must_use]
 pub fn weidmann_mps(density_per_m2: f64) -> f64 {
     let free_m2 = 1.0 / density_per_m2 - 1.0 / 5.4;
     (1.34 * (1.0 - libm::exp(-1.913 * free_m2))).max(0.0)
 }
 
-/// Speeds in single file by persons per meter: (1/m, m/s). [D] Seyfried, Steffen, Klingsch, Boltes 2005.
+/// Speeds in single file by persons per meter: (1/m, m/s). \[D\] Seyfried, Steffen, Klingsch, Boltes 2005.
 pub const SINGLE_FILE: [(f64, f64); 4] = [(0.75, 0.89), (1.25, 0.45), (1.75, 0.19), (2.25, 0.07)];
 
-/// Flow of 75 people through a gate of 0.5 m at the end of a corridor of 5.6 m, 1/s. [D] Adrian, Seyfried, Sieben 2020, run
+/// Flow of 75 people through a gate of 0.5 m at the end of a corridor of 5.6 m, 1/s. \[D\] Adrian, Seyfried, Sieben 2020, run
 /// `040_c_56_h`, as PedPy ships it.
 pub const GATE_FLOW_PER_S: f64 = 1.15;
 

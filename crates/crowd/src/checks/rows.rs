@@ -12,7 +12,7 @@ use crate::model::WalkingModel;
 pub enum Judged {
     /// The mean of all runs.
     Mean,
-    /// The values that 95 % of the runs do not exceed, and do not fall below. [D] IMO MSC.1/Circ.1238, for times.
+    /// The values that 95 % of the runs do not exceed, and do not fall below. \[D\] IMO MSC.1/Circ.1238, for times.
     Most,
     /// Each run.
     All,
@@ -94,7 +94,11 @@ fn single_person_rows() -> Vec<RowSpec> {
 fn corridor_rows(against: SpeedData) -> Vec<RowSpec> {
     let mut rows = Vec::new();
     for (density, speed_mps) in DENSITIES_PER_M2.iter().zip(against.speeds_mps()) {
-        rows.push(near(format!("speed at {density}/m², m/s"), speed_mps, 0.10));
+        rows.push(near(
+            &format!("speed at {density}/m², m/s"),
+            speed_mps,
+            0.10,
+        ));
     }
     rows.push(mean("speed at 6/m², m/s", 0.0, 0.25));
     for data in SpeedData::ALL {
@@ -113,7 +117,7 @@ fn single_file_rows() -> Vec<RowSpec> {
     for (per_m, speed_mps) in SINGLE_FILE {
         rows.push(RowSpec {
             requirement: None,
-            ..near(format!("speed at {per_m}/m, m/s"), speed_mps, 0.10)
+            ..near(&format!("speed at {per_m}/m, m/s"), speed_mps, 0.10)
         });
     }
     rows
@@ -158,11 +162,7 @@ fn two_rooms_rows() -> Vec<RowSpec> {
 
 fn gate_rows() -> Vec<RowSpec> {
     vec![
-        near(
-            "flow, 1/s".to_owned(),
-            GATE_FLOW_PER_S,
-            0.10 * GATE_FLOW_PER_S,
-        ),
+        near("flow, 1/s", GATE_FLOW_PER_S, 0.10 * GATE_FLOW_PER_S),
         RowSpec {
             published: Some(1.16),
             ..shown("flow, middle 60 %, 1/s")
@@ -200,9 +200,9 @@ fn all(measure: &str, from: f64, to: f64) -> RowSpec {
 }
 
 /// A mean at most `distance` from what was published.
-fn near(measure: String, published: f64, distance: f64) -> RowSpec {
+fn near(measure: &str, published: f64, distance: f64) -> RowSpec {
     RowSpec {
         published: Some(published),
-        ..mean(&measure, published - distance, published + distance)
+        ..mean(measure, published - distance, published + distance)
     }
 }
