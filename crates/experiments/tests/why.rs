@@ -20,7 +20,7 @@ use lab::folder::recorded_epoch;
 use lab::run::{RobotMaker, execute_with};
 use protocol::RobotName;
 use protocol::random::unit;
-use record::RunFolder;
+use record::{EpochFiles, RunFolder};
 use recording::RunDecisions;
 use robot::{Action, BadParameters, Cars, Robot};
 use scenario::Scenario;
@@ -456,12 +456,20 @@ fn planted_causes_are_found_in_95_percent_of_runs_and_no_others_named() {
     }
 }
 
+/// What is asked about the run of [`record_coin`].
+const TWO_HEADS: &str = "{ robot = \"Coin\", variable = \"heads\", above = 1.5 }";
+
+/// A run of one robot that throws three coins.
+fn record_coin() -> (Recorded, EpochFiles) {
+    let recorded = record(&format!("{HEAD}{}", robot("Coin", "Thrower", 6.0)), 1);
+    let files = recorded_epoch(&recorded.folder, None).unwrap();
+    (recorded, files)
+}
+
 #[test]
 fn an_answer_does_not_depend_on_threads_and_goes_on_where_it_was_stopped() {
-    let text = format!("{HEAD}{}", robot("Coin", "Thrower", 6.0));
-    let what = "{ robot = \"Coin\", variable = \"heads\", above = 1.5 }";
-    let recorded = record(&text, 1);
-    let files = recorded_epoch(&recorded.folder, None).unwrap();
+    let what = TWO_HEADS;
+    let (recorded, files) = record_coin();
     let run = "run".parse().unwrap();
 
     let stop = AtomicBool::new(false);
@@ -520,10 +528,8 @@ fn an_answer_does_not_depend_on_threads_and_goes_on_where_it_was_stopped() {
 
 #[test]
 fn a_robot_that_cannot_be_copied_gives_the_same_answer() {
-    let text = format!("{HEAD}{}", robot("Coin", "Thrower", 6.0));
-    let what = "{ robot = \"Coin\", variable = \"heads\", above = 1.5 }";
-    let recorded = record(&text, 1);
-    let files = recorded_epoch(&recorded.folder, None).unwrap();
+    let what = TWO_HEADS;
+    let (recorded, files) = record_coin();
     let run = "run".parse().unwrap();
     let stop = AtomicBool::new(false);
 

@@ -56,11 +56,8 @@ fn write_tick(
         writeln!(out, "{} {number} {:.3} {:.3} 0", index + 1, at.x, at.y)?;
     }
 
-    for (index, place) in frame.guests_mm.chunks_exact(2).enumerate() {
-        let guest = frame.guest_numbers.get(index);
-        let guest = guest.map_or(index, |guest| *guest as usize);
-        let id = robots.len() + 1 + guest;
-        let [x_m, y_m] = [place[0], place[1]].map(|mm| mm as f64 / 1000.0);
+    for (guest, [x_m, y_m]) in frame.guests() {
+        let id = robots.len() + 1 + guest as usize;
         writeln!(out, "{id} {number} {x_m:.3} {y_m:.3} 0")?;
     }
     Ok(())

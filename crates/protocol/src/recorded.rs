@@ -131,6 +131,18 @@ pub struct Frame {
 }
 
 impl Frame {
+    /// The guests on the field: the number of each, and its center in meters.
+    pub fn guests(&self) -> impl Iterator<Item = (u32, [f64; 2])> + '_ {
+        let places = self.guests_mm.chunks_exact(2);
+        (0..).zip(places).map(|(index, place)| {
+            let number = self.guest_numbers.get(index as usize);
+            let number = number.copied().unwrap_or(index);
+            (number, [place[0], place[1]].map(|mm| mm as f64 / 1000.0))
+        })
+    }
+}
+
+impl Frame {
     /// How the expectations of the scenario stand after the events of the tick, which may be the last one of the run.
     #[must_use]
     pub fn standings(&self, events: &[Event]) -> Vec<Standing> {

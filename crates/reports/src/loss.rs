@@ -97,9 +97,10 @@ impl LossByDistance {
             }
             if counts.0 > 0 {
                 let middle_m = f64::from(first + next) / 2.0;
+                let share = Estimate::share(counts.1 as usize, counts.0 as usize);
                 levels.push((middle_m, middle_m.to_string()));
-                points.push(point(middle_m, counts));
-                table.row(row(&format!("{first} to {next}"), counts));
+                points.push(point(middle_m, &share));
+                table.row(row(&format!("{first} to {next}"), counts, &share));
             }
             first = next;
         }
@@ -137,22 +138,20 @@ fn is_of_radio(because: Cause) -> bool {
     )
 }
 
-fn point(middle_m: f64, (commands, lost): (u64, u64)) -> TrendPoint {
-    let share = Estimate::share(lost as usize, commands as usize);
+fn point(middle_m: f64, share: &Estimate) -> TrendPoint {
     TrendPoint {
         x: middle_m,
         estimate: PlottedEstimate {
-            value: lost as f64 / commands as f64,
+            value: share.value,
             interval: share.bounds(),
-            n: commands as usize,
+            n: share.n,
             is_filled: true,
         },
         runs: Vec::new(),
     }
 }
 
-fn row(distance: &str, (commands, lost): (u64, u64)) -> [Cell; 5] {
-    let share = Estimate::share(lost as usize, commands as usize);
+fn row(distance: &str, (commands, lost): (u64, u64), share: &Estimate) -> [Cell; 5] {
     let interval = share.bounds().map_or(Cell::Empty, |(low, high)| {
         format!("{low:.3} to {high:.3}").into()
     });
@@ -160,7 +159,7 @@ fn row(distance: &str, (commands, lost): (u64, u64)) -> [Cell; 5] {
         distance.into(),
         commands.into(),
         lost.into(),
-        Cell::Number(lost as f64 / commands as f64, 3),
+        Cell::Number(share.value, 3),
         interval,
     ]
 }

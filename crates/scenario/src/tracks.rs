@@ -167,18 +167,14 @@ pub(crate) fn read_run(folder: &Path, placement: &TrackPlacement) -> Result<Trac
     let mut count = 0;
     while let Some(tick) = ticks.next_tick().map_err(|error| error.to_string())? {
         let now = tick.tick();
-        let places = tick.frame.guests_mm.chunks_exact(2);
-        count += places.len();
+        count += tick.frame.guests_mm.len() / 2;
         if count > MAX_OBSERVATIONS {
             return Err(format!(
                 "the guests of this run are at more than {MAX_OBSERVATIONS} places: take a shorter run"
             ));
         }
 
-        for (index, place) in (0..).zip(places) {
-            let numbers = &tick.frame.guest_numbers;
-            let number = numbers.get(index as usize).copied().unwrap_or(index);
-            let at = [place[0] as f64, place[1] as f64].map(|mm| mm / 1000.0);
+        for (number, at) in tick.frame.guests() {
             let at = placement.place(at, 1.0).ok_or(FAR)?;
 
             let goes_on = open.get(&number).filter(|(last, _)| last + 1 == now);

@@ -487,12 +487,16 @@ impl Medium {
         }
 
         let named = self.named_fates(&command);
-        let is_forced = self.forced_verdict(&command).is_some();
         match transmission {
+            Transmission::Before(until) if until <= tick => {
+                self.transmit(tick, command, named, around, events);
+            }
             // Whether it is forced or named, it has taken its time.
-            _ if is_forced || named.is_lost => self.transmit(tick, command, named, around, events),
+            _ if named.is_lost || self.forced_verdict(&command).is_some() => {
+                self.transmit(tick, command, named, around, events);
+            }
             Transmission::NoRoom => events.push(command.dropped(Cause::Queue)),
-            Transmission::Before(until) if until > tick => {
+            Transmission::Before(until) => {
                 events.push(Event::CommandDelayed {
                     from: command.from.clone(),
                     to: command.to.clone(),
@@ -505,7 +509,6 @@ impl Medium {
                     .or_default()
                     .push((command, named));
             }
-            Transmission::Before(_) => self.transmit(tick, command, named, around, events),
         }
     }
 

@@ -496,9 +496,10 @@ impl Simulation {
         for robot in self.world.robots() {
             digest.place(robot.x, robot.y);
         }
+        // Who is on the field counts only where that can change, so that all other digests are as ever.
+        let has_passages = self.world.has_passages();
         for (guest, at) in self.world.present_guests() {
-            // Who is on the field counts only where that can change, so that all other digests are as ever.
-            if self.world.has_passages() {
+            if has_passages {
                 digest.guest(guest);
             }
             digest.place(at.x, at.y);

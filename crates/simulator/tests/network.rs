@@ -2,49 +2,43 @@
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
+mod commands;
+mod media;
+
 use std::collections::BTreeMap;
 use std::iter::zip;
 use std::path::Path;
 
 use protocol::event::Cause;
-use protocol::messages::{CommandText, Point};
+use protocol::messages::Point;
 use protocol::random::{stream, unit};
 use protocol::{Event, RobotName};
 use scenario::Scenario;
 use scenario::diagnostic::{FileError, Source};
-use simulator::medium::{Medium, NetworkDecisions, SentCommand};
+use simulator::medium::{Medium, NetworkDecisions};
+
+use commands::{command, name};
+use media::medium_of;
 
 const ROBOTS: &str = "[[robot]]\nname = \"A\"\nat = [\"2 m\", \"2 m\"]\n[[robot]]\nname = \"B\"\nat = [\"4 m\", \"2 m\"]\n\
                       [[robot]]\nname = \"C\"\nat = [\"6 m\", \"2 m\"]\n";
 
 fn parse(network: &str) -> Result<Scenario, FileError> {
-    let text = format!("seed = 5\n{network}\n{ROBOTS}");
     Scenario::parse(
         &Source {
             name: "test".into(),
-            text,
+            text: text(network),
         },
         Path::new("."),
     )
 }
 
+fn text(network: &str) -> String {
+    format!("seed = 5\n{network}\n{ROBOTS}")
+}
+
 fn medium(network: &str) -> Medium {
-    let scenario = parse(network).unwrap_or_else(|error| panic!("{}", error.in_words()));
-    let roster = scenario.roster();
-    Medium::new(scenario.seed, scenario.tick_s, scenario.network, roster)
-}
-
-fn name(name: &str) -> RobotName {
-    RobotName::new(name).unwrap()
-}
-
-fn command(from: &str, to: &str, seq: u64) -> SentCommand {
-    SentCommand {
-        to: name(to),
-        from: name(from),
-        seq,
-        text: CommandText::named("refill"),
-    }
+    medium_of(&text(network))
 }
 
 /// One command from A to B a tick, sent in the ticks from 1 on; what the network decides at the ticks from 2 on.

@@ -4,6 +4,8 @@
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
+mod media;
+
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -12,9 +14,9 @@ use protocol::RobotName;
 use protocol::messages::{CommandText, Point};
 use protocol::random::{stream, unit};
 use radio::{SendQueue, Transmitter, outage};
-use scenario::Scenario;
-use scenario::diagnostic::Source;
 use simulator::medium::{Medium, SentCommand};
+
+use media::medium_of;
 
 /// Quantile of the normal distribution for intervals of 99 %.
 const Z_99: f64 = 2.576;
@@ -57,14 +59,7 @@ fn medium(network: &str, robots: usize) -> Medium {
             2 + 2 * index
         );
     }
-    let source = Source {
-        name: "figure".into(),
-        text,
-    };
-    let scenario = Scenario::parse(&source, Path::new("."))
-        .unwrap_or_else(|error| panic!("{}", error.in_words()));
-    let roster = scenario.roster();
-    Medium::new(scenario.seed, scenario.tick_s, scenario.network, roster)
+    medium_of(&text)
 }
 
 fn name(index: usize) -> RobotName {

@@ -2,17 +2,20 @@
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
+mod commands;
+mod media;
+
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use protocol::event::Cause;
 use protocol::messages::{CommandText, Payload, Point};
 use protocol::{Event, RobotName};
 use radio::outage;
-use scenario::Scenario;
-use scenario::diagnostic::Source;
 use simulator::medium::{ForcedVerdict, Medium, NetworkDecisions, NetworkVerdict, SentCommand};
 use world::Crossed;
+
+use commands::{command, name};
+use media::medium_of;
 
 /// Quantile of the normal distribution for bounds of 99 %.
 const Z_99: f64 = 2.576;
@@ -35,27 +38,7 @@ fn medium_with(rules: &str, radio: &str) -> Medium {
             2 + 2 * index
         );
     }
-    let source = Source {
-        name: "test".into(),
-        text,
-    };
-    let scenario = Scenario::parse(&source, Path::new("."))
-        .unwrap_or_else(|error| panic!("{}", error.in_words()));
-    let roster = scenario.roster();
-    Medium::new(scenario.seed, scenario.tick_s, scenario.network, roster)
-}
-
-fn name(name: &str) -> RobotName {
-    RobotName::new(name).unwrap()
-}
-
-fn command(from: &str, to: &str, seq: u64) -> SentCommand {
-    SentCommand {
-        to: name(to),
-        from: name(from),
-        seq,
-        text: CommandText::named("refill"),
-    }
+    medium_of(&text)
 }
 
 /// A and B apart from each other, and C beside B.

@@ -102,7 +102,7 @@ pub(crate) fn corridor<M: WalkingModel + Clone>(model: &M, chance: &mut RunChanc
     values
 }
 
-/// Single file: a corridor of 24 m that repeats itself, 0.04 m broader than a body, so that nobody walks beside anybody. \[I\] The
+/// Single file: a corridor of 24 m that repeats itself, 0.2 m broader than a body, so that nobody walks beside anybody. \[I\] The
 /// mean speeds at the densities of [`SINGLE_FILE`].
 pub(crate) fn single_file<M: WalkingModel + Clone>(model: &M, chance: &mut RunChance) -> Vec<f64> {
     let breadth_m = 2.0 * model.body_radius_m() + 0.2;
@@ -144,15 +144,7 @@ fn ring<M: WalkingModel + Clone>(
     let way = add_way(&mut crowd, Itinerary::along(Vector::new(1.0, 0.0)));
     let radius_m = model.body_radius_m();
     for place in chance.ring_places(length_m, breadth_m, count, radius_m) {
-        add(
-            &mut crowd,
-            Pedestrian {
-                radius_m,
-                desired_mps: chance.desired_mps(),
-                itinerary: way,
-                ..Pedestrian::at(place)
-            },
-        );
+        add(&mut crowd, chance.person(place, radius_m, way));
     }
 
     crowd.advance(10.0, 1);
@@ -215,11 +207,8 @@ pub(crate) fn reaction<M: WalkingModel + Clone>(model: &M, chance: &mut RunChanc
         add(
             &mut crowd,
             Pedestrian {
-                radius_m,
-                desired_mps: chance.desired_mps(),
-                itinerary: way,
                 starts_s: 10.0 * (index + 1) as f64,
-                ..Pedestrian::at(place)
+                ..chance.person(place, radius_m, way)
             },
         );
         started_s.push(None);
@@ -260,15 +249,7 @@ pub(crate) fn corner<M: WalkingModel + Clone>(model: &M, chance: &mut RunChance)
     let way = add_way(&mut crowd, Itinerary::leaving_by(&[turn, end]));
     let radius_m = model.body_radius_m();
     for place in chance.places(Vector::ZERO, Vector::new(6.0, 2.0), 20, radius_m) {
-        add(
-            &mut crowd,
-            Pedestrian {
-                radius_m,
-                desired_mps: chance.desired_mps(),
-                itinerary: way,
-                ..Pedestrian::at(place)
-            },
-        );
+        add(&mut crowd, chance.person(place, radius_m, way));
     }
 
     let mut beyond = 0;
@@ -371,15 +352,8 @@ fn leave_room<M: WalkingModel + Clone>(model: &M, chance: &mut RunChance, has_fo
     for place in chance.places(Vector::ZERO, size, 1000, radius_m) {
         let is_right = usize::from(place.x > 15.0);
         let is_upper = usize::from(has_four && place.y > 10.0);
-        add(
-            &mut crowd,
-            Pedestrian {
-                radius_m,
-                desired_mps: chance.desired_mps(),
-                itinerary: ways[2 * is_upper + is_right],
-                ..Pedestrian::at(place)
-            },
-        );
+        let way = ways[2 * is_upper + is_right];
+        add(&mut crowd, chance.person(place, radius_m, way));
     }
 
     while !crowd.is_empty() && crowd.now_s() < 3600.0 {
@@ -472,15 +446,7 @@ fn flow_times<M: WalkingModel + Clone>(
     let radius_m = model.body_radius_m();
     let mut reached = Vec::new();
     for place in chance.places(area.0, area.1, count, radius_m) {
-        add(
-            &mut crowd,
-            Pedestrian {
-                radius_m,
-                desired_mps: chance.desired_mps(),
-                itinerary: way,
-                ..Pedestrian::at(place)
-            },
-        );
+        add(&mut crowd, chance.person(place, radius_m, way));
         reached.push(0_usize);
     }
 

@@ -32,9 +32,14 @@ impl RunChance {
         }
     }
 
-    /// A desired speed, m/s.
-    pub(crate) fn desired_mps(&mut self) -> f64 {
-        self.people.normal(DESIRED_MPS, DESIRED_DEVIATION_MPS)
+    /// The next person of the population, at a place, on a way.
+    pub(crate) fn person(&mut self, place: Vector, radius_m: f64, way: u16) -> Pedestrian {
+        Pedestrian {
+            radius_m,
+            desired_mps: self.people.normal(DESIRED_MPS, DESIRED_DEVIATION_MPS),
+            itinerary: way,
+            ..Pedestrian::at(place)
+        }
     }
 
     /// Places in a rectangle, at random on a lattice that has room for everybody.
