@@ -159,7 +159,7 @@ impl Lab {
             .args(args)
             .args(own)
             .args(["--out".as_ref(), self.out().as_os_str()]);
-        command
+        processes::mark(&mut command)
             .stdin(Stdio::null())
             .env_remove("CARS_RUN")
             .env_remove("CARS_CONNECT");

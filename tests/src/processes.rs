@@ -23,7 +23,7 @@ pub struct Running {
 impl Running {
     /// Starts a program.
     pub fn start(mut command: Command, run: &str, folder: PathBuf) -> Self {
-        let mut child = command
+        let mut child = mark(&mut command)
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()
@@ -183,7 +183,29 @@ pub fn nobody_is_left(run: &str) {
     });
 }
 
-/// Processes with the name of a run in their environment or arguments. Each test has its own names of runs.
+/// Variable with the name of the test that has started a process.
+const TEST: &str = "CARS_TEST";
+
+/// Marks what a command starts as of this test: others may have runs of the same name at the same time.
+pub fn mark(command: &mut Command) -> &mut Command {
+    match std::thread::current().name() {
+        Some(test) => command.env(TEST, test),
+        None => command,
+    }
+}
+
+/// Whether another test has started a process.
+fn is_of_other_test(pid: u32) -> bool {
+    // A thread without a name belongs to a test that nobody can tell.
+    let thread = std::thread::current();
+    let Some(test) = thread.name() else {
+        return false;
+    };
+    contains(pid, "environ", &format!("\0{TEST}="))
+        && !contains(pid, "environ", &format!("\0{TEST}={test}\0"))
+}
+
+/// Processes of this test with the name of a run in their environment or arguments.
 #[must_use]
 pub fn find(run: &str) -> Vec<(u32, String)> {
     let mut found = Vec::new();
@@ -192,7 +214,8 @@ pub fn find(run: &str) -> Vec<(u32, String)> {
         let Some(pid) = name.to_str().and_then(|name| name.parse().ok()) else {
             continue;
         };
-        if pid != std::process::id() && is_of_run(pid, run) && is_alive(pid) {
+        let is_found = pid != std::process::id() && is_of_run(pid, run) && !is_of_other_test(pid);
+        if is_found && is_alive(pid) {
             found.push((pid, program(pid)));
         }
     }
