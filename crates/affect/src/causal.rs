@@ -100,8 +100,7 @@ impl fmt::Display for Clause {
 
 impl Clause {
     fn read(text: &str) -> Option<Self> {
-        let (kind, text) = text.split_once(": ")?;
-        let kind = ClauseKind::ALL.into_iter().find(|one| one.name() == kind)?;
+        let (kind, text) = parts(text)?;
 
         Some(Self {
             kind,
@@ -146,6 +145,45 @@ impl Clause {
             text,
         })
     }
+}
+
+/// Kind and words of a clause in its published form.
+fn parts(clause: &str) -> Option<(ClauseKind, &str)> {
+    ClauseKind::ALL.into_iter().find_map(|kind| {
+        let text = clause.strip_prefix(kind.name())?.strip_prefix(": ")?;
+        Some((kind, text))
+    })
+}
+
+/// The words of clauses as one sentence.
+fn sentence<'a>(texts: impl IntoIterator<Item = &'a str>) -> String {
+    let mut texts = texts.into_iter();
+    let mut sentence = String::new();
+
+    if let Some(first) = texts.next() {
+        let mut letters = first.chars();
+        sentence.extend(letters.next().into_iter().flat_map(char::to_uppercase));
+        sentence.push_str(letters.as_str());
+    }
+    for text in texts {
+        sentence.push_str(SEPARATOR);
+        sentence.push_str(text);
+    }
+    if !sentence.is_empty() {
+        sentence.push('.');
+    }
+
+    sentence
+}
+
+/// What a chain in its published form says, as [`CausalChain::spoken`]; empty if it is none.
+pub(crate) fn spoken(published: &str) -> String {
+    // Panels ask in every tick: nothing is copied before it is known to be said.
+    let clauses = || published.split(SEPARATOR).map(parts);
+    if clauses().any(|clause| clause.is_none()) {
+        return String::new();
+    }
+    sentence(clauses().flatten().map(|(_, text)| text))
 }
 
 /// The placeholders in a text, in order, with `None` for an unmatched brace.
@@ -232,16 +270,7 @@ impl CausalChain {
 
     /// The chain as one sentence, for speech output or a panel.
     pub fn spoken(&self) -> String {
-        let texts: Vec<&str> = self.0.iter().map(|clause| clause.text.as_str()).collect();
-        let mut sentence = texts.join(SEPARATOR);
-
-        if let Some(first) = sentence.chars().next() {
-            let capital: String = first.to_uppercase().collect();
-            sentence.replace_range(..first.len_utf8(), &capital);
-            sentence.push('.');
-        }
-
-        sentence
+        sentence(self.0.iter().map(|clause| clause.text.as_str()))
     }
 }
 

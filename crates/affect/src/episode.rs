@@ -1,7 +1,7 @@
 //! Episodes: an emotion from its beginning to its end, and what a robot remembers to appraise it.
 
 use crate::akr::Agency;
-use crate::causal::{CausalChain, Circumstances};
+use crate::causal::{self, Circumstances};
 use crate::schema::Schemata;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
@@ -22,7 +22,7 @@ pub struct EpisodeCause {
 impl EpisodeCause {
     /// The causal chain as a sentence; empty without one.
     pub fn spoken(&self) -> String {
-        CausalChain::read(&self.causal_chain).map_or_else(String::new, |chain| chain.spoken())
+        causal::spoken(&self.causal_chain)
     }
 }
 
