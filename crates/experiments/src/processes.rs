@@ -1,6 +1,7 @@
 //! Files of a run whose robots are processes: the launch file that it is played by, and its record.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use config::FileError;
 use observe::{Observation, SiteStates};
@@ -116,7 +117,7 @@ pub(super) fn read(
     let mut sites = SiteStates::new(&scenario.setting());
     while let Some(tick) = ticks.next_tick()? {
         let number = tick.tick();
-        let mut events = tick.events;
+        let mut events = Arc::unwrap_or_clone(tick.events);
         // The end of the run is observed by itself, as it is where robots run in this process.
         let end = events.pop_if(|event| matches!(event, Event::End { .. }));
         states.note(number, tick.reports, tick.frame.robots);

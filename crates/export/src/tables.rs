@@ -240,7 +240,7 @@ fn add_states(
     tick: &RecordedTick,
 ) -> Result<(), ExportError> {
     for robot in &tick.frame.robots {
-        let report = tick.reports.get(&robot.name);
+        let report = tick.reports.get(&robot.name).map(AsRef::as_ref);
         let cells = state_cells(robot, report);
         states.add(when.iter().cloned().chain(cells))?;
 

@@ -1,6 +1,7 @@
 //! What the robots of a recorded run have reported last, and the layers, which follow from what they did.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use observe::RobotState;
 use protocol::messages::{Point, Report};
@@ -11,7 +12,7 @@ use simulator::layers::Layers;
 
 /// What robots reported last, where they stand, and the layers.
 pub struct LastStates {
-    reports: BTreeMap<RobotName, Report>,
+    reports: BTreeMap<RobotName, Arc<Report>>,
     locations: BTreeMap<RobotName, Point>,
     layers: Layers,
 }
@@ -30,7 +31,7 @@ impl LastStates {
     pub fn note(
         &mut self,
         tick: Tick,
-        reports: BTreeMap<RobotName, Report>,
+        reports: BTreeMap<RobotName, Arc<Report>>,
         robots: Vec<PlacedRobot>,
     ) {
         for robot in robots {

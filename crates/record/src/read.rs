@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use lockstep::{Attendance, Sent};
 use protocol::messages::{CommandText, Payload, Report, Target};
@@ -261,16 +262,19 @@ impl Record {
             )));
         }
         let tick = recorded.next_tick().map_err(|error| unreadable(&error))?;
-        let Some(mut tick) = tick else {
+        let Some(tick) = tick else {
             return Ok(());
         };
 
         // The recording has the events of the end with those of the last tick, the file of events has
         // them after it.
-        let own = entry.events.len().min(tick.events.len());
-        self.events_after = Some(tick.events.split_off(own));
-        entry.recorded_events = Some(tick.events);
-        entry.reports = Some(tick.reports);
+        let mut events = Arc::unwrap_or_clone(tick.events);
+        let own = entry.events.len().min(events.len());
+        self.events_after = Some(events.split_off(own));
+        entry.recorded_events = Some(events);
+        let reports = tick.reports.into_iter();
+        let reports = reports.map(|(robot, report)| (robot, Arc::unwrap_or_clone(report)));
+        entry.reports = Some(reports.collect());
         entry.frame = Some(tick.frame);
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! What a recording contains.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use protocol::messages::{Awaited, LogRecord, Panel, Report};
 pub use protocol::recorded::{Frame, Header, Missed, PlacedRobot, WallTimes};
@@ -23,41 +24,19 @@ pub(crate) fn metadata(header: &Header) -> BTreeMap<String, String> {
     metadata
 }
 
-/// Everything that is recorded of one tick.
-#[derive(Debug, Clone, PartialEq)]
+/// Everything that is recorded of one tick. Events and reports are shared with the simulation that they came from.
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct RecordedTick {
     /// The field after the tick.
     pub frame: Frame,
     /// The events of the tick, in the order of `events.jsonl`, without seals. The last tick of a run also has its end.
-    pub events: Vec<Event>,
+    pub events: Arc<Vec<Event>>,
     /// The reports for this tick, whole; a robot that missed the tick has none.
-    pub reports: BTreeMap<RobotName, Report>,
+    pub reports: BTreeMap<RobotName, Arc<Report>>,
     /// The newest panel of each robot from which one arrived during the tick. Not reproducible.
     pub panels: BTreeMap<RobotName, Panel>,
     /// Wall-clock times. Not reproducible.
     pub wall: WallTimes,
-}
-
-/// Everything that is recorded of one tick, of which nothing is copied: a [`RecordedTick`].
-#[derive(Debug, Clone)]
-pub struct TickView<'a> {
-    /// The field after the tick.
-    pub frame: &'a Frame,
-    /// The events of the tick, without seals.
-    pub events: &'a [Event],
-    /// The reports for this tick.
-    pub reports: BTreeMap<&'a RobotName, &'a Report>,
-    /// The newest panels.
-    pub panels: &'a BTreeMap<RobotName, Panel>,
-    /// Wall-clock times.
-    pub wall: &'a WallTimes,
-}
-
-impl TickView<'_> {
-    /// The lines of the log about this tick, which are made from its events.
-    pub(crate) fn log(&self, header: &Header) -> Vec<LogRecord> {
-        log(self.frame.tick, self.events, self.wall, header)
-    }
 }
 
 impl RecordedTick {
@@ -65,18 +44,6 @@ impl RecordedTick {
     #[must_use]
     pub fn tick(&self) -> Tick {
         self.frame.tick
-    }
-
-    /// The tick as it is recorded.
-    #[must_use]
-    pub fn view(&self) -> TickView<'_> {
-        TickView {
-            frame: &self.frame,
-            events: &self.events,
-            reports: self.reports.iter().collect(),
-            panels: &self.panels,
-            wall: &self.wall,
-        }
     }
 
     /// The lines of the log about this tick, which are made from its events.
@@ -126,7 +93,7 @@ impl RawTick {
     pub(crate) fn decode(self) -> Result<RecordedTick, serde_json::Error> {
         let mut reports = BTreeMap::new();
         for (robot, report) in self.reports {
-            reports.insert(robot, Report::from_json(&report.0)?);
+            reports.insert(robot, Arc::new(Report::from_json(&report.0)?));
         }
         let mut panels = BTreeMap::new();
         for (robot, panel) in self.panels {
@@ -135,7 +102,7 @@ impl RawTick {
 
         Ok(RecordedTick {
             frame: self.frame,
-            events: self.events,
+            events: Arc::new(self.events),
             reports,
             panels,
             wall: self.wall,

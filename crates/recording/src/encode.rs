@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use protocol::{Event, RobotName, Tick, schemas};
 use serde::Serialize;
 
-use crate::content::{Header, TickView};
+use crate::content::{Header, RecordedTick};
 use crate::file::{Channels, Chunk, MessageHead};
 use crate::json;
 use crate::protobuf::Protobuf;
@@ -129,26 +129,26 @@ impl Encoder {
     }
 
     /// Adds a tick to a chunk.
-    pub(crate) fn add_tick(&self, tick: &TickView<'_>, chunk: &mut Chunk) {
+    pub(crate) fn add_tick(&self, tick: &RecordedTick, chunk: &mut Chunk) {
         let number = tick.frame.tick;
-        self.add(chunk, self.ids.frame, number, tick.frame);
-        for event in tick.events {
+        self.add(chunk, self.ids.frame, number, &tick.frame);
+        for event in tick.events.iter() {
             self.add_event(number, event, chunk);
         }
 
         // A robot outside the scenario cannot report.
         for (robot, report) in &tick.reports {
-            if let Some(ids) = self.robots.get(*robot) {
-                self.add(chunk, ids.report, number, report);
+            if let Some(ids) = self.robots.get(robot) {
+                self.add(chunk, ids.report, number, report.as_ref());
             }
         }
-        for (robot, panel) in tick.panels {
+        for (robot, panel) in &tick.panels {
             if let Some(ids) = self.robots.get(robot) {
                 self.add(chunk, ids.panel, number, panel);
             }
         }
 
-        self.add(chunk, self.ids.wall, number, tick.wall);
+        self.add(chunk, self.ids.wall, number, &tick.wall);
         self.add_views(tick, chunk);
     }
 
@@ -158,7 +158,7 @@ impl Encoder {
     }
 
     /// Adds what viewers draw, limited in its rate.
-    fn add_views(&self, tick: &TickView<'_>, chunk: &mut Chunk) {
+    fn add_views(&self, tick: &RecordedTick, chunk: &mut Chunk) {
         let number = tick.frame.tick;
         let time_ns = self.header.time_ns(number);
         for line in tick.log(&self.header) {

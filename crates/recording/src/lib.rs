@@ -21,9 +21,7 @@ mod topic;
 mod viewers;
 mod write;
 
-pub use content::{
-    Frame, Header, Json, PlacedRobot, RawTick, RecordedTick, TickEvents, TickView, WallTimes,
-};
+pub use content::{Frame, Header, Json, PlacedRobot, RawTick, RecordedTick, TickEvents, WallTimes};
 pub use damage::RecordingError;
 pub use decisions::{ANSWERS, RunDecisions};
 pub use read::Recording;

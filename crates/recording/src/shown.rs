@@ -1,6 +1,7 @@
 //! What observers see of a recorded tick, as in a run in progress: frames have the last report of each robot.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use protocol::RobotName;
 use protocol::messages::{Presence, Report, RobotFrame};
@@ -12,7 +13,7 @@ use crate::read::Recording;
 /// The last report of each robot, as far as ticks have been read.
 #[derive(Debug, Default)]
 pub struct LastReports {
-    reports: BTreeMap<RobotName, Report>,
+    reports: BTreeMap<RobotName, Arc<Report>>,
 }
 
 impl LastReports {
@@ -57,7 +58,7 @@ impl LastReports {
         if let Some(report) = newer {
             self.reports.insert(name.clone(), report);
         }
-        Ok(self.reports.get(name))
+        Ok(self.reports.get(name).map(Arc::as_ref))
     }
 }
 

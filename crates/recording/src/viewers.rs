@@ -4,7 +4,7 @@
 use protocol::RobotName;
 use protocol::messages::{BodyShape, LogRecord};
 
-use crate::content::{Header, PlacedRobot, TickView};
+use crate::content::{Header, PlacedRobot, RecordedTick};
 use crate::protobuf::Protobuf;
 
 /// Frame of reference of everything: the origin is the corner of the field, x and y are its edges, in meters.
@@ -112,7 +112,7 @@ fn body(
 }
 
 /// The robots, each with its name, its emotion and its behavior.
-pub(crate) fn robots(to: &mut Protobuf<'_>, header: &Header, tick: &TickView<'_>, time_ns: u64) {
+pub(crate) fn robots(to: &mut Protobuf<'_>, header: &Header, tick: &RecordedTick, time_ns: u64) {
     for (index, robot) in tick.frame.robots.iter().enumerate() {
         let at = robot.location;
         let direction_rad = direction_rad(tick, robot);
@@ -135,7 +135,7 @@ pub(crate) fn robots(to: &mut Protobuf<'_>, header: &Header, tick: &TickView<'_>
     }
 }
 
-fn label(tick: &TickView<'_>, robot: &RobotName) -> String {
+fn label(tick: &RecordedTick, robot: &RobotName) -> String {
     match tick.reports.get(robot) {
         Some(report) => format!(
             "{robot}\n{}\n{}",
@@ -170,7 +170,7 @@ pub(crate) fn guests(to: &mut Protobuf<'_>, guests_mm: &[i64], time_ns: u64) {
 /// The pose of a robot.
 pub(crate) fn robot_pose(
     to: &mut Protobuf<'_>,
-    tick: &TickView<'_>,
+    tick: &RecordedTick,
     robot: &PlacedRobot,
     time_ns: u64,
 ) {
@@ -183,7 +183,7 @@ pub(crate) fn robot_pose(
 }
 
 /// The frame of reference of each robot, which has its name.
-pub(crate) fn transforms(to: &mut Protobuf<'_>, tick: &TickView<'_>, time_ns: u64) {
+pub(crate) fn transforms(to: &mut Protobuf<'_>, tick: &RecordedTick, time_ns: u64) {
     for robot in &tick.frame.robots {
         let at = robot.location;
         to.message(1, |to| {
@@ -221,7 +221,7 @@ const ROBOT_COLORS: [[f64; 3]; 4] = [
 ];
 
 /// The heading of a robot, or the direction of one that does not drive; that of x for one without a report.
-fn direction_rad(tick: &TickView<'_>, robot: &PlacedRobot) -> f64 {
+fn direction_rad(tick: &RecordedTick, robot: &PlacedRobot) -> f64 {
     let report = tick.reports.get(&robot.name);
     let reported = report.map_or(0.0, |report| report.direction_rad);
     robot.heading_rad.unwrap_or(reported)

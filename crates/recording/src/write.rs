@@ -1,6 +1,5 @@
-//! Writes a recording: ticks are encoded where they are handed over, and compressed and written by a thread of its own.
+//! Writes a recording: ticks are handed over whole, and encoded, compressed and written by a thread of its own.
 
-use std::collections::VecDeque;
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -10,17 +9,21 @@ use std::time::{Duration, Instant};
 
 use protocol::{Event, Tick};
 
-use crate::content::{Header, TickView, metadata};
+use crate::content::{Header, RecordedTick, metadata};
 use crate::encode::Encoder;
 use crate::file::{Chunk, McapFile};
 use crate::{METADATA, SCENARIO};
 
 /// A chunk ends with the tick in which it gets this large, bytes before compression. A reader that seeks reads whole chunks.
 const CHUNK_BYTES: usize = 256 << 10;
-/// A chunk ends with the first tick that is complete this long after the chunk began: what a crash can lose of a slow run.
+/// What was handed over is in the file at most this long after: what a crash can lose.
 const CHUNK_INTERVAL: Duration = Duration::from_secs(1);
-/// Chunks that may wait to be written. The run waits when there are more.
-const QUEUE: usize = 16;
+/// Ticks that may wait to be encoded. The run waits when there are more.
+const QUEUE: usize = 64;
+/// Ticks that are encoded together: to wake the other thread for each one would take longer than to encode it.
+const BATCH: usize = 16;
+/// Coordinates of guests that may wait, so that large crowds take no more memory than this and one tick.
+const QUEUE_COORDINATES: usize = 1 << 20;
 
 /// A recording cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -36,7 +39,6 @@ pub struct WriteError {
 /// by [`Writer::finish`]. A writer that is dropped finishes its file, without reporting errors.
 pub struct Writer {
     path: PathBuf,
-    encoder: Encoder,
     queue: Arc<WriteQueue>,
     thread: Option<JoinHandle<io::Result<()>>>,
 }
@@ -53,10 +55,9 @@ struct WriteQueue {
 
 #[derive(Default)]
 struct WriterState {
-    /// Chunks in their order. The last one gets further ticks if it is open.
-    chunks: VecDeque<OpenChunk>,
-    /// Chunks that have been written, for their memory.
-    spare: Vec<Chunk>,
+    pending: Batch,
+    /// Ticks that have been encoded, for their memory.
+    spare: Vec<RecordedTick>,
     /// Everything so far is to be on the disk.
     wants_sync: bool,
     /// Nothing more is to come.
@@ -65,16 +66,26 @@ struct WriterState {
     is_over: bool,
 }
 
-/// A chunk that gets ticks until it is full.
-struct OpenChunk {
-    chunk: Chunk,
-    begun: Instant,
-    is_full: bool,
+/// What is encoded together.
+#[derive(Default)]
+struct Batch {
+    /// In their order.
+    ticks: Vec<RecordedTick>,
+    /// Coordinates of guests in these ticks.
+    coordinates: usize,
+    /// Events of the end of the run, which follow its last tick.
+    end: Vec<(Tick, Event)>,
+    /// When the first of these was handed over.
+    begun: Option<Instant>,
 }
 
-/// What the thread that writes does next.
+/// What the thread that writes does when it has encoded a batch.
+#[derive(Clone, Copy, PartialEq)]
 enum WriterTask {
-    Write(Chunk),
+    /// Writes chunks that are full.
+    Encode,
+    /// Writes what there is.
+    Write,
     Sync,
     Finish,
 }
@@ -94,24 +105,29 @@ impl Writer {
 
         let queue = Arc::new(WriteQueue::default());
         let tasks = queue.clone();
-        let thread = Builder::new().spawn(move || write(file, &tasks));
+        let thread = Builder::new().spawn(move || write(file, &encoder, &tasks));
         Ok(Self {
             path: path.to_owned(),
-            encoder,
             queue,
             thread: Some(thread.map_err(failed)?),
         })
     }
 
-    /// Records a tick. Ticks come in their order, from tick 0 on. Waits while too many chunks wait to be written.
+    /// A tick to fill and record. It has the content, and the memory, of one that was recorded.
+    #[must_use]
+    pub fn spare(&self) -> RecordedTick {
+        self.queue.lock().spare.pop().unwrap_or_default()
+    }
+
+    /// Records a tick. Ticks come in their order, from tick 0 on. Waits while too many wait to be encoded.
     ///
     /// # Errors
     /// [`WriteError`] if what was recorded before cannot be written.
-    pub fn tick(&mut self, tick: &TickView<'_>) -> Result<(), WriteError> {
+    pub fn tick(&mut self, tick: RecordedTick) -> Result<(), WriteError> {
         let mut state = self.queue.lock();
-        // The only wait of a run for its recording. It ends when a chunk has been written, or the
-        // thread that writes has ended.
-        while state.chunks.len() > QUEUE && !state.is_over {
+        // The only wait of a run for its recording. It ends when a batch has been taken, or the thread
+        // that writes has ended.
+        while state.pending.is_full() && !state.is_over {
             state = wait(&self.queue.done, state);
         }
         if state.is_over {
@@ -120,11 +136,9 @@ impl Writer {
             return self.join();
         }
 
-        // Encoded under the lock, so that the other thread takes whole ticks only.
-        let open = state.open_chunk();
-        self.encoder.add_tick(tick, &mut open.chunk);
-        if open.is_due() {
-            open.is_full = true;
+        let was_due = state.pending.is_due();
+        state.pending.add(tick);
+        if state.pending.is_due() && !was_due {
             self.queue.due.notify_one();
         }
         Ok(())
@@ -134,14 +148,13 @@ impl Writer {
     ///
     /// # Errors
     /// [`WriteError`] if what was recorded before cannot be written.
-    pub fn end(&mut self, last: Tick, event: &Event) -> Result<(), WriteError> {
+    pub fn end(&mut self, last: Tick, event: Event) -> Result<(), WriteError> {
         let mut state = self.queue.lock();
         if state.is_over {
             drop(state);
             return self.join();
         }
-        self.encoder
-            .add_event(last, event, &mut state.open_chunk().chunk);
+        state.pending.end.push((last, event));
         Ok(())
     }
 
@@ -151,7 +164,7 @@ impl Writer {
     /// [`WriteError`] if it cannot be written.
     pub fn sync(&mut self) -> Result<(), WriteError> {
         let mut state = self.queue.lock();
-        // The other thread writes every chunk first, the open one included, and then synchronizes.
+        // The other thread writes all that was handed over first, and then synchronizes.
         state.wants_sync = true;
         self.queue.due.notify_one();
         while state.wants_sync && !state.is_over {
@@ -176,8 +189,8 @@ impl Writer {
         self.queue.lock().is_ended = true;
         self.queue.due.notify_one();
 
-        // It writes all chunks before it finds that nothing more is to come. For a second call there is
-        // no thread any more.
+        // It writes all that was handed over before it ends. For a second call there is no thread any
+        // more.
         let ended = match self.thread.take().map(JoinHandle::join) {
             None => Ok(()),
             Some(Ok(written)) => written,
@@ -205,25 +218,31 @@ impl WriteQueue {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits for something to do.
-    fn next(&self) -> WriterTask {
+    /// Waits for something to do, and puts what is to be encoded in the place of `batch`, which is empty. `begun` is when the first
+    /// tick of the open chunk was handed over.
+    fn next(&self, batch: &mut Batch, begun: Option<Instant>) -> WriterTask {
         let mut state = self.lock();
         loop {
-            // Chunks come before a synchronization, and that before the end: so both are about all that
-            // was recorded.
-            if let Some(chunk) = state.next_chunk() {
-                return WriterTask::Write(chunk);
-            }
-            if state.wants_sync {
-                return WriterTask::Sync;
-            }
-            if state.is_ended {
-                return WriterTask::Finish;
-            }
+            // Also without a word: what there is of a slow run, or of one that is held, is written after a
+            // while.
+            let age = begun.or(state.pending.begun).map(|begun| begun.elapsed());
+            let age = age.unwrap_or_default();
+            // A synchronization comes before the end, and both are about all that was handed over.
+            let task = if state.wants_sync {
+                WriterTask::Sync
+            } else if state.is_ended {
+                WriterTask::Finish
+            } else if age >= CHUNK_INTERVAL {
+                WriterTask::Write
+            } else {
+                WriterTask::Encode
+            };
 
-            // Also without a word: a chunk of a slow run, or of one that is held, becomes due with time.
-            let first = state.chunks.front();
-            let age = first.map_or(Duration::ZERO, |first| first.begun.elapsed());
+            if task != WriterTask::Encode || state.pending.is_due() {
+                std::mem::swap(&mut state.pending, batch);
+                self.done.notify_one();
+                return task;
+            }
             let rest = CHUNK_INTERVAL.saturating_sub(age);
             let waited = self.due.wait_timeout(state, rest);
             state = waited.unwrap_or_else(PoisonError::into_inner).0;
@@ -231,61 +250,66 @@ impl WriteQueue {
     }
 }
 
-impl WriterState {
-    /// The chunk that gets the next tick.
-    fn open_chunk(&mut self) -> &mut OpenChunk {
-        // Also after the other thread has taken the open chunk.
-        if self.chunks.back().is_none_or(|last| last.is_full) {
-            let chunk = self.spare.pop().unwrap_or_default();
-            self.chunks.push_back(OpenChunk {
-                chunk,
-                begun: Instant::now(),
-                is_full: false,
-            });
-        }
-        let last = self.chunks.len() - 1;
-        &mut self.chunks[last]
+impl Batch {
+    fn add(&mut self, tick: RecordedTick) {
+        self.begun.get_or_insert_with(Instant::now);
+        self.coordinates += tick.frame.guests_mm.len();
+        self.ticks.push(tick);
     }
 
-    /// The next chunk, if it is to be written. In a run that is slow, or held, what there is is kept.
-    fn next_chunk(&mut self) -> Option<Chunk> {
-        let is_due = self.wants_sync || self.is_ended;
-        let first = self.chunks.front()?;
-        if !is_due && !first.is_full && !first.is_due() {
-            return None;
-        }
-        self.chunks.pop_front().map(|first| first.chunk)
-    }
-}
-
-impl OpenChunk {
-    /// Whether it is large enough, or old enough.
+    /// Whether it is worth to wake the thread that writes.
     fn is_due(&self) -> bool {
-        self.chunk.len() >= CHUNK_BYTES || self.begun.elapsed() >= CHUNK_INTERVAL
+        self.ticks.len() >= BATCH || self.coordinates >= QUEUE_COORDINATES
+    }
+
+    fn is_full(&self) -> bool {
+        self.ticks.len() >= QUEUE || self.coordinates >= QUEUE_COORDINATES
     }
 }
 
 /// Writes until there is nothing more to come.
-fn write(mut file: McapFile, queue: &WriteQueue) -> io::Result<()> {
+fn write(mut file: McapFile, encoder: &Encoder, queue: &WriteQueue) -> io::Result<()> {
     // Dropped last, also after an error or a panic: callers that wait get to know.
     let _over = Over(queue);
+    let mut batch = Batch::default();
+    let mut chunk = Chunk::default();
+    let mut begun = None;
 
     loop {
-        match queue.next() {
-            WriterTask::Write(mut chunk) => {
+        let task = queue.next(&mut batch, begun);
+        begun = begun.or(batch.begun.take());
+
+        for tick in &batch.ticks {
+            encoder.add_tick(tick, &mut chunk);
+            if chunk.len() >= CHUNK_BYTES {
                 file.add_chunk(&chunk)?;
-                // Its memory goes round: at full speed nothing is allocated for a tick.
                 chunk.clear();
-                queue.lock().spare.push(chunk);
+                begun = Some(Instant::now());
             }
+        }
+        for (last, event) in batch.end.drain(..) {
+            encoder.add_event(last, &event, &mut chunk);
+        }
+        // Their memory goes round, and all that they hold is freed by the thread that made it.
+        batch.coordinates = 0;
+        queue.lock().spare.append(&mut batch.ticks);
+
+        if task != WriterTask::Encode {
+            if chunk.len() > 0 {
+                file.add_chunk(&chunk)?;
+                chunk.clear();
+            }
+            begun = None;
+        }
+        match task {
+            WriterTask::Encode | WriterTask::Write => {}
             WriterTask::Sync => {
                 file.sync()?;
                 queue.lock().wants_sync = false;
+                queue.done.notify_one();
             }
             WriterTask::Finish => return file.finish(),
         }
-
-        queue.done.notify_one();
     }
 }
 

@@ -8,6 +8,7 @@
 use std::collections::BTreeMap;
 use std::num::NonZero;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use protocol::messages::{
     Awaited, Cut, DisplayUnit, End, GuestMood, LogKind, LogRecord, Panel, Performative, Point,
@@ -77,15 +78,18 @@ fn report(tick: Tick) -> Report {
 /// A tick; Leguin misses every tenth one.
 fn tick(tick: Tick) -> RecordedTick {
     let is_missed = tick % 10 == 9;
-    let mut reports = BTreeMap::from([(name("Butler"), report(tick))]);
+    let mut reports = BTreeMap::from([(name("Butler"), report(tick).into())]);
     if !is_missed {
-        reports.insert(name("Leguin"), report(tick));
+        reports.insert(name("Leguin"), report(tick).into());
     }
     let mut panels = BTreeMap::new();
     if tick == 5 || tick == 1234 {
         let label = format!("panel {tick}");
         let text = String::new();
-        let widgets = vec![Widget::Text { label, text }];
+        let widgets = vec![Widget::Text {
+            label: label.into(),
+            text: text.into(),
+        }];
         panels.insert(name("Leguin"), Panel { widgets });
     }
 
@@ -146,7 +150,8 @@ fn tick(tick: Tick) -> RecordedTick {
                 digest: format!("{tick:032x}"),
                 seal: None,
             },
-        ],
+        ]
+        .into(),
         reports,
         panels,
         wall: WallTimes {
@@ -185,7 +190,7 @@ fn end() -> Event {
 fn expected(number: Tick, ticks: Tick) -> RecordedTick {
     let mut expected = tick(number);
     if number + 1 == ticks {
-        expected.events.push(end());
+        Arc::make_mut(&mut expected.events).push(end());
     }
     expected
 }
@@ -194,9 +199,9 @@ fn write(folder: &Path, ticks: Tick) -> PathBuf {
     let path = folder.join("run.mcap");
     let mut writer = Writer::create(&path, &header(), SCENARIO).unwrap();
     for number in 0..ticks {
-        writer.tick(&tick(number).view()).unwrap();
+        writer.tick(tick(number)).unwrap();
     }
-    writer.end(ticks - 1, &end()).unwrap();
+    writer.end(ticks - 1, end()).unwrap();
     writer.finish().unwrap();
     path
 }

@@ -6,14 +6,13 @@ use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
 use std::io::{BufRead, BufReader, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use protocol::event::log_line;
-use protocol::messages::{Awaited, LogRecord, Panel, Report};
+use protocol::messages::{Awaited, LogRecord, Panel};
 use protocol::{Line, PROTOCOL_VERSION, RobotName, RunName, Tick};
 use recording::content::Missed;
-use recording::{Frame, Header, PlacedRobot, TickView, WallTimes, WriteError, Writer};
+use recording::{Frame, Header, PlacedRobot, RecordedTick, WallTimes, WriteError, Writer};
 
 use crate::simulation::{Simulation, TickRecord};
 use crate::static_world::static_world;
@@ -138,13 +137,12 @@ impl Observed {
     }
 }
 
-/// A tick that was noted and is not written: all that writing it needs beside the frame.
+/// A tick that was noted and is not written: all that writing it needs.
 struct PendingTick {
     record: TickRecord,
     lines: Vec<LogRecord>,
-    reports: Vec<(RobotName, Arc<Report>)>,
-    panels: BTreeMap<RobotName, Panel>,
-    wall: WallTimes,
+    /// `None` if the recording is to have no tick: for the end of the run, or without a recording.
+    recorded: Option<RecordedTick>,
 }
 
 /// Writes the record of one epoch.
@@ -155,8 +153,6 @@ pub struct Recorder {
     seal: Seal,
     log: Option<LineFile>,
     recording: Option<Writer>,
-    /// The field after the tick that was noted last. Its memory is used again.
-    frame: Frame,
     /// What was noted and is not written.
     noted: Option<PendingTick>,
     begun: Instant,
@@ -262,7 +258,6 @@ impl Recorder {
             log,
             observed: recording.is_some().then(Observed::default),
             recording,
-            frame: Frame::default(),
             noted: None,
             begun: Instant::now(),
             sync: record.sync,
@@ -319,7 +314,6 @@ impl Recorder {
         simulation: &Simulation,
         record: &TickRecord,
     ) -> Result<Vec<LogRecord>, RecordError> {
-        // The tick before first: the memory of its frame is used again below.
         self.write_noted()?;
 
         let mut lines = Vec::new();
@@ -331,18 +325,24 @@ impl Recorder {
         let observed = self.observed.as_mut();
         let taken = observed.map(|observed| observed.take(record.tick, self.begun));
         let (wall, panels) = taken.unwrap_or_default();
-        let mut reports = Vec::new();
-        if self.recording.is_some() && !record.is_end() {
-            set_frame(&mut self.frame, simulation, record);
-            reports = simulation.reports_of(record.tick, |_| true);
-        }
+        let recording = self.recording.as_ref().filter(|_| !record.is_end());
+        let recorded = recording.map(|recording| {
+            let mut tick = recording.spare();
+            set_frame(&mut tick.frame, simulation, record);
+            tick.events = record.events.clone();
+            tick.reports = simulation
+                .reports_of(record.tick, |_| true)
+                .into_iter()
+                .collect();
+            tick.panels = panels;
+            tick.wall = wall;
+            tick
+        });
 
         self.noted = Some(PendingTick {
             record: record.clone(),
             lines: lines.clone(),
-            reports,
-            panels,
-            wall,
+            recorded,
         });
         // Such a tick is on the disk before the next one begins.
         if matches!(self.sync, SyncPoint::Tick) {
@@ -384,33 +384,14 @@ impl Recorder {
         }
         self.write_log(&noted.lines)?;
 
-        if self.recording.is_some() {
-            self.record_tick(&noted)?;
+        if let (Some(recording), Some(tick)) = (&mut self.recording, noted.recorded) {
+            recording.tick(tick).map_err(|error| unrecordable(&error))?;
         }
 
         if is_end || self.is_sync_due() {
             self.sync()?;
         }
         Ok(())
-    }
-
-    fn record_tick(&mut self, noted: &PendingTick) -> Result<(), RecordError> {
-        let Some(recording) = &mut self.recording else {
-            return Ok(());
-        };
-
-        let mut reports = BTreeMap::new();
-        for (robot, report) in &noted.reports {
-            reports.insert(robot, report.as_ref());
-        }
-        let tick = TickView {
-            frame: &self.frame,
-            events: &noted.record.events,
-            reports,
-            panels: &noted.panels,
-            wall: &noted.wall,
-        };
-        recording.tick(&tick).map_err(|error| unrecordable(&error))
     }
 
     fn add_event(&mut self, line: &Line) -> Result<(), RecordError> {
@@ -531,7 +512,7 @@ fn copy_log_of_earlier_epochs(
 /// Ends a recording with the events of the end of the run.
 fn finish(mut recording: Writer, end: &TickRecord) -> Result<(), WriteError> {
     for event in end.events.iter() {
-        recording.end(end.tick, event)?;
+        recording.end(end.tick, event.clone())?;
     }
     recording.finish()
 }

@@ -250,7 +250,7 @@ fn check_epoch(lab: &Lab, run: &str, suffix: &str, epoch: Epoch, seed: u64) {
     let mut last_report = None;
     for (number, tick) in (0..).zip(&ticks) {
         assert_eq!(tick.tick(), number);
-        for event in &tick.events {
+        for event in tick.events.iter() {
             if let Event::Joined {
                 robot,
                 generation: Some(joined),

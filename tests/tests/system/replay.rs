@@ -411,7 +411,7 @@ fn a_replay_is_paused_stepped_and_sought_in_both_directions() {
     let state: PublicState = serde_json::from_str(&state).unwrap();
     assert_eq!(
         (state.tick, state.state_variables),
-        (19, before.state_variables)
+        (19, before.state_variables.clone())
     );
 
     // It plays to the last tick and stays there.

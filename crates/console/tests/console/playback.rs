@@ -4,6 +4,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use protocol::messages::{
     Awaited, Cut, DisplayUnit, FaultKind, LayerFrame, Panel, Performative, Point, Reason, Report,
@@ -96,8 +97,8 @@ fn recorded_tick(tick: u64) -> RecordedTick {
             guests_mm: vec![-1, tick as i64],
             ..Frame::default()
         },
-        events: events(tick),
-        reports: [(robot("Butler"), report(tick))].into(),
+        events: events(tick).into(),
+        reports: [(robot("Butler"), report(tick).into())].into(),
         panels: BTreeMap::new(),
         wall: WallTimes::default(),
     }
@@ -106,7 +107,7 @@ fn recorded_tick(tick: u64) -> RecordedTick {
 fn write(file: &Path, ticks: impl IntoIterator<Item = RecordedTick>) {
     let mut writer = Writer::create(file, &header(), "").unwrap();
     for tick in ticks {
-        writer.tick(&tick.view()).unwrap();
+        writer.tick(tick).unwrap();
     }
     writer.finish().unwrap();
 }
@@ -173,7 +174,7 @@ fn a_tick_has_the_layers_that_are_not_as_at_the_start() {
         if tick >= 2 {
             recorded.frame.layers = vec![layer(9.0 - tick as f64)];
         }
-        writer.tick(&recorded.view()).unwrap();
+        writer.tick(recorded).unwrap();
     }
     writer.finish().unwrap();
 
@@ -239,14 +240,14 @@ fn a_range_has_the_commands_and_faults_of_before_that_its_ticks_show() {
     let recorded = (0..60).map(|tick| {
         let mut recorded = recorded_tick(tick);
         if tick == 12 || tick == 24 {
-            recorded.events.push(Event::CommandDelivered {
+            Arc::make_mut(&mut recorded.events).push(Event::CommandDelivered {
                 from: robot("Butler"),
                 to: robot("Leguin"),
                 seq: tick / 10,
             });
         }
         if tick == 15 || tick == 30 {
-            recorded.events.push(Event::Fault {
+            Arc::make_mut(&mut recorded.events).push(Event::Fault {
                 robot: robot("Leguin"),
                 kind: FaultKind::Hang,
                 begins: tick == 15,
@@ -406,7 +407,7 @@ fn a_robot_that_misses_ticks_is_shown_with_its_last_report() {
         }
         if tick == 700 {
             let robot = robot("Butler");
-            recorded.events.push(Event::Lost { robot });
+            Arc::make_mut(&mut recorded.events).push(Event::Lost { robot });
         }
         recorded
     });
@@ -432,8 +433,8 @@ fn a_robot_that_misses_ticks_is_shown_with_its_last_report() {
 fn cuts_panels_and_who_held_the_clock_up_are_shown() {
     let panel = |text: &str| Panel {
         widgets: vec![Widget::Text {
-            label: "why".to_owned(),
-            text: text.to_owned(),
+            label: "why".into(),
+            text: text.into(),
         }],
     };
     let cut = Cut {
@@ -609,7 +610,7 @@ fn begin(folder: &Path, epoch: u32) -> Writer {
 /// Records ticks and waits until they can be read.
 fn go_on(writer: &mut Writer, ticks: std::ops::Range<u64>) {
     for tick in ticks {
-        writer.tick(&recorded_tick(tick).view()).unwrap();
+        writer.tick(recorded_tick(tick)).unwrap();
     }
     writer.sync().unwrap();
 }
@@ -727,7 +728,7 @@ fn samples_have_every_change_of_state_and_the_whole_log() {
     let ticks_with_changes = (0..9000).map(|tick| {
         let mut recorded = recorded_tick(tick);
         if tick == 1234 {
-            recorded.events.push(Event::Emotion {
+            Arc::make_mut(&mut recorded.events).push(Event::Emotion {
                 robot: robot("Butler"),
                 from: Some("HAPPY".to_owned()),
                 to: "ANGRY".to_owned(),
@@ -762,7 +763,7 @@ fn explained_run() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let ticks = (0..21).map(|tick| {
         let mut recorded = recorded_tick(tick);
-        recorded.events.push(Event::Tick {
+        Arc::make_mut(&mut recorded.events).push(Event::Tick {
             digest: format!("digest {tick}"),
             seal: None,
         });
