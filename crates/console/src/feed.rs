@@ -510,7 +510,7 @@ mod tests {
     /// A panel of a tick, which has a picture of this size.
     fn panel(tick: Tick, bytes: usize) -> TickPanel {
         let picture = Widget::Svg {
-            label: String::new(),
+            label: String::new().into(),
             svg: "x".repeat(bytes),
         };
         TickPanel {

@@ -76,7 +76,7 @@ impl Robot for Vera {
     fn panel(&self) -> Panel {
         let widgets = vec![Widget::Text {
             label: "why".into(),
-            text: self.episode.cause().spoken(),
+            text: self.episode.cause().spoken().into(),
         }];
         Panel { widgets }
     }

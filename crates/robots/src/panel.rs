@@ -3,12 +3,12 @@
 use affect::akr::{FacialExpression, Valence};
 use affect::{AffectFrame, Episode, EpisodeCause};
 use robot::{Face, Tone, Widget};
-use smol_str::{SmolStr, format_smolstr};
+use smol_str::{SmolStr, StrExt, format_smolstr};
 
 use crate::emotion::NEUTRAL;
 
-/// Values in a panel's curve: a minute of ticks of half a second.
-pub(crate) const SPARKLINE_LEN: usize = 120;
+/// Values in a panel's curve: half a minute of ticks of half a second. A panel with them is recorded in each tick.
+pub(crate) const SPARKLINE_LEN: usize = 60;
 
 /// Face, name and intensity of an emotion, what it inclines the robot to do, and why; `None` without emotions. The other
 /// components are state variables, which the console shows of every robot.
@@ -32,18 +32,22 @@ pub(crate) fn affect(frame: Option<&AffectFrame<'_>>, label_cuts: &[f64; 4]) -> 
         },
         emotion(frame.name(), tone(frame)),
         Widget::Bar {
-            label: format!("intensity ({})", intensity.label(label_cuts).name()),
+            label: format_smolstr!("intensity ({})", intensity.label(label_cuts).name()),
             value: intensity.value(),
             min: 0.0,
             max: 1.0,
         },
         Widget::Text {
-            label: "inclined to".to_owned(),
-            text: frame.schema().action_tendency.name().replace('-', " "),
+            label: SmolStr::new_static("inclined to"),
+            text: frame
+                .schema()
+                .action_tendency
+                .name()
+                .replace_smolstr("-", " "),
         },
         Widget::Text {
-            label: "why".to_owned(),
-            text: cause.map(EpisodeCause::spoken).unwrap_or_default(),
+            label: SmolStr::new_static("why"),
+            text: cause.map(EpisodeCause::spoken).unwrap_or_default().into(),
         },
     ]
 }
@@ -51,16 +55,16 @@ pub(crate) fn affect(frame: Option<&AffectFrame<'_>>, label_cuts: &[f64; 4]) -> 
 /// The badge of a behavior.
 pub(crate) fn behavior(name: &str) -> Widget {
     Widget::Badge {
-        label: "behavior".to_owned(),
-        text: name.to_owned(),
+        label: SmolStr::new_static("behavior"),
+        text: name.into(),
         tone: Tone::Neutral,
     }
 }
 
 fn emotion(name: &str, tone: Tone) -> Widget {
     Widget::Badge {
-        label: "emotion".to_owned(),
-        text: name.to_owned(),
+        label: SmolStr::new_static("emotion"),
+        text: name.into(),
         tone,
     }
 }

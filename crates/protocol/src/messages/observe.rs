@@ -354,23 +354,28 @@ pub enum Widget {
     /// A labeled line of text.
     Text {
         /// What it is.
-        label: String,
+        #[cfg_attr(test, schemars(with = "String"))]
+        label: SmolStr,
         /// What it says.
-        text: String,
+        #[cfg_attr(test, schemars(with = "String"))]
+        text: SmolStr,
     },
     /// A state, set off from the rest.
     Badge {
         /// What it is.
-        label: String,
+        #[cfg_attr(test, schemars(with = "String"))]
+        label: SmolStr,
         /// The state.
-        text: String,
+        #[cfg_attr(test, schemars(with = "String"))]
+        text: SmolStr,
         /// How it is meant.
         tone: Tone,
     },
     /// A quantity within bounds.
     Bar {
         /// What it is.
-        label: String,
+        #[cfg_attr(test, schemars(with = "String"))]
+        label: SmolStr,
         /// The quantity.
         value: f64,
         /// Lower bound.
@@ -388,7 +393,8 @@ pub enum Widget {
     /// A small curve of recent values.
     Sparkline {
         /// What it is.
-        label: String,
+        #[cfg_attr(test, schemars(with = "String"))]
+        label: SmolStr,
         /// The values, oldest first.
         values: Vec<f64>,
     },
@@ -401,16 +407,19 @@ pub enum Widget {
     /// A picture; shown as an image, so that nothing in it runs.
     Svg {
         /// What it shows, for those who do not see it.
-        label: String,
+        #[cfg_attr(test, schemars(with = "String"))]
+        label: SmolStr,
         /// The document.
         svg: String,
     },
     /// Sends the robot a command.
     Button {
         /// What it says.
-        label: String,
+        #[cfg_attr(test, schemars(with = "String"))]
+        label: SmolStr,
         /// The command.
-        command: String,
+        #[cfg_attr(test, schemars(with = "String"))]
+        command: SmolStr,
     },
 }
 

@@ -19,7 +19,7 @@ use robot::{
     Robot, RobotName, SensedRobot, StateVariables, Widget, control_cycle, read_parameters,
 };
 use serde::{Deserialize, Serialize};
-use smol_str::format_smolstr;
+use smol_str::{SmolStr, format_smolstr};
 
 pub use deliberation::Deliberation;
 pub use parameters::{Approach, ButlerParameters, Rate};
@@ -239,13 +239,13 @@ impl Robot for Butler {
         let mut widgets = panel::affect(self.frame().as_ref(), cuts);
         widgets.push(panel::behavior(self.behavior().name()));
         widgets.push(Widget::Bar {
-            label: self.parameters.goods.clone(),
+            label: self.parameters.goods.as_str().into(),
             value: f64::from(self.state.treats),
             min: 0.0,
             max: f64::from(self.parameters.treat_capacity),
         });
         widgets.push(Widget::Sparkline {
-            label: "valence".to_owned(),
+            label: SmolStr::new_static("valence"),
             values: self.state.valences.iter().copied().collect(),
         });
         widgets.push(self.progress_table());

@@ -233,8 +233,8 @@ impl Robot for Leguin {
         widgets.push(panel::behavior(self.behavior().name()));
         widgets.push(self.progress_table());
         widgets.extend([REFILL, HURRY, GO_HOME].map(|command| Widget::Button {
-            label: command.to_owned(),
-            command: command.to_owned(),
+            label: SmolStr::new_static(command),
+            command: SmolStr::new_static(command),
         }));
         Panel { widgets }
     }
