@@ -1,15 +1,16 @@
 //! `cars fork`: a recorded run goes on from a tick with changes.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::str::FromStr;
 
 use clap::Args;
 use config::units::Time;
 use config::{Changes, Override};
-use lab::folder::{find, recorded_epoch, run_name};
+use lab::folder::{find, is_same_place, recorded_epoch, run_name};
 use lab::fork::Fork;
 use lab::moment::Moment;
+use lab::run::project_robots;
 use launch::RunOptions;
 use protocol::{Epoch, RunName};
 use scenario::{ChanceKind, Scenario};
@@ -81,22 +82,17 @@ pub(crate) fn fork(args: ForkArgs) -> Result<ExitCode> {
     let parent = run_name(&parent_folder);
     let files = recorded_epoch(&parent_folder, args.epoch)?;
     let recorded = Scenario::load(&files.scenario, &Changes::default())?;
-    let tick = args.at.moment.tick(recorded.tick_s);
     let fork = Fork {
         parent: &parent,
         files: &files,
-        tick,
+        tick: args.at.moment.tick(recorded.tick_s),
         set: args.set,
         duration_s: args.duration.map(|duration| duration.0),
         reseed: args.seed.map(|seed| (seed, args.reseed)),
     };
     let scenario = fork.scenario()?;
 
-    let suffix = match args.seed {
-        Some(seed) => format!("-fork-{tick}-seed-{seed}"),
-        None => format!("-fork-{tick}"),
-    };
-    let run = args.run.unwrap_or_else(|| parent.with_suffix(&suffix));
+    let run = args.run.unwrap_or_else(|| fork.name());
     let place = args.out.join(run.as_str());
     if args.replace && is_same_place(&place, parent_folder.path()) {
         return Err(refusal!(
@@ -117,14 +113,12 @@ pub(crate) fn fork(args: ForkArgs) -> Result<ExitCode> {
     if let Some(notice) = &made.notice {
         terminal::note(notice);
     }
-    let executed = fork.execute(scenario, &made.run, &made.folder);
+    let executed = fork.execute(scenario, &made.run, &made.folder, &project_robots(), || {
+        Ok(())
+    });
     let summary = executed.inspect_err(|_| made.undo())?;
     if !args.quiet {
         table::print(&summary, made.folder.path())?;
     }
     Ok(ExitCode::from(summary.verdict().exit_status()))
-}
-
-fn is_same_place(one: &Path, other: &Path) -> bool {
-    one.canonicalize().ok() == other.canonicalize().ok()
 }

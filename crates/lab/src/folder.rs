@@ -91,6 +91,12 @@ pub fn run_name(folder: &RunFolder) -> RunName {
         .unwrap_or_else(RunName::unknown)
 }
 
+/// Whether both paths lead to the same folder.
+#[must_use]
+pub fn is_same_place(one: &Path, other: &Path) -> bool {
+    one.canonicalize().ok() == other.canonicalize().ok()
+}
+
 /// The recording of an epoch.
 ///
 /// # Errors

@@ -12,7 +12,7 @@ use simulator::Recorder;
 
 use crate::error::LabError;
 use crate::reexecution::{Reexecution, cannot_go_on};
-use crate::run::{check_faults, check_parameters, go_on, observe};
+use crate::run::{RobotMaker, check_faults, check_parameters, go_on, observe};
 
 /// Tables of a scenario that hold for the whole run and can be other ones in a fork.
 const OF_THE_RUN: [&str; 3] = ["duration", "end_when", "record"];
@@ -35,6 +35,16 @@ pub struct Fork<'a> {
 }
 
 impl Fork<'_> {
+    /// The name of the fork, unless it is given another one: RUN-fork-TICK, with -seed-N after it if it is re-seeded.
+    #[must_use]
+    pub fn name(&self) -> RunName {
+        let mut suffix = format!("-fork-{}", self.tick);
+        if let Some((seed, _)) = self.reseed {
+            suffix += &format!("-seed-{seed}");
+        }
+        self.parent.with_suffix(&suffix)
+    }
+
     /// The scenario of the fork: that of the recorded run, with the changes as a `[[change]]`.
     ///
     /// # Errors
@@ -119,7 +129,8 @@ impl Fork<'_> {
         })
     }
 
-    /// Executes the fork and records it in a folder that [`RunFolder::create`] made for its scenario.
+    /// Executes the fork and records it in a folder that [`RunFolder::create`] made for its scenario. `make` makes the robots;
+    /// `goes_on` is called in each tick, and its error ends the fork.
     ///
     /// # Errors
     /// If the recorded run cannot be executed again with the same result, a robot cannot go on in this process, a robot ends
@@ -129,11 +140,14 @@ impl Fork<'_> {
         scenario: Scenario,
         run: &RunName,
         folder: &RunFolder,
+        make: &RobotMaker,
+        mut goes_on: impl FnMut() -> Result<(), LabError>,
     ) -> Result<Summary, LabError> {
         let mut record = Record::open(self.files)?;
-        let mut again = Reexecution::new(scenario, 1)?;
+        let mut again = Reexecution::with_robots(scenario, 1, make.clone())?;
         let mut recorder = Recorder::begin(folder, run, &again.local.simulation)?;
         loop {
+            goes_on()?;
             let opened = Instant::now();
             let recorded = record.next_entry()?;
             let recorded =
@@ -154,7 +168,8 @@ impl Fork<'_> {
             return Err(LabError::refused(reason)
                 .with_help("fork it earlier, or give another condition: --set 'end_when=…'"));
         }
-        go_on(&mut local, run, |local, record, opened| {
+        go_on(&mut local, run, &**make, |local, record, opened| {
+            goes_on()?;
             observe(&mut recorder, local, opened);
             recorder.write(&local.simulation, record)?;
             Ok(())

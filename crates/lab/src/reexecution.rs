@@ -330,8 +330,9 @@ pub fn digest_from(
     }
 
     let run = again.run.clone();
+    let make = again.make.clone();
     let mut local = again.end().map_err(|robot| cannot_go_on(&robot))?;
-    go_on(&mut local, &run, |_, _, _| Ok(()))?;
+    go_on(&mut local, &run, &*make, |_, _, _| Ok(()))?;
     Ok(local.simulation.digest())
 }
 

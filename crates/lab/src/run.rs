@@ -140,23 +140,15 @@ fn play_with_robots(
     let record = local.simulation.init(&mut local.robots)?;
     each(&local, &record, opened)?;
 
-    go_on_with(&mut local, run, make, each)?;
+    go_on(&mut local, run, make, each)?;
     Ok(local.simulation)
 }
 
-/// Plays a scenario from the last complete tick to its end and calls `each` as [`play`] does.
+/// Plays a scenario from the last complete tick to its end and calls `each` as [`play`] does; `make` makes the robots that come back.
 ///
 /// # Errors
 /// As [`play`].
 pub(crate) fn go_on(
-    local: &mut Local,
-    run: &RunName,
-    each: impl FnMut(&Local, &TickRecord, Instant) -> Result<(), LabError>,
-) -> Result<(), LabError> {
-    go_on_with(local, run, &of_class, each)
-}
-
-fn go_on_with(
     local: &mut Local,
     run: &RunName,
     make: Make<'_>,

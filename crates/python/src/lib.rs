@@ -5,6 +5,7 @@
 mod cars;
 mod error;
 mod experiment;
+mod fork;
 mod host;
 mod hunt;
 mod interrupt;
@@ -33,6 +34,7 @@ fn _cars(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(host::main, module)?)?;
     module.add_function(wrap_pyfunction!(host::take_part, module)?)?;
     module.add_function(wrap_pyfunction!(run::run, module)?)?;
+    module.add_function(wrap_pyfunction!(fork::fork, module)?)?;
     module.add_function(wrap_pyfunction!(run::find, module)?)?;
     module.add_function(wrap_pyfunction!(run::export, module)?)?;
     module.add_function(wrap_pyfunction!(experiment::experiment, module)?)?;

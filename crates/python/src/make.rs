@@ -100,6 +100,13 @@ impl Makers {
         }
     }
 
+    /// Prepares a run that goes on from another. What a robot or its maker raises is kept in `failure`.
+    pub(crate) fn of_fork(&self, failure: &FirstException) -> RobotMaker {
+        let makers = self.clone();
+        let failure = failure.clone();
+        Arc::new(move |name, class| makers.of_run(&failure).make(name, class))
+    }
+
     /// Prepares a run and its branches. What a robot raises ends its branch only; what a maker raises is kept in `failure`.
     pub(crate) fn of_branches(&self, failure: &FirstException) -> RobotMaker {
         let makers = self.clone();

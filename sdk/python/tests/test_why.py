@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from pathlib import Path
 from typing import Any
@@ -57,6 +58,48 @@ def test_the_throw_that_decided_a_run_is_found(tmp_path: Path) -> None:
     assert jump["before"]["low"] <= 0.5 <= jump["before"]["high"], why
     assert jump["cause"]["what"] == "chance of robot.Coin", why
     assert str(run.why()) == str(why) == str(cars.why(run.folder.name, HEADS, robots={"Coin": Coin}, out=tmp_path))
+
+
+def test_a_fork_goes_on_with_the_robots_of_its_run(tmp_path: Path) -> None:
+    run = run_with_heads(tmp_path)
+    robots: Any = {"Coin": Coin}
+    same = cars.fork(run, "4 s", robots=robots, out=tmp_path, duration=20)
+    assert same.folder.name == f"{run.folder.name}-fork-8" and same.summary["ticks"] == 40
+
+    def heads(seed: int, at: int) -> float:
+        forked = cars.fork(run, at, seed=seed, robots=robots)
+        assert "seed = " in (forked.folder / "scenario.toml").read_text()
+        return float(forked.summary["robots"]["Coin"]["state_variables"]["heads"])
+
+    assert {heads(seed, FLIP - 1) for seed in range(1, 9)} == {0.0, 1.0}
+    assert heads(1, FLIP) == 1.0
+    # They are the forks of an answer: number n has the seed n + 1.
+    cars.why(run, HEADS, robots=robots, budget=64)
+    lines = next((run.folder / "why").glob("*.jsonl")).read_text().splitlines()[1:]
+    for line in lines[:8]:
+        fork = json.loads(line)
+        assert fork["outcome"] == heads(fork["number"] + 1, fork["tick"]), fork
+
+    with pytest.raises(cars.RefusedError, match="Coin cannot go on"):
+        cars.fork(run, 8)
+    with pytest.raises(cars.BadArgument, match="reseed"):
+        cars.fork(run, 8, seed=1, reseed=["luck"], robots=robots)
+    with pytest.raises(cars.BadArgument, match="needs a seed"):
+        cars.fork(run, 8, reseed="network", robots=robots)
+    with pytest.raises(TypeError, match="at must be"):
+        cars.fork(run, None, robots=robots)  # type: ignore[arg-type]
+    with pytest.raises(cars.BadArgument, match="would overwrite the run"):
+        cars.fork(run, 8, name=run.folder.name, replace=True, out=tmp_path, robots=robots)
+
+    class Fragile(Coin):
+        def tick(self, cars: Cars) -> Action:
+            if cars.tick > FLIP:
+                raise ValueError("worn out")
+            return super().tick(cars)
+
+    with pytest.raises(ValueError, match="worn out"):
+        cars.fork(run, FLIP, name="fragile", out=tmp_path, robots={"Coin": Fragile})
+    assert not (tmp_path / "fragile").exists()
 
 
 def test_an_answer_does_not_depend_on_jobs(tmp_path: Path) -> None:

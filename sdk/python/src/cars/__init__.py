@@ -52,7 +52,7 @@ from ._frames import Frames
 from ._hunt import Finding, Hunt, hunt
 from ._pictures import Page, Picture
 from ._robot import Action, CarsRobotInterface, Robot
-from ._run import Run, load, run, why
+from ._run import Run, fork, load, run, why
 from ._why import Why, WhyFrames
 from .panel import Panel
 
@@ -108,6 +108,7 @@ __all__ = [
     "WhyFrames",
     "__version__",
     "experiment",
+    "fork",
     "hunt",
     "load",
     "main",

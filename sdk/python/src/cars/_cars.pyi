@@ -127,6 +127,16 @@ def hunt(
     processes: tuple[Path | None, bool, float | None] | None,
 ) -> tuple[str, list[str]]: ...
 def verdicts(folder: Path) -> list[tuple[str, str, list[int], list[int], list[int], list[int]]]: ...
+def fork(
+    run: Path,
+    at: str,
+    changes: tuple[Sequence[str], str | None, int | None, Sequence[str]],
+    *,
+    name: str | None,
+    replace: bool,
+    out: Path,
+    robots: Mapping[str, Callable[[], Robot]],
+) -> tuple[Path, str]: ...
 def why(
     run: Path,
     question: str | None,

@@ -6,12 +6,12 @@ import json
 import os
 import tempfile
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, Optional, Union
 
 from . import _arguments, _cars, _settings
-from ._errors import Error
+from ._errors import BadArgument, Error
 from ._frames import Frame, Frames, read, with_value
 from ._pictures import Page, Picture
 from ._robot import Robot, maker
@@ -188,12 +188,7 @@ def run(
     pace = _arguments.speed("speed", speed)
     named = _arguments.text("name", name)
     makers = {of: maker(of, make) for of, make in _arguments.makers("robots", robots).items()}
-    into = None if out is None else _arguments.path("out", out)
-
-    keeper = None
-    if into is None:
-        keeper = tempfile.TemporaryDirectory(prefix="cars-")
-        into = Path(keeper.name)
+    into, keeper = _folder(out)
     folder, summary = _cars.run(
         file,
         seed=seed,
@@ -208,6 +203,14 @@ def run(
     return Run(folder, json.loads(summary), keeper)
 
 
+def _folder(out: Optional[Name]) -> tuple[Path, Optional[tempfile.TemporaryDirectory[str]]]:
+    """Where a run is recorded, and what keeps that folder."""
+    if out is not None:
+        return _arguments.path("out", out), None
+    keeper = tempfile.TemporaryDirectory(prefix="cars-")
+    return Path(keeper.name), keeper
+
+
 def load(run: Name = "latest", *, out: Name = "runs") -> Run:
     """A run that was recorded before, by any program.
 
@@ -217,6 +220,63 @@ def load(run: Name = "latest", *, out: Name = "runs") -> Run:
     """
     folder, summary = _cars.find(_arguments.path("out", out), _arguments.path("run", run))
     return Run(folder, None if summary is None else json.loads(summary))
+
+
+def fork(
+    run: Union[Run, Name],
+    at: Union[int, str],
+    *,
+    seed: Optional[int] = None,
+    reseed: Iterable[str] = (),
+    set: Optional[Mapping[str, Any]] = None,  # noqa: A002
+    duration: Union[float, str, None] = None,
+    name: Optional[str] = None,
+    replace: bool = False,
+    out: Optional[Name] = None,
+    robots: Optional[Mapping[str, Callable[[], Robot]]] = None,
+) -> Run:
+    """Executes a recorded run again up to a tick, and goes on with changes, or with other chance, as ``cars fork`` does.
+
+    :param run: a run, or its folder.
+    :param at: the last tick that both have: a tick, or a time such as ``"120 s"``.
+    :param seed: the seed of what is drawn from the next tick on: the same past with another future. Number n of the forks that
+        :func:`cars.why` plays after a tick has the seed n + 1.
+    :param reseed: what is drawn anew: ``"network"``, ``"guests"``, ``"sensing"``, ``"robot.NAME"``; without it all.
+    :param set: what changes from the next tick on: see :func:`cars.run`.
+    :param duration: another end, from the beginning of the run.
+    :param name: name of the fork; without it ``RUN-fork-TICK``, with ``-seed-N`` after it if there is one.
+    :param replace: replace the run with this name, if it is over.
+    :param out: where its folder is made; without it in a temporary folder, which goes with the returned object.
+    :param robots: the classes of robots of Python with which it was run: see :func:`cars.run`.
+    :raises Error: if the run cannot be executed again with the same result, or a change cannot be made.
+    :raises TypeError, BadArgument: which argument has a type or a value that is not accepted.
+    """
+    parent = run if isinstance(run, Run) else load(run)
+    parent._check()
+    moment = _moment("at", at)
+    if moment is None:
+        raise _arguments.wrong_type("at", "a tick, or a time such as '120 s'", at)
+    kinds = [reseed] if isinstance(reseed, str) else list(reseed)
+    if kinds and seed is None:
+        raise BadArgument("reseed needs a seed")
+    makers = _arguments.makers("robots", robots)
+    changes = (
+        _settings.changes(set),
+        _arguments.time("duration", duration),
+        None if seed is None else _arguments.whole("seed", seed, 0, _arguments.MAX_SEED),
+        kinds,
+    )
+    into, keeper = _folder(out)
+    folder, summary = _cars.fork(
+        parent.folder,
+        moment,
+        changes,
+        name=_arguments.text("name", name),
+        replace=_arguments.flag("replace", replace),
+        out=into,
+        robots={of: maker(of, make) for of, make in makers.items()},
+    )
+    return Run(folder, json.loads(summary), keeper)
 
 
 def why(
