@@ -15,6 +15,7 @@ use experiments::hunt::{
     HuntReport, HuntRobots, Link, Subject, hunt as go,
 };
 use experiments::shell;
+use experiments::why::WhyBudget;
 use experiments::{ByClass, Robots};
 use indicatif::{ProgressBar, ProgressStyle};
 use protocol::random::MAX_SEED;
@@ -81,6 +82,10 @@ pub(crate) struct HuntArgs {
     /// Record the run of each finding, and run `cars why` on it: when it was decided, and by what.
     #[arg(long, conflicts_with_all = ["json", "processes"])]
     explain: bool,
+    /// How much is spent on the explanation of each finding, as for `cars why`: most forks, such as 2000, or a time, such as "5 min";
+    /// without it as many forks as the answer needs.
+    #[arg(long, value_name = "FORKS|TIME", requires = "explain")]
+    budget: Option<WhyBudget>,
 }
 
 /// Hunts; the exit status is 1 if something was found, 2 if the hunt cannot be made, and 3 if nothing was found and what some run
@@ -164,7 +169,7 @@ fn play(args: &HuntArgs) -> Result<HuntReport> {
     };
     OutputError::unless_closed(printed)?;
     if args.explain {
-        explain(&report.findings)?;
+        explain(&report.findings, args.budget)?;
     }
     Ok(report)
 }
@@ -271,10 +276,13 @@ fn finding_in_words(finding: &Finding) -> String {
     text
 }
 
-/// Records the run of each finding, and asks when and by what it was decided.
-fn explain(findings: &[Finding]) -> Result<()> {
+/// Records the run of each finding, and asks when and by what it was decided. Ctrl-C ends it; `cars why` goes on where it was.
+fn explain(findings: &[Finding], budget: Option<WhyBudget>) -> Result<()> {
     let program = std::env::current_exe()?;
     for finding in findings.iter().filter(|finding| finding.can_be_explained()) {
+        if STOP.load(Ordering::Relaxed) {
+            break;
+        }
         let run = finding.run();
         // The verdict of the run is a failure; whether it was recorded is what `cars why` finds out.
         Command::new(&program)
@@ -283,10 +291,14 @@ fn explain(findings: &[Finding]) -> Result<()> {
             .args(["--run", &run, "--replace", "--quiet"])
             .stdout(Stdio::null())
             .status()?;
+
         terminal::note(format_args!("cars why {run} {}", finding.expectation));
-        Command::new(&program)
-            .args(["why", &run, &finding.expectation])
-            .status()?;
+        let mut why = Command::new(&program);
+        why.args(["why", &run, &finding.expectation]);
+        if let Some(budget) = budget {
+            why.args(["--budget", &budget.to_string()]);
+        }
+        why.status()?;
     }
     Ok(())
 }

@@ -2,13 +2,10 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
 
 use clap::Args;
-use config::units::Time;
-use experiments::why::{WhyAnswer, WhyOptions, why as find_out};
+use experiments::why::{WhyAnswer, WhyBudget, WhyOptions, why as find_out};
 use indicatif::{ProgressBar, ProgressStyle};
 use lab::folder::{find, recorded_epoch, run_name};
 use lab::run::project_robots;
@@ -38,7 +35,7 @@ pub(crate) struct WhyArgs {
     /// Most forks, such as 2000, or the time after which no fork is begun, such as "5 min"; without it as many as the answer needs. The
     /// same number of forks gives the same answer.
     #[arg(long, value_name = "FORKS|TIME")]
-    budget: Option<Budget>,
+    budget: Option<WhyBudget>,
     /// Number of forks at the same time; without it the number of processors. The answer does not depend on it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1024))]
     jobs: Option<u64>,
@@ -53,29 +50,6 @@ pub(crate) struct WhyArgs {
     json: bool,
 }
 
-/// How much is spent on an answer.
-#[derive(Debug, Clone, Copy)]
-enum Budget {
-    Forks(u64),
-    Time(Duration),
-}
-
-impl FromStr for Budget {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        if let Ok(forks) = text.parse() {
-            return Ok(Self::Forks(forks));
-        }
-        let time: Time = text.parse().map_err(|_| {
-            format!("{text:?} is neither a number of forks nor a time such as \"5 min\"")
-        })?;
-        Duration::try_from_secs_f64(time.0)
-            .map(Self::Time)
-            .map_err(|error| error.to_string())
-    }
-}
-
 /// Finds out what decided a run.
 pub(crate) fn why(args: &WhyArgs) -> Result<ExitCode> {
     let folder = find(&args.out, &args.run)?.resolved()?;
@@ -88,14 +62,7 @@ pub(crate) fn why(args: &WhyArgs) -> Result<ExitCode> {
     };
     let options = WhyOptions {
         what: args.what.clone(),
-        forks: match args.budget {
-            Some(Budget::Forks(forks)) => Some(forks),
-            _ => None,
-        },
-        until: match args.budget {
-            Some(Budget::Time(time)) => Instant::now().checked_add(time),
-            _ => None,
-        },
+        budget: args.budget,
         jobs,
         make: project_robots(),
         stop: &STOP,

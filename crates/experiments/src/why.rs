@@ -2,6 +2,7 @@
 //! that probability jumps. A jump is confirmed by forks in which exactly that event does not happen.
 
 mod answer;
+mod budget;
 mod candidates;
 mod forks;
 mod plan;
@@ -9,7 +10,8 @@ mod question;
 mod search;
 mod sentence;
 
-pub use answer::{Jump, KindEffect, PlannedEffect, TriedCause, WhyAnswer};
+pub use answer::{FailedForks, Jump, KindEffect, PlannedEffect, TriedCause, WhyAnswer};
+pub use budget::WhyBudget;
 pub use forks::{WhyOptions, WhyProgress, why};
 pub use plan::{Counterfactual, ForkPlan};
 pub use question::Question;

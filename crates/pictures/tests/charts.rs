@@ -442,6 +442,7 @@ fn what_decided_a_run_is_a_curve_with_its_jumps() {
         value: Some(value),
         low: Some(value - 0.1),
         high: Some(value + 0.1),
+        failed: 0,
     };
     let mut decision = RunDecision {
         digest: String::new(),

@@ -872,6 +872,7 @@ fn decision() -> RunDecision {
         value: Some(value),
         low: Some(value - 0.05),
         high: Some(value + 0.05),
+        failed: 0,
     };
     let curve = [(0, 0.1), (59, 0.1), (60, 0.9), (100, 0.9)];
     RunDecision {

@@ -4,41 +4,32 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
 
 use config::Changes;
-use config::units::Time;
 use experiments::why::{WhyOptions, why as find_out};
 use lab::folder::{recorded_epoch, run_name};
 use pyo3::prelude::*;
 use record::RunFolder;
 use scenario::Scenario;
 
-use crate::error::{argument, read, reported};
+use crate::error::{read, reported};
 use crate::interrupt::interruptible;
 use crate::make::Makers;
 use crate::runner::FirstException;
 
 /// Finds out what decided the last epoch of a run, and writes the answer into its folder. Returns what was asked.
 #[pyfunction]
-#[pyo3(signature = (run, question, *, forks, time, jobs, robots))]
+#[pyo3(signature = (run, question, *, budget, jobs, robots))]
 pub(crate) fn why(
     py: Python<'_>,
     run: PathBuf,
     question: Option<String>,
-    forks: Option<u64>,
-    time: Option<&str>,
+    budget: Option<&str>,
     jobs: Option<usize>,
     robots: BTreeMap<String, Py<PyAny>>,
 ) -> PyResult<String> {
     let makers = Makers::new(robots)?;
-    let until = match read::<Time>("budget", time)? {
-        None => None,
-        Some(Time(time_s)) => {
-            let time = Duration::try_from_secs_f64(time_s);
-            Instant::now().checked_add(time.map_err(|error| argument("budget", error))?)
-        }
-    };
+    let budget = read("budget", budget)?;
     let folder = RunFolder::at(run);
     let files = recorded_epoch(&folder, None).map_err(reported)?;
     let scenario = Scenario::load(&files.scenario, &Changes::default()).map_err(reported)?;
@@ -52,8 +43,7 @@ pub(crate) fn why(
     let work = move || {
         let options = WhyOptions {
             what: question,
-            forks,
-            until,
+            budget,
             jobs,
             make,
             stop: &stop,

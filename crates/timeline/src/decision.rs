@@ -55,6 +55,9 @@ pub struct ForkOutcomes {
     pub low: Option<f64>,
     /// Upper end.
     pub high: Option<f64>,
+    /// Forks in which a robot failed; they have no outcome.
+    #[serde(default)]
+    pub failed: u64,
 }
 
 /// The expected outcome after a tick.
@@ -207,10 +210,14 @@ impl ForkOutcomes {
         }
     }
 
-    /// In words, with the number of forks: `12 % (8 to 16), n = 200`.
+    /// In words, with the number of forks: `12 % (8 to 16), n = 180, and a robot failed in 20`.
     #[must_use]
     pub fn in_words_with_count(&self, is_share: bool) -> String {
-        format!("{}, n = {}", self.in_words(is_share), self.n)
+        let mut text = format!("{}, n = {}", self.in_words(is_share), self.n);
+        if self.failed > 0 {
+            text += &format!(", and a robot failed in {}", self.failed);
+        }
+        text
     }
 
     fn check(&self, tick: Tick) -> Result<(), String> {
@@ -297,6 +304,7 @@ mod tests {
             value: Some(value),
             low: Some(value - 0.04),
             high: Some(value + 0.04),
+            failed: 0,
         }
     }
 

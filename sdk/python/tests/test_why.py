@@ -147,6 +147,12 @@ def test_a_fork_whose_robot_raises_has_no_outcome(tmp_path: Path) -> None:
     why = cars.why(run, HEADS, robots={"Coin": Fragile}, budget=100)
     first = why.answer["curve"][0]
     assert 0 < first["n"] < 64 and first["value"] == 1.0, first
+    assert first["n"] + first["failed"] == 64, first
+    assert "a robot failed: they are left out" in why.sentence, why
+    assert f"in tick {FLIP} Coin gives up: ValueError: tails" in why.sentence, why
+    assert list(why.curve["failed"])[0] == first["failed"]
+    again = cars.why(run, HEADS, robots={"Coin": Fragile}, budget=100)
+    assert again.sentence == why.sentence, "what was kept says the same"
 
 
 def test_a_class_that_is_no_robot_is_refused(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use statistics::Estimate;
 use timeline::{DecisionJump, DecisionPoint, ForkOutcomes};
 
-use super::plan::ForkPlan;
+use super::plan::{ForkOutcome, ForkPlan};
 use super::question::Question;
 
 /// What decided a run. What is shown of it is read as [`RunDecision`](timeline::RunDecision).
@@ -39,16 +39,35 @@ pub struct WhyAnswer {
     pub least_jump: f64,
     /// The number of forks.
     pub forks: u64,
+    /// Those in which a robot failed, if there are any.
+    pub failed: Option<FailedForks>,
     /// Whether the budget was enough to look at all that is worth a look.
     pub is_complete: bool,
     /// The answer in a sentence.
     pub sentence: String,
 }
 
+/// Forks in which a robot failed. They have no outcome, so the answer is about runs in which none does.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FailedForks {
+    /// Their number.
+    pub forks: u64,
+    /// How the first of them begins.
+    pub first: ForkPlan,
+    /// Its number.
+    pub number: u64,
+    /// Why its robot failed, and in which tick.
+    pub because: String,
+}
+
 /// What outcomes of forks give, of which some have none.
 #[must_use]
-pub(super) fn outcomes_of(outcomes: &[Option<f64>], is_share: bool) -> ForkOutcomes {
-    let values: Vec<f64> = outcomes.iter().flatten().copied().collect();
+pub(super) fn outcomes_of(outcomes: &[ForkOutcome], is_share: bool) -> ForkOutcomes {
+    let failed = outcomes
+        .iter()
+        .filter(|outcome| matches!(outcome, ForkOutcome::Failed(_)))
+        .count();
+    let values: Vec<f64> = outcomes.iter().filter_map(ForkOutcome::number).collect();
     let estimate = if is_share {
         let ones = values.iter().filter(|value| **value == 1.0).count();
         Estimate::share(ones, values.len())
@@ -61,6 +80,7 @@ pub(super) fn outcomes_of(outcomes: &[Option<f64>], is_share: bool) -> ForkOutco
         value: estimate.value.is_finite().then_some(estimate.value),
         low: bounds.map(|(low, _)| low),
         high: bounds.map(|(_, high)| high),
+        failed: failed as u64,
     }
 }
 

@@ -6,7 +6,7 @@ use std::io::{ErrorKind, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use export::draft;
@@ -22,9 +22,10 @@ use serde::{Deserialize, Serialize};
 use simulator::medium::{ForcedVerdict, NetworkVerdict};
 use xxhash_rust::xxh3::xxh3_128;
 
-use super::answer::WhyAnswer;
+use super::answer::{FailedForks, WhyAnswer};
+use super::budget::WhyBudget;
 use super::candidates;
-use super::plan::{Counterfactual, ForkPlan};
+use super::plan::{Counterfactual, ForkOutcome, ForkPlan};
 use super::question::AskedRun;
 use super::search::{Forks, SearchedRun, search};
 use crate::parallel;
@@ -34,16 +35,16 @@ use crate::plan::ProgramVersion;
 const MAX_RUNGS: usize = 64;
 /// Most characters of a file's name that come from the question.
 const MAX_NAME: usize = 60;
+/// Most characters that are kept of why a robot failed.
+const MAX_REASON: usize = 300;
 
 /// How a question is answered.
 pub struct WhyOptions<'a> {
     /// What is asked: the name of an expectation or of a measure, a condition, the path of a number of the summary; `None` for the
     /// expectation that failed first.
     pub what: Option<String>,
-    /// Most forks; `None` for as many as the answer needs. The same number gives the same answer.
-    pub forks: Option<u64>,
-    /// No fork is begun after this. The answer depends on it.
-    pub until: Option<Instant>,
+    /// How much is spent; `None` for as much as the answer needs.
+    pub budget: Option<WhyBudget>,
     /// Number of forks at the same time; the answer does not depend on it.
     pub jobs: usize,
     /// Makes the robots.
@@ -74,6 +75,7 @@ pub fn why(
     options: &WhyOptions<'_>,
     progress: &mut (dyn FnMut(WhyProgress) + Send),
 ) -> Result<(WhyAnswer, PathBuf), LabError> {
+    let begun = Instant::now();
     let recorded = Scenario::load(&files.scenario, &config::Changes::default())?;
     let asked = AskedRun::read(options.what.as_deref(), &recorded, files)?;
     let make = options.make.clone();
@@ -98,7 +100,9 @@ pub fn why(
         rungs,
         outcomes,
         kept,
+        budget: options.budget.map(|budget| (budget, begun)),
         used: 0,
+        failed: None,
         progress,
     };
     let trunk = sampler.rungs[&0].snapshot()?;
@@ -128,6 +132,7 @@ pub fn why(
         planned: found.planned,
         least_jump: found.least_jump,
         forks: sampler.used,
+        failed: sampler.failed,
         is_complete: found.is_complete,
         sentence: String::new(),
     };
@@ -170,7 +175,7 @@ fn key(asked: &AskedRun, digest: &str) -> Result<String, LabError> {
 }
 
 /// Outcomes of forks, by their plans and numbers.
-type Outcomes = BTreeMap<ForkPlan, BTreeMap<u64, Option<f64>>>;
+type Outcomes = BTreeMap<ForkPlan, BTreeMap<u64, ForkOutcome>>;
 
 /// The file of outcomes: a line with the key of the question, and one for each fork.
 struct OutcomeFile {
@@ -184,6 +189,9 @@ struct PlayedFork {
     plan: ForkPlan,
     number: u64,
     outcome: Option<f64>,
+    /// Why a robot failed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    failed: Option<String>,
 }
 
 impl OutcomeFile {
@@ -212,7 +220,11 @@ impl OutcomeFile {
                 };
                 whole += line;
                 let of_plan = outcomes.entry(kept.plan).or_default();
-                of_plan.insert(kept.number, kept.outcome);
+                let outcome = match kept.failed {
+                    Some(because) => ForkOutcome::Failed(because.into()),
+                    None => kept.outcome.into(),
+                };
+                of_plan.insert(kept.number, outcome);
             }
         }
         if whole != text {
@@ -223,11 +235,16 @@ impl OutcomeFile {
         Ok((outcomes, Self { path, file }))
     }
 
-    fn add(&mut self, plan: &ForkPlan, number: u64, outcome: Option<f64>) -> Result<(), LabError> {
+    fn add(&mut self, plan: &ForkPlan, number: u64, outcome: &ForkOutcome) -> Result<(), LabError> {
+        let failed = match outcome {
+            ForkOutcome::Failed(because) => Some(because.to_string()),
+            ForkOutcome::Number(_) | ForkOutcome::Nothing => None,
+        };
         let kept = PlayedFork {
             plan: plan.clone(),
             number,
-            outcome,
+            outcome: outcome.number(),
+            failed,
         };
         let line = serde_json::to_string(&kept).map_err(LabError::failed)?;
         let written = self.file.write_all(format!("{line}\n").as_bytes());
@@ -243,13 +260,17 @@ struct Sampler<'a> {
     rungs: BTreeMap<Tick, Trunk>,
     outcomes: Outcomes,
     kept: OutcomeFile,
+    /// How much is spent, and since when.
+    budget: Option<(WhyBudget, Instant)>,
     /// Forks that were asked for, whether they were played now or before.
     used: u64,
+    /// Those of them in which a robot failed.
+    failed: Option<FailedForks>,
     progress: &'a mut (dyn FnMut(WhyProgress) + Send),
 }
 
 impl Forks for Sampler<'_> {
-    fn play(&mut self, plan: &ForkPlan, numbers: Range<u64>) -> Result<Vec<Option<f64>>, LabError> {
+    fn play(&mut self, plan: &ForkPlan, numbers: Range<u64>) -> Result<Vec<ForkOutcome>, LabError> {
         let known = self.outcomes.entry(plan.clone()).or_default();
         let missing: Vec<u64> = numbers
             .clone()
@@ -261,18 +282,30 @@ impl Forks for Sampler<'_> {
         }
 
         let known = &self.outcomes[plan];
-        Ok(numbers
-            .map(|number| known.get(&number).copied().flatten())
-            .collect())
+        let mut outcomes = Vec::new();
+        for number in numbers {
+            let outcome = known.get(&number).cloned();
+            let outcome = outcome.unwrap_or(ForkOutcome::Nothing);
+            if let ForkOutcome::Failed(because) = &outcome {
+                let failed = self.failed.get_or_insert_with(|| FailedForks {
+                    forks: 0,
+                    first: plan.clone(),
+                    number,
+                    because: because.to_string(),
+                });
+                failed.forks += 1;
+            }
+            outcomes.push(outcome);
+        }
+        Ok(outcomes)
     }
 
     fn has_budget(&self) -> bool {
-        let has_forks = self.options.forks.is_none_or(|forks| self.used < forks);
-        has_forks
-            && self
-                .options
-                .until
-                .is_none_or(|until| Instant::now() < until)
+        match self.budget {
+            None => true,
+            Some((WhyBudget::Forks(forks), _)) => self.used < forks,
+            Some((WhyBudget::Time(time), begun)) => begun.elapsed() < time,
+        }
     }
 }
 
@@ -300,7 +333,7 @@ impl Sampler<'_> {
             let (known, kept, progress) = &mut *locked(&keeping);
             progress(WhyProgress { forks, tick });
             let is_kept = outcome.and_then(|outcome| {
-                kept.add(plan, number, outcome)?;
+                kept.add(plan, number, &outcome)?;
                 known.insert(number, outcome);
                 Ok(())
             });
@@ -336,13 +369,13 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Plays a fork; returns its outcome. A fork in which a robot fails has none.
+/// Plays a fork; returns what came of it.
 fn fork(
     asked: &AskedRun,
     mut branch: Branch,
     plan: &ForkPlan,
     number: u64,
-) -> Result<Option<f64>, LabError> {
+) -> Result<ForkOutcome, LabError> {
     let played = begin(&mut branch, plan, number + 1).and_then(|is_fork| {
         if is_fork {
             asked.outcome(&mut branch)
@@ -351,8 +384,15 @@ fn fork(
         }
     });
     match played {
-        Err(LabError::Robot(_)) => Ok(None),
-        played => played,
+        Ok(outcome) => Ok(outcome.into()),
+        Err(LabError::Robot(error)) => {
+            let reason: String = error.to_string().chars().take(MAX_REASON).collect();
+            let tick = branch.tick() + 1;
+            Ok(ForkOutcome::Failed(Arc::from(format!(
+                "in tick {tick} {reason}"
+            ))))
+        }
+        Err(error) => Err(error),
     }
 }
 

@@ -1,4 +1,6 @@
-//! How forks of a run begin.
+//! How forks of a run begin, and what comes of them.
+
+use std::sync::Arc;
 
 use protocol::{RobotName, Seq, Tick};
 use scenario::ChanceKind;
@@ -93,4 +95,31 @@ pub enum Counterfactual {
         /// Its place.
         index: usize,
     },
+}
+
+/// What came of a fork.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum ForkOutcome {
+    /// Its number: 1 or 0 where the question is whether something happens.
+    Number(f64),
+    /// It has none: a measure without a value, or what the plan is about has not come about.
+    Nothing,
+    /// A robot failed: why, and in which tick.
+    Failed(Arc<str>),
+}
+
+impl ForkOutcome {
+    /// Its number, if it has one.
+    pub(super) fn number(&self) -> Option<f64> {
+        match self {
+            Self::Number(number) => Some(*number),
+            Self::Nothing | Self::Failed(_) => None,
+        }
+    }
+}
+
+impl From<Option<f64>> for ForkOutcome {
+    fn from(number: Option<f64>) -> Self {
+        number.map_or(Self::Nothing, Self::Number)
+    }
 }

@@ -14,7 +14,7 @@ use statistics::{SignFlip, holm};
 use timeline::{DecisionCause, DecisionJump, DecisionPoint, ForkOutcomes};
 
 use super::answer::{Jump, KindEffect, PlannedEffect, TriedCause, outcomes_of};
-use super::plan::{Counterfactual, ForkPlan};
+use super::plan::{Counterfactual, ForkOutcome, ForkPlan};
 
 /// Points of the curve at first, beside tick 0.
 const GRID: Tick = 40;
@@ -46,11 +46,11 @@ const LEVEL: f64 = 0.05;
 
 /// Plays forks.
 pub(super) trait Forks {
-    /// The outcomes of the forks of a plan with these numbers; `None` for one that has none.
+    /// The outcomes of the forks of a plan with these numbers.
     ///
     /// # Errors
     /// If the run cannot be executed again, or the caller ends it.
-    fn play(&mut self, plan: &ForkPlan, numbers: Range<u64>) -> Result<Vec<Option<f64>>, LabError>;
+    fn play(&mut self, plan: &ForkPlan, numbers: Range<u64>) -> Result<Vec<ForkOutcome>, LabError>;
 
     /// Whether more forks may be played.
     fn has_budget(&self) -> bool;
@@ -116,7 +116,7 @@ struct Search<'a> {
     run: &'a SearchedRun<'a>,
     forks: &'a mut dyn Forks,
     /// Outcomes after ticks, by the numbers of forks from 0 on.
-    points: BTreeMap<Tick, Vec<Option<f64>>>,
+    points: BTreeMap<Tick, Vec<ForkOutcome>>,
     is_complete: bool,
 }
 
@@ -154,7 +154,7 @@ impl Search<'_> {
 
     /// The differences between the outcomes after two ticks, fork by fork.
     fn differences(&self, from: Tick, to: Tick) -> Vec<f64> {
-        let known = [self.run.recorded];
+        let known = [ForkOutcome::from(self.run.recorded)];
         let of = |tick| self.points.get(&tick).map(Vec::as_slice);
         let before = of(from).unwrap_or_default();
         let after = of(to).unwrap_or_default();
@@ -169,7 +169,7 @@ impl Search<'_> {
             return LEAST_JUMP;
         }
         let deviations = self.points.values().map(|point| {
-            let values: Vec<f64> = point.iter().flatten().copied().collect();
+            let values: Vec<f64> = point.iter().filter_map(ForkOutcome::number).collect();
             deviation(&values)
         });
         LEAST_JUMP_SD * deviations.fold(0.0, f64::max)
@@ -256,7 +256,7 @@ impl Search<'_> {
     fn contrast(&self, before: &[Tick], after: &[Tick]) -> (f64, f64) {
         let of = |ticks: &[Tick]| -> Vec<f64> {
             let outcomes = ticks.iter().filter_map(|tick| self.points.get(tick));
-            outcomes.flatten().flatten().copied().collect()
+            outcomes.flatten().filter_map(ForkOutcome::number).collect()
         };
         let [before, after] = [of(before), of(after)];
         if before.is_empty() || after.is_empty() {
@@ -314,9 +314,9 @@ impl Search<'_> {
     }
 
     /// Outcomes after a tick of forks that took no part in the search.
-    fn fresh(&mut self, tick: Tick, forks: u64) -> Result<Vec<Option<f64>>, LabError> {
+    fn fresh(&mut self, tick: Tick, forks: u64) -> Result<Vec<ForkOutcome>, LabError> {
         if tick >= self.run.last {
-            return Ok(vec![self.run.recorded; forks as usize]);
+            return Ok(vec![self.run.recorded.into(); forks as usize]);
         }
         let numbers = FIRST_CONFIRMING..FIRST_CONFIRMING + forks;
         self.forks.play(&ForkPlan::After { tick }, numbers)
@@ -326,7 +326,7 @@ impl Search<'_> {
     fn explain(
         &mut self,
         jump: &mut Jump,
-        after: &[Option<f64>],
+        after: &[ForkOutcome],
         change: f64,
     ) -> Result<(), LabError> {
         let tick = jump.shown.tick;
@@ -391,9 +391,13 @@ impl Search<'_> {
                 kind: kind.clone(),
             };
             let outcomes = self.forks.play(&plan, 0..SCOUTS)?;
-            let changed: Vec<Option<f64>> = outcomes
-                .iter()
-                .map(|outcome| Some(f64::from(u8::from(*outcome != self.run.recorded))))
+            let recorded = ForkOutcome::from(self.run.recorded);
+            let changed: Vec<ForkOutcome> = outcomes
+                .into_iter()
+                .map(|outcome| match outcome {
+                    failed @ ForkOutcome::Failed(_) => failed,
+                    outcome => ForkOutcome::Number(f64::from(u8::from(outcome != recorded))),
+                })
                 .collect();
             effects.push(KindEffect {
                 kind: kind.to_string(),
@@ -453,6 +457,7 @@ impl Search<'_> {
                 value: self.run.recorded,
                 low: None,
                 high: None,
+                failed: 0,
             },
         });
         curve
@@ -477,12 +482,12 @@ fn merged(mut intervals: Vec<(f64, Tick, Tick)>) -> Vec<(f64, Tick, Tick)> {
 
 /// The differences of pairs of which both have an outcome.
 fn differences<'a>(
-    before: &[Option<f64>],
-    after: impl Iterator<Item = &'a Option<f64>>,
+    before: &[ForkOutcome],
+    after: impl Iterator<Item = &'a ForkOutcome>,
 ) -> Vec<f64> {
     let pairs = before.iter().zip(after);
     pairs
-        .filter_map(|(before, after)| Some((*after)? - (*before)?))
+        .filter_map(|(before, after)| Some(after.number()? - before.number()?))
         .collect()
 }
 
@@ -524,12 +529,12 @@ mod tests {
             &mut self,
             plan: &ForkPlan,
             numbers: Range<u64>,
-        ) -> Result<Vec<Option<f64>>, LabError> {
+        ) -> Result<Vec<ForkOutcome>, LabError> {
             let probability = (self.probability)(plan.shared());
             let outcomes = numbers.map(|number| {
                 let name = format!("{}/{plan:?}/{number}", self.case);
                 let is_one = unit(&mut stream(1, &name)) < probability;
-                Some(f64::from(u8::from(is_one)))
+                ForkOutcome::Number(f64::from(u8::from(is_one)))
             });
             Ok(outcomes.collect())
         }

@@ -4,7 +4,7 @@ use protocol::time::time_s;
 
 use timeline::{DecisionJump, ForkOutcomes, outcome_in_words};
 
-use super::answer::WhyAnswer;
+use super::answer::{FailedForks, WhyAnswer};
 use super::question::Question;
 
 /// How near the expected outcome after tick 0 must be to that of the run, so that the run was decided from the start.
@@ -42,6 +42,9 @@ impl WhyAnswer {
             text += ". ";
         }
         text += &planned.concat();
+        if let Some(failed) = &self.failed {
+            text += &self.failed_in_words(failed);
+        }
         if !self.is_complete {
             text += "The budget ended before all of the curve was looked at. ";
         }
@@ -105,6 +108,22 @@ impl WhyAnswer {
             Some(value) => format!("{name} is {}", outcome_in_words(value, false)),
             None => format!("{name} has no number"),
         }
+    }
+
+    /// What the answer leaves out because robots failed.
+    fn failed_in_words(&self, failed: &FailedForks) -> String {
+        let FailedForks {
+            forks,
+            first,
+            because,
+            ..
+        } = failed;
+        format!(
+            "In {forks} of {} forks a robot failed: they are left out, so this is about runs in which none does (the first of them \
+             goes on from tick {}: {because}). ",
+            self.forks,
+            first.shared()
+        )
     }
 
     /// What happened in a tick.

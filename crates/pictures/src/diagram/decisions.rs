@@ -115,6 +115,7 @@ fn between(curve: &[DecisionPoint], tick: Tick) -> Option<DecisionPoint> {
             value: Some(mix(before.outcome.value?, after.outcome.value?)),
             low: Some(mix(low, next_low)),
             high: Some(mix(high, next_high)),
+            failed: before.outcome.failed.max(after.outcome.failed),
         },
     })
 }

@@ -141,8 +141,7 @@ def why(
     run: Path,
     question: str | None,
     *,
-    forks: int | None,
-    time: str | None,
+    budget: str | None,
     jobs: int | None,
     robots: Mapping[str, Callable[[], Robot]],
 ) -> str: ...

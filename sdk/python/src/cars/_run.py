@@ -292,7 +292,8 @@ def why(
     events at which it jumps.
 
     Robots of Rust are copied where a fork begins. Those of Python are made anew for each fork and executed again from the start of the
-    run, which takes as long as so many runs: give a ``budget``. What a robot raises ends its fork, which then has no outcome.
+    run, which takes as long as so many runs: give a ``budget``. What a robot raises ends its fork, which then has no outcome: the
+    sentence says in how many forks, and what the first of them raised.
 
     :param run: a run, or its name or folder.
     :param question: the name of an expectation or of a measure, a condition such as
@@ -309,12 +310,12 @@ def why(
     asked = run if isinstance(run, Run) else load(run, out=out)
     asked._check()
     makers = _arguments.makers("robots", robots)
-    is_time = isinstance(budget, str)
+    if budget is not None and not isinstance(budget, str):
+        budget = str(_arguments.whole("budget", budget, 1, 2**53 - 1))
     words = _cars.why(
         asked.folder,
         _arguments.text("question", question),
-        forks=None if budget is None or is_time else _arguments.whole("budget", budget, 1, 2**53 - 1),
-        time=_arguments.text("budget", budget) if is_time else None,
+        budget=budget,
         jobs=None if jobs is None else _arguments.whole("jobs", jobs, 1, MAX_JOBS),
         robots={of: maker(of, make) for of, make in makers.items()},
     )

@@ -51,7 +51,7 @@ class Why:
         """The expected outcome over the run: a row for each tick after which forks with other chance were played.
 
         ``value`` is their mean, a probability if the question is whether something happens; ``low`` and ``high`` are its interval of
-        95 %, and ``n`` the number of forks.
+        95 %, ``n`` the number of forks, and ``failed`` the number of those left out because a robot failed.
         """
         return self.frames().curve
 
@@ -74,6 +74,7 @@ class Why:
         points = self.answer["curve"]
         columns = self._moments(points)
         columns |= {name: [point[name] for point in points] for name in ("value", "low", "high", "n")}
+        columns["failed"] = [point.get("failed", 0) for point in points]
         return of_columns(columns, kind)
 
     def _jumps(self, kind: Optional[str]) -> Frame:
