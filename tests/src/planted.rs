@@ -1,4 +1,4 @@
-//! Robots with defects that hunts must find: a copy of Leguin, and one that needs two rare events.
+//! Robots with defects that hunts must find: a copy of Leguin, and two that need two rare events.
 
 use protocol::random::unit;
 use robot::{Action, BadParameters, Cars, Panel, Robot, StateVariables, Tick};
@@ -19,6 +19,8 @@ pub fn make(class: &str) -> Option<Box<dyn Robot>> {
     match class {
         "Leguin" => Some(Box::new(Planted::default())),
         "Gambler" => Some(Box::new(Gambler::default())),
+        "Teller" => Some(Box::new(Teller)),
+        "Hearer" => Some(Box::new(Hearer::default())),
         other => robots::make(other),
     }
 }
@@ -93,6 +95,61 @@ impl Robot for Gambler {
             .emotion("CALM")
             .behavior(behavior)
             .variable("was_lucky", self.was_lucky)
+    }
+
+    fn snapshot(&self) -> Option<Box<dyn Robot>> {
+        Some(Box::new(self.clone()))
+    }
+}
+
+/// Number of the commands of a teller, one in each tick.
+const TOLD: Tick = 600;
+/// Those of them that a hearer does not bear to miss both.
+const BOTH: [Tick; 2] = [200, 400];
+
+/// Broadcasts a command in each tick.
+#[derive(Clone)]
+struct Teller;
+
+impl Robot for Teller {
+    fn init(&mut self, _: &mut Cars<'_>) -> Result<(), BadParameters> {
+        Ok(())
+    }
+
+    fn tick(&mut self, cars: &mut Cars<'_>) -> Action {
+        if (1..=TOLD).contains(&cars.tick()) {
+            cars.broadcast("news", None);
+        }
+        Action::stay(cars).emotion("CALM").behavior("WORK")
+    }
+
+    fn snapshot(&self) -> Option<Box<dyn Robot>> {
+        Some(Box::new(self.clone()))
+    }
+}
+
+/// Breaks if two certain commands are both lost. The first loss is seen in a variable only.
+#[derive(Clone, Default)]
+struct Hearer {
+    has_missed: bool,
+    is_broken: bool,
+}
+
+impl Robot for Hearer {
+    fn init(&mut self, _: &mut Cars<'_>) -> Result<(), BadParameters> {
+        *self = Self::default();
+        Ok(())
+    }
+
+    fn tick(&mut self, cars: &mut Cars<'_>) -> Action {
+        let misses = cars.commands().is_empty();
+        self.has_missed |= misses && cars.tick() == BOTH[0] + 1;
+        self.is_broken |= misses && cars.tick() == BOTH[1] + 1 && self.has_missed;
+        let behavior = if self.is_broken { "BROKEN" } else { "WORK" };
+        Action::stay(cars)
+            .emotion("CALM")
+            .behavior(behavior)
+            .variable("has_missed", self.has_missed)
     }
 
     fn snapshot(&self) -> Option<Box<dyn Robot>> {
