@@ -10,7 +10,7 @@ use world::{Field, GuestWalk, Guests, Hall, Region, Shape, Shapes, Wall, Wheels}
 
 use super::change::{Change, Parent};
 use super::fault::Fault;
-use super::guests::{GuestRules, RecordedGuests};
+use super::guests::{GuestMotion, GuestRules};
 use super::lateness::Lateness;
 use super::layers::LayerSpec;
 use super::network::{Network, Radio};
@@ -57,8 +57,8 @@ pub struct Scenario {
     pub sensing: Sensing,
     /// The moving obstacles. The number of recorded ones is that of the record.
     pub guests: Guests,
-    /// The record of those that do not walk at random.
-    pub recorded_guests: Option<RecordedGuests>,
+    /// What moves them.
+    pub guest_motion: GuestMotion,
     /// What they do beside walking.
     pub guest_rules: GuestRules,
     /// The fixed obstacles.
@@ -225,10 +225,7 @@ impl Scenario {
     /// What moves the guests.
     #[must_use]
     pub fn guest_walk(&self) -> GuestWalk {
-        match &self.recorded_guests {
-            Some(recorded) => GuestWalk::Recorded(recorded.walk()),
-            None => GuestWalk::Random,
-        }
+        self.guest_motion.walk()
     }
 
     /// The initial environment; robots are in the order of their names. Recorded guests are no part of it.
@@ -247,7 +244,7 @@ impl Scenario {
         robots: impl Iterator<Item = &'a RobotSpec>,
     ) -> Hall {
         let mut guests = self.guests;
-        if self.recorded_guests.is_some() {
+        if self.guest_motion.recorded().is_some() {
             guests.count = 0;
         }
         let mut hall = Hall {

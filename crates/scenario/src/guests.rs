@@ -6,7 +6,39 @@ use std::num::NonZeroU64;
 use std::sync::Arc;
 
 use protocol::Tick;
-use world::{Recorded, Track};
+use world::{CrowdModel, GuestWalk, Recorded, Track};
+
+/// What moves the guests.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub enum GuestMotion {
+    /// The random walk of the paper.
+    #[default]
+    Random,
+    /// A record of people.
+    Recorded(RecordedGuests),
+    /// A model of how people walk, which gets guests where the random walk has them want to go.
+    Crowd(CrowdModel),
+}
+
+impl GuestMotion {
+    /// The record, if there is one.
+    #[must_use]
+    pub fn recorded(&self) -> Option<&RecordedGuests> {
+        match self {
+            Self::Recorded(recorded) => Some(recorded),
+            Self::Random | Self::Crowd(_) => None,
+        }
+    }
+
+    /// The same for the environment.
+    pub(crate) fn walk(&self) -> GuestWalk {
+        match self {
+            Self::Random => GuestWalk::Random,
+            Self::Recorded(recorded) => GuestWalk::Recorded(recorded.walk()),
+            Self::Crowd(model) => GuestWalk::Crowd(*model),
+        }
+    }
+}
 
 /// Guests who walk as recorded people did.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,7 +59,7 @@ pub struct RecordedGuests {
 
 impl RecordedGuests {
     /// The same for the environment.
-    pub(crate) fn walk(&self) -> Recorded {
+    fn walk(&self) -> Recorded {
         let thousand = NonZeroU64::MIN.saturating_add(999);
         let period_us = self.length_ms.saturating_mul(thousand);
         Recorded {

@@ -41,7 +41,7 @@ pub(super) enum PlacingCause<'a> {
 /// Places all bodies once.
 pub(super) fn check(scenario: &Scenario) -> Result<(), PlacingError> {
     let stream = protocol::random::stream(scenario.seed, "guests");
-    match World::new(&scenario.hall(), stream) {
+    match World::with_guests(&scenario.hall(), scenario.guest_walk(), stream) {
         Ok(_) => Ok(()),
         Err(error) => Err(PlacingError::of(error, &scenario.roster())),
     }
@@ -268,7 +268,9 @@ impl PlacingError {
             HallError::WallOffField { index, .. } | HallError::WallTooShort { index, .. } => {
                 PlacingCause::Wall(index)
             }
-            HallError::NoRoom { .. } | HallError::TooManyBodies { .. } => PlacingCause::Guests,
+            HallError::NoRoom { .. }
+            | HallError::NoCrowd { .. }
+            | HallError::TooManyBodies { .. } => PlacingCause::Guests,
             HallError::OutOfRange { name: "tick_s", .. } => PlacingCause::Tick,
             _ => PlacingCause::Field,
         }

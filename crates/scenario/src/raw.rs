@@ -255,8 +255,8 @@ impl ScenarioFile {
             },
             source,
         };
-        let recorded_guests = guests::recorded(guests, record_setting)?;
-        let guests = guests::walks(self.guests.as_ref(), recorded_guests.as_ref(), source)?;
+        let guest_motion = guests::motion(guests, record_setting)?;
+        let guests = guests::walks(self.guests.as_ref(), guest_motion.recorded(), source)?;
         let max_speed = field.and_then(|field| field.max_speed);
         let display_unit = field.and_then(|field| field.display_unit);
 
@@ -304,7 +304,7 @@ impl ScenarioFile {
             max_speed_mps: max_speed.unwrap_or(MAX_SPEED).0,
             sensing,
             guests,
-            recorded_guests,
+            guest_motion,
             guest_rules,
             obstacles: fixed
                 .obstacles
@@ -659,7 +659,7 @@ impl From<&checked::Scenario> for ScenarioFile {
             sensing: Some(SensingTable::from(&scenario.sensing)),
             guests: Some(unplaced(GuestsTable::of(
                 &scenario.guests,
-                scenario.recorded_guests.as_ref(),
+                &scenario.guest_motion,
                 &scenario.guest_rules,
                 tick_s,
             ))),
@@ -681,8 +681,8 @@ impl From<&checked::Scenario> for ScenarioFile {
             floor_plan: None,
             robots: robots.collect(),
             tracks: scenario
-                .recorded_guests
-                .as_ref()
+                .guest_motion
+                .recorded()
                 .map(|recorded| unplaced(TracksTable::of(recorded))),
         }
     }

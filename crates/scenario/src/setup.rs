@@ -134,7 +134,7 @@ impl Scenario {
         let count = setup.guests as usize;
         if let Err(reason) = check_guests(count) {
             errors.add("guests", &reason);
-        } else if self.recorded_guests.is_some() && count != self.guests.count {
+        } else if self.guest_motion.recorded().is_some() && count != self.guests.count {
             let recorded = self.guests.count;
             let reason =
                 format!("the guests of this run are recorded: there are {recorded} of them");

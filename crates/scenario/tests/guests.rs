@@ -9,7 +9,7 @@ use std::fs;
 use std::path::Path;
 
 use config::{Changes, FileError, Source};
-use scenario::Scenario;
+use scenario::{GuestMotion, Scenario};
 use world::{Point, Track};
 
 const ROBOT: &str = "[[robot]]\nname = \"A\"\nat = [\"8 m\", \"8 m\"]\n";
@@ -43,7 +43,7 @@ fn shown(result: Result<Scenario, FileError>) -> String {
 }
 
 fn tracks(scenario: &Scenario) -> &[Track] {
-    &scenario.recorded_guests.as_ref().unwrap().tracks
+    &scenario.guest_motion.recorded().unwrap().tracks
 }
 
 /// Times in ms and places of a track.
@@ -81,7 +81,7 @@ fn all_formats_are_read_into_the_same_tracks() {
         let read: Vec<_> = tracks(&scenario).iter().map(points).collect();
         assert_eq!(read, expected, "{text}");
         assert_eq!(scenario.guests.count, 2);
-        let recorded = scenario.recorded_guests.as_ref().unwrap();
+        let recorded = scenario.guest_motion.recorded().unwrap();
         assert_eq!(recorded.length_ms.get(), 1200);
         assert_eq!(recorded.catch_up_mps, 2.0);
         // They are no part of the hall that is placed.
@@ -258,9 +258,9 @@ fn what_cannot_be_of_a_record_is_refused_in_the_scenario() {
 fn a_start_that_is_drawn_stays_drawn_in_the_record() {
     let keys = "rate = 25\nstart = \"random\"\nloop = true";
     let scenario = load("0 1 5 5\n10 1 5 6\n", keys).unwrap();
-    assert_eq!(scenario.recorded_guests.as_ref().unwrap().start_ms, None);
+    assert_eq!(scenario.guest_motion.recorded().unwrap().start_ms, None);
     let read = parse(&scenario.to_toml().unwrap()).unwrap();
-    assert_eq!(read.recorded_guests, scenario.recorded_guests);
+    assert_eq!(read.guest_motion, scenario.guest_motion);
 }
 
 #[test]
@@ -270,7 +270,7 @@ fn a_random_model_reads_no_record() {
         "count = 3\nmodel = \"random\"",
     )
     .unwrap();
-    assert_eq!(scenario.recorded_guests, None);
+    assert_eq!(scenario.guest_motion, GuestMotion::Random);
     assert_eq!(scenario.guests.count, 3);
 }
 
@@ -281,7 +281,7 @@ fn the_record_has_the_tracks_and_finds_that_they_were_changed() {
     let scenario = load(text, keys).unwrap();
     let written = scenario.to_toml().unwrap();
     let read = parse(&written).unwrap();
-    assert_eq!(read.recorded_guests, scenario.recorded_guests);
+    assert_eq!(read.guest_motion, scenario.guest_motion);
     assert_eq!(read.to_toml().unwrap(), written);
     // Millimeters.
     assert_eq!(points(&tracks(&read)[0])[1], (400, 5.123, 6.0), "{written}");
@@ -405,4 +405,23 @@ fn the_record_that_is_shipped_is_that_of_its_formula() {
     };
     assert_eq!(present(0), 1);
     assert!((25..60).contains(&present(150)), "{}", present(150));
+}
+
+#[test]
+fn models_of_walking_are_written_and_read() {
+    for model in ["collision-free", "social-force"] {
+        let text = format!("[guests]\ncount = 5\nmodel = \"{model}\"\n{ROBOT}");
+        let scenario = parse(&text).unwrap();
+        assert_eq!(scenario.guests.count, 5);
+        assert_eq!(scenario.hall().guests.count, 5);
+        let written = scenario.to_toml().unwrap();
+        assert!(written.contains(&format!("model = \"{model}\"")), "{written}");
+        assert_eq!(parse(&written).unwrap().guest_motion, scenario.guest_motion);
+    }
+    let error = shown(parse(&format!("[guests]\ncount = 5\nmodel = \"boids\"\n{ROBOT}")));
+    assert!(error.contains("unknown variant"), "{error}");
+
+    let large = format!("[field]\nsize = [\"40 m\", \"40 m\"]\nbody = \"2 m\"\n[guests]\ncount = 5\nmodel = \"social-force\"\n{ROBOT}");
+    let error = shown(parse(&large));
+    assert!(error.contains("body_m of guests who walk by a model"), "{error}");
 }

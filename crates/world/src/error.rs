@@ -144,6 +144,11 @@ pub enum HallError {
         /// Index of the robot it overlaps; the first one if there are several.
         other: usize,
     },
+    /// Guests cannot walk by a model.
+    NoCrowd {
+        /// Why, in words.
+        reason: &'static str,
+    },
     /// The guests do not fit beside the obstacles and the robots.
     NoRoom {
         /// Number of guests requested.
@@ -226,6 +231,7 @@ impl fmt::Display for HallError {
                 let (robot, other) = (index + 1, other + 1);
                 write!(f, "robot {robot} at {at} m overlaps robot {other}")
             }
+            Self::NoCrowd { reason } => write!(f, "guests cannot walk by this model: {reason}"),
             Self::NoRoom { count, room } => {
                 write!(
                     f,

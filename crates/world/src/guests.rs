@@ -80,19 +80,25 @@ impl RandomWalk {
     pub(crate) fn courses(&self) -> &[Course] {
         &self.courses
     }
+
+    /// The course of a guest for the next tick. One whose course is over draws a new one first.
+    pub(crate) fn next(&mut self, index: usize, rng: &mut dyn Rng) -> Course {
+        let course = &mut self.courses[index];
+        if course.ticks_left == 0 {
+            *course = Course::draw(&self.guests, self.tick_s, rng);
+        }
+
+        course.ticks_left -= 1;
+        *course
+    }
 }
 
 impl GuestWalker for RandomWalk {
-    /// A guest whose course is over draws a new one first.
     fn advance(&mut self, floor: &mut GuestFloor<'_>, rng: &mut dyn Rng) {
-        for (index, course) in self.courses.iter_mut().enumerate() {
-            if course.ticks_left == 0 {
-                *course = Course::draw(&self.guests, self.tick_s, rng);
-            }
-
-            course.ticks_left -= 1;
+        for index in 0..self.courses.len() {
+            let course = self.next(index, rng);
             let step_m = match floor.direction(index) {
-                Some(direction) => direction * (course.speed_mps * self.tick_s),
+                Some(direction) => direction * (course.speed_mps * floor.tick_s()),
                 None => course.step_m,
             };
             floor.step(index, step_m);

@@ -6,7 +6,8 @@
 //!
 //! The rules are those of the paper (CARS, 2002, section "Obstacles"). Every body occupies a square of the same
 //! size, unless the hall gives it another [`Shape`] (chosen here, as are walls). Guests walk in a straight line for a while, then choose a new one, unless they react to a robot
-//! ([`Reaction`], chosen here), or walk as recorded people did ([`Recorded`], chosen here). A body whose proposed location collides is not advanced. How a robot reacts to a collision is up to the robot and not part of this crate.
+//! ([`Reaction`], chosen here), or walk as recorded people did ([`Recorded`], chosen here) or
+//! as a model of people has them ([`CrowdModel`], chosen here). A body whose proposed location collides is not advanced. How a robot reacts to a collision is up to the robot and not part of this crate.
 //!
 //! # One tick
 //!
@@ -76,6 +77,7 @@ mod reactions;
 mod shape;
 mod shapes;
 mod sight;
+mod social;
 mod solids;
 mod sweep;
 mod tracks;
@@ -96,6 +98,7 @@ pub use reactions::{Reaction, Response};
 pub use shape::{Shape, Wall};
 pub use shapes::Shapes;
 pub use sight::{Crossed, Opaque, is_hidden};
+pub use social::CrowdModel;
 pub use tracks::{Recorded, Track, TrackPoint};
 pub use triangular::Triangular;
 pub use walk::Passage;

@@ -10,6 +10,7 @@ use crate::placing::{place, place_absent};
 use crate::point::Point;
 use crate::reactions::{Reaction, directions};
 use crate::shape::{Shape, Wall};
+use crate::social::{CrowdModel, SocialWalk};
 use crate::tracks::{Recorded, RecordedWalk};
 use crate::walk::{GuestFloor, GuestOutcomes, GuestWalker, Passage};
 use crate::wheels::{DriveStep, Pose, Velocity, Wheels};
@@ -58,6 +59,8 @@ pub enum GuestWalk {
     Random,
     /// Recorded people, in the place of [`Hall::guests`].
     Recorded(Recorded),
+    /// A model of how people walk. What each guest wants is what the random walk by [`Hall::guests`] has it do.
+    Crowd(CrowdModel),
 }
 
 /// The guests, as what moves them has them.
@@ -65,6 +68,7 @@ pub enum GuestWalk {
 enum Crowd {
     Random(RandomWalk),
     Recorded(RecordedWalk),
+    Social(Box<SocialWalk>),
 }
 
 impl Crowd {
@@ -72,6 +76,7 @@ impl Crowd {
         match self {
             Self::Random(walk) => walk,
             Self::Recorded(walk) => walk,
+            Self::Social(walk) => walk.as_mut(),
         }
     }
 }
@@ -112,6 +117,14 @@ impl<R: Rng> World<R> {
                 let bodies = place(hall, &mut rng)?;
                 let walk = RandomWalk::new(hall.guests, hall.tick_s, &mut rng);
                 (bodies, Crowd::Random(walk))
+            }
+            GuestWalk::Crowd(model) => {
+                let mut bodies = place(hall, &mut rng)?;
+                let wishes = RandomWalk::new(hall.guests, hall.tick_s, &mut rng);
+                let mut outcomes = GuestOutcomes::default();
+                let floor = GuestFloor::new(&mut bodies, &[], &mut outcomes, hall.tick_s);
+                let walk = SocialWalk::new(model, hall, wishes, &floor)?;
+                (bodies, Crowd::Social(Box::new(walk)))
             }
             GuestWalk::Recorded(recorded) => {
                 let count = recorded.tracks.len();
@@ -361,7 +374,7 @@ impl<R> World<R> {
     #[must_use]
     pub fn has_passages(&self) -> bool {
         match self.crowd {
-            Crowd::Random(_) => false,
+            Crowd::Random(_) | Crowd::Social(_) => false,
             Crowd::Recorded(_) => true,
         }
     }
@@ -418,6 +431,7 @@ impl<R> World<R> {
     pub fn courses(&self) -> &[Course] {
         match &self.crowd {
             Crowd::Random(walk) => walk.courses(),
+            Crowd::Social(walk) => walk.wishes().courses(),
             Crowd::Recorded(_) => &[],
         }
     }

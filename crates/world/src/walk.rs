@@ -1,8 +1,9 @@
 //! What moves the guests of a run: one trait, and what it is done to.
 
-use crate::bodies::{Blocker, Bodies};
+use crate::bodies::{Blocker, Bodies, Body};
 use crate::hall::Field;
 use crate::point::Point;
+use crate::shape::Wall;
 use rand::Rng;
 
 /// Moves the guests, tick by tick. What a walk does is a function of its state, the floor and what it draws.
@@ -68,6 +69,27 @@ impl<'a> GuestFloor<'a> {
 
     pub(crate) fn field(&self) -> &Field {
         self.bodies.field()
+    }
+
+    pub(crate) fn obstacles(&self) -> &[Point] {
+        self.bodies.obstacles()
+    }
+
+    pub(crate) fn walls(&self) -> &[Wall] {
+        self.bodies.walls()
+    }
+
+    pub(crate) fn robots(&self) -> &[Point] {
+        self.bodies.robots()
+    }
+
+    pub(crate) fn guests(&self) -> &[Point] {
+        self.bodies.guests()
+    }
+
+    /// Half extents of a body along x and y, m.
+    pub(crate) fn half_m(&self, body: Body) -> (f64, f64) {
+        self.bodies.footprint(body).half_m()
     }
 
     /// Where a guest stands, or has stood last.

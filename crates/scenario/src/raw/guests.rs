@@ -9,7 +9,7 @@ use config::units::{Angle, Length, Speed, Time};
 use config::{FileError, Source, shipped};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
-use world::{Field, Point};
+use world::{CrowdModel, Field, Point};
 
 use super::folders::Folders;
 use super::numbers::{Range, positive, triangular};
@@ -18,7 +18,7 @@ use super::tracks::TracksTable;
 use super::unplaced::unplaced;
 use crate::checked::check_guests;
 use crate::files::RECORDING;
-use crate::guests::{Faces, GuestRules, RecordedGuests, Requests};
+use crate::guests::{Faces, GuestMotion, GuestRules, RecordedGuests, Requests};
 use crate::network::ticks;
 use crate::tracks::{self, MAX_RATE_HZ, TrackFormat, TrackPlacement, TrackSet, is_rate};
 
@@ -71,6 +71,8 @@ pub(super) struct GuestsTable {
 enum GuestModel {
     Random,
     Recorded,
+    CollisionFree,
+    SocialForce,
 }
 
 /// Time of the record at the start of the run.
@@ -159,15 +161,24 @@ pub(super) struct RecordSetting<'a> {
     pub(super) source: &'a Source,
 }
 
-/// The record by which guests walk, if they do not walk at random.
-pub(super) fn recorded(
+/// What moves the guests.
+pub(super) fn motion(
     table: Option<&GuestsTable>,
     setting: RecordSetting<'_>,
-) -> Result<Option<RecordedGuests>, FileError> {
-    let source = setting.source;
-    let Some(table) = table.filter(|table| table.is_recorded(setting.tracks)) else {
-        return Ok(None);
+) -> Result<GuestMotion, FileError> {
+    let Some(table) = table else {
+        return Ok(GuestMotion::Random);
     };
+    Ok(match table.model(setting.tracks) {
+        GuestModel::Random => GuestMotion::Random,
+        GuestModel::Recorded => GuestMotion::Recorded(recorded(table, setting)?),
+        GuestModel::CollisionFree => GuestMotion::Crowd(CrowdModel::CollisionFree),
+        GuestModel::SocialForce => GuestMotion::Crowd(CrowdModel::SocialForce),
+    })
+}
+
+fn recorded(table: &GuestsTable, setting: RecordSetting<'_>) -> Result<RecordedGuests, FileError> {
+    let source = setting.source;
 
     let (set, span) = match setting.tracks {
         Some(tracks) => {
@@ -204,7 +215,7 @@ pub(super) fn recorded(
     };
     check_seen(&recorded, &setting.field)
         .map_err(|reason| FileError::at(source, Some(span), &reason))?;
-    Ok(Some(recorded))
+    Ok(recorded)
 }
 
 /// Checks that somebody is on the field at some time.
@@ -277,10 +288,11 @@ fn range_m(source: &Source, range: Option<&Spanned<Length>>) -> Result<f64, File
 }
 
 impl GuestsTable {
-    fn is_recorded(&self, tracks: Option<&Spanned<TracksTable>>) -> bool {
-        match self.model.as_ref().map(Spanned::get_ref) {
-            Some(model) => *model == GuestModel::Recorded,
-            None => self.from.is_some() || tracks.is_some(),
+    fn model(&self, tracks: Option<&Spanned<TracksTable>>) -> GuestModel {
+        match &self.model {
+            Some(model) => *model.get_ref(),
+            None if self.from.is_some() || tracks.is_some() => GuestModel::Recorded,
+            None => GuestModel::Random,
         }
     }
 
@@ -363,7 +375,7 @@ impl GuestsTable {
     /// The table as it is written from a scenario.
     pub(super) fn of(
         guests: &world::Guests,
-        recorded: Option<&RecordedGuests>,
+        motion: &GuestMotion,
         rules: &GuestRules,
         tick_s: f64,
     ) -> Self {
@@ -379,7 +391,13 @@ impl GuestsTable {
             patience: Some(unplaced(Time(requests.patience as f64 * tick_s))),
         });
 
-        let model = recorded.map(|_| unplaced(GuestModel::Recorded));
+        let model = match motion {
+            GuestMotion::Random => None,
+            GuestMotion::Recorded(_) => Some(GuestModel::Recorded),
+            GuestMotion::Crowd(CrowdModel::CollisionFree) => Some(GuestModel::CollisionFree),
+            GuestMotion::Crowd(CrowdModel::SocialForce) => Some(GuestModel::SocialForce),
+        };
+        let recorded = motion.recorded();
         let from = recorded.filter(|recorded| !recorded.from.is_empty());
         let start = recorded.map(|recorded| match recorded.start_ms {
             Some(start_ms) => RecordStart::At(Time(start_ms as f64 / 1000.0)),
@@ -388,7 +406,7 @@ impl GuestsTable {
         let catch_up = recorded.map(|recorded| unplaced(Speed(recorded.catch_up_mps)));
         Self {
             count: Some(unplaced(guests.count)),
-            model,
+            model: model.map(unplaced),
             from: from.map(|recorded| unplaced(PathBuf::from(&recorded.from))),
             format: None,
             unit: None,

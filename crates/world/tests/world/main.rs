@@ -14,4 +14,5 @@ mod reactions;
 mod recorded;
 mod shapes;
 mod sight;
+mod social;
 mod wheels;
