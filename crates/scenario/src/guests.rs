@@ -99,4 +99,8 @@ pub struct Requests {
     pub range_m: f64,
     /// After how many ticks in which a guest has waited in vain it is annoyed.
     pub patience: Tick,
+    /// For how many ticks a guest stops that has got something, while the robot is near; 0 if it walks on.
+    pub stop: Tick,
+    /// Whether a guest that waits comes to the robot that it asked in vain, while that is near.
+    pub comes_closer: bool,
 }

@@ -32,6 +32,10 @@ struct Guest {
     mood: GuestMood,
     /// The tick in which the mood began.
     since: Tick,
+    /// The robot that it asked last, by index.
+    robot: usize,
+    /// It stops up to this tick, which is not part of it.
+    stops_until: Tick,
 }
 
 impl GuestState {
@@ -39,6 +43,8 @@ impl GuestState {
         let content = Guest {
             mood: GuestMood::Content,
             since: 0,
+            robot: 0,
+            stops_until: 0,
         };
         let count = if rules.requests.is_some() { count } else { 0 };
         Self {
@@ -61,7 +67,34 @@ impl GuestState {
             robot,
             range_m: faces.range_m,
             response: response(faces, face)?,
+            guest: None,
         })
+    }
+
+    /// What single guests do in a tick at the robot that they asked last: those that got something stop, and those that wait come
+    /// closer, if the scenario has it.
+    pub(crate) fn own_reactions(&self, tick: Tick) -> Vec<Reaction> {
+        let Some(requests) = self.rules.requests else {
+            return Vec::new();
+        };
+
+        let mut reactions = Vec::new();
+        for (index, guest) in self.guests.iter().enumerate() {
+            let response = if guest.stops_until > tick {
+                Response::Stay
+            } else if requests.comes_closer && guest.mood == GuestMood::Waiting {
+                Response::Approach
+            } else {
+                continue;
+            };
+            reactions.push(Reaction {
+                robot: guest.robot,
+                range_m: requests.range_m,
+                response,
+                guest: Some(index),
+            });
+        }
+        reactions
     }
 
     /// Those of these guests that are not content, by their index among them, by mood.
@@ -105,7 +138,7 @@ impl GuestState {
             }
 
             let near = nearest_first(world, robot, requests.range_m);
-            self.ask(&near, served, missed, tick);
+            self.ask(&near, [served, missed], tick, (robot, requests.stop));
             if cheers {
                 self.cheer(&near, tick);
             }
@@ -135,7 +168,15 @@ impl GuestState {
     }
 
     /// So many of the nearest guests get what they ask for, and so many ask in vain. Who has waited is served first.
-    fn ask(&mut self, near: &[usize], served: u64, missed: u64, tick: Tick) {
+    ///
+    /// Those that are served stop for so many ticks from the next one on.
+    fn ask(
+        &mut self,
+        near: &[usize],
+        [served, missed]: [u64; 2],
+        tick: Tick,
+        (robot, stop): (usize, Tick),
+    ) {
         let mut asking: Vec<usize> = near.to_vec();
         // The sort is stable: among the waiting, and among the content, the nearest is first.
         asking.sort_by_key(|guest| self.guests[*guest].mood == GuestMood::Content);
@@ -144,13 +185,19 @@ impl GuestState {
         let missed = usize::try_from(missed).unwrap_or(usize::MAX);
         let (lucky, others) = asking.split_at(served.min(asking.len()));
         for guest in lucky {
-            self.guests[*guest].set_mood(GuestMood::Content, tick);
+            let guest = &mut self.guests[*guest];
+            guest.set_mood(GuestMood::Content, tick);
+            guest.robot = robot;
+            if stop > 0 {
+                guest.stops_until = tick + 1 + stop;
+            }
         }
         let content = others
             .iter()
             .filter(|guest| self.guests[**guest].mood == GuestMood::Content);
         for guest in content.copied().take(missed).collect::<Vec<_>>() {
             self.guests[guest].set_mood(GuestMood::Waiting, tick);
+            self.guests[guest].robot = robot;
         }
     }
 
@@ -167,7 +214,8 @@ impl GuestState {
 impl Guest {
     fn set_mood(&mut self, mood: GuestMood, tick: Tick) {
         if self.mood != mood {
-            *self = Self { mood, since: tick };
+            self.mood = mood;
+            self.since = tick;
         }
     }
 }
@@ -372,6 +420,34 @@ mod tests {
                 assert_eq!(events, []);
             }
         }
+    }
+
+    #[test]
+    fn who_is_served_stops_and_who_waits_comes_closer_if_the_rules_say_so() {
+        let rules = format!("{RULES}stop = \"1 s\"\ncome_closer = true\n");
+        let responses = |hall: &(World<Stream>, GuestState), tick| {
+            let reactions = hall.1.own_reactions(tick).into_iter();
+            let mut found: Vec<Response> = reactions.map(|reaction| reaction.response).collect();
+            found.sort_by_key(|response| format!("{response:?}"));
+            found
+        };
+
+        let mut hall = hall(&rules);
+        after(&mut hall, 0, &report("neutral", 0.0, 0.0, &[]));
+        after(&mut hall, 1, &report("neutral", 1.0, 1.0, &[]));
+        // A stop of 1 s are ticks 2 and 3.
+        for tick in [2, 3] {
+            assert_eq!(responses(&hall, tick), [Response::Approach, Response::Stay]);
+        }
+        assert_eq!(responses(&hall, 4), [Response::Approach]);
+        // Annoyed, it does not come.
+        after(&mut hall, 5, &report("neutral", 1.0, 1.0, &[]));
+        assert_eq!(responses(&hall, 6), []);
+
+        let mut plain = self::hall(RULES);
+        after(&mut plain, 0, &report("neutral", 0.0, 0.0, &[]));
+        after(&mut plain, 1, &report("neutral", 1.0, 1.0, &[]));
+        assert_eq!(responses(&plain, 2), []);
     }
 
     #[test]

@@ -751,11 +751,11 @@ impl Simulation {
         }
     }
 
-    /// What guests do in the tick at the robots' faces.
+    /// What guests do in the tick at the robots' faces, and at those that they asked.
     fn reactions(&self) -> Vec<Reaction> {
         let mut reactions = Vec::new();
         if !self.guests.sees_faces() {
-            return reactions;
+            return self.guests.own_reactions(self.now);
         }
 
         for (index, name) in self.names.iter().enumerate() {
@@ -768,6 +768,8 @@ impl Simulation {
                 reactions.extend(self.guests.reaction(index, report));
             }
         }
+        // At the same robot a face counts more.
+        reactions.extend(self.guests.own_reactions(self.now));
         reactions
     }
 

@@ -16,6 +16,8 @@ pub struct Reaction {
     pub range_m: f64,
     /// What they do.
     pub response: Response,
+    /// Only this guest reacts; all in the range without it.
+    pub guest: Option<usize>,
 }
 
 /// What a guest does at a robot, at the speed of its course.
@@ -24,6 +26,8 @@ pub enum Response {
     /// Steps aside, at a right angle to where the robot means to move, if it stands in the robot's way: ahead of it, and less
     /// than two bodies from its line. From a robot that means to stay, it steps straight away.
     MakeWay,
+    /// Stays where it is.
+    Stay,
     /// Comes straight to the robot, until the centers are two bodies apart, and stays there.
     Approach,
 }
@@ -44,6 +48,9 @@ pub(crate) fn directions(
             let Body::Guest(guest) = near.body else {
                 continue;
             };
+            if reaction.guest.is_some_and(|only| only != guest) {
+                continue;
+            }
             let distance_m2 = (near.center - center).length_squared_m2();
             if nearest[guest].is_none_or(|(least_m2, _)| distance_m2 < least_m2) {
                 nearest[guest] = Some((distance_m2, reaction));
@@ -69,6 +76,7 @@ impl Response {
     /// `offset` is where the guest stands as seen from the robot, m.
     fn direction(self, offset: Point, heading: Point, body_m: f64) -> Option<Point> {
         match self {
+            Self::Stay => Some(Point::default()),
             Self::Approach => {
                 let is_there = offset.length_squared_m2() <= 4.0 * body_m * body_m;
                 if is_there {

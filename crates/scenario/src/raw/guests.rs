@@ -119,6 +119,8 @@ struct FacesTable {
 struct RequestsTable {
     range: Option<Spanned<Length>>,
     patience: Option<Spanned<Time>>,
+    stop: Option<Spanned<Time>>,
+    come_closer: Option<bool>,
 }
 
 /// How guests walk; the number of recorded ones is that of the record.
@@ -278,6 +280,15 @@ pub(super) fn rules(
         rules.requests = Some(Requests {
             range_m: range_m(source, requests.range.as_ref())?,
             patience: ticks(patience_s, tick_s).max(1),
+            stop: match &requests.stop {
+                Some(_) => {
+                    let stop = requests.stop.as_ref();
+                    let stop_s = positive(source, stop, Time(1.0), "how long a guest stops")?.0;
+                    ticks(stop_s, tick_s).max(1)
+                }
+                None => 0,
+            },
+            comes_closer: requests.come_closer.unwrap_or(false),
         });
     }
     Ok(rules)
@@ -389,6 +400,8 @@ impl GuestsTable {
         let requests = rules.requests.as_ref().map(|requests| RequestsTable {
             range: Some(unplaced(Length(requests.range_m))),
             patience: Some(unplaced(Time(requests.patience as f64 * tick_s))),
+            stop: (requests.stop > 0).then(|| unplaced(Time(requests.stop as f64 * tick_s))),
+            come_closer: requests.comes_closer.then_some(true),
         });
 
         let model = match motion {

@@ -31,6 +31,7 @@ fn reaction(robot: usize, response: Response) -> Reaction {
         robot,
         range_m: 2.0,
         response,
+        guest: None,
     }
 }
 
@@ -145,6 +146,7 @@ proptest! {
                 robot,
                 range_m,
                 response: responses[(tick / 50 + robot) % 2],
+                guest: None,
             });
             let drift = Point::new(0.01, if tick % 40 < 20 { 0.02 } else { -0.02 });
             let proposals: Vec<_> = moved.robots().iter().map(|&at| Some(at + drift)).collect();
@@ -155,4 +157,33 @@ proptest! {
         }
         prop_assert_ne!(moved.guests(), calm.guests());
     }
+}
+
+#[test]
+fn a_reaction_of_one_guest_moves_no_other_and_one_that_stays_stays() {
+    let mut hall = reception(40);
+    hall.robots = vec![MIDDLE];
+    let mut world = World::new(&hall, rng(6)).unwrap();
+    let start = world.guests().to_vec();
+    let mut calm = world.clone();
+    for _ in 0..10 {
+        calm.advance(&[None]);
+    }
+
+    let walker = (0..40).find(|&guest| calm.guests()[guest] != start[guest]);
+    let walker = walker.unwrap();
+    let stay = Reaction {
+        guest: Some(walker),
+        range_m: 100.0,
+        ..reaction(0, Response::Stay)
+    };
+    for _ in 0..10 {
+        world.advance_with(&[None], &[stay]);
+    }
+    assert_eq!(world.guests()[walker], start[walker]);
+    assert_eq!(world.courses(), calm.courses());
+    let moved = world.guests().iter().zip(calm.guests());
+    let others = moved.filter(|(at, other)| at != other).count();
+    // That one, and those in whose way it stands.
+    assert!((1..8).contains(&others), "{others}");
 }

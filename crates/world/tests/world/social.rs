@@ -95,6 +95,7 @@ fn guests_of_a_model_react_to_robots() {
             robot: 0,
             range_m: 100.0,
             response: Response::Approach,
+            guest: None,
         };
         let distance_m = |world: &crate::halls::TestWorld| world.guests()[0].distance_m(world.robots()[0]);
         let before_m = distance_m(&world);
