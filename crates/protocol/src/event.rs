@@ -222,7 +222,7 @@ pub enum Event {
         /// Its mood now.
         mood: GuestMood,
     },
-    /// A guest has entered the field. Guests of runs in which none enters are there from the beginning.
+    /// A guest has entered the field. Guests that are placed at the beginning are there without it.
     GuestEntered {
         /// Which, counted from 0.
         guest: u32,

@@ -6,11 +6,13 @@ use observe::{Expectation, RunSetting, ScenarioMeasure, TickCondition};
 use protocol::messages::{DisplayUnit, Parameters, Point};
 use protocol::{RobotName, Tick};
 use serde::{Deserialize, Serialize};
-use world::{Field, GuestWalk, Guests, Hall, Region, Shape, Shapes, Wall, Wheels};
+use world::{
+    CrowdGuests, Field, Goal, GuestWalk, Guests, Hall, Region, Shape, Shapes, Wall, Want, Wheels,
+};
 
 use super::change::{Change, Parent};
 use super::fault::Fault;
-use super::guests::{GuestMotion, GuestRules};
+use super::guests::{GuestMotion, GuestRules, GuestWant, WantGoal};
 use super::lateness::Lateness;
 use super::layers::LayerSpec;
 use super::network::{Network, Radio};
@@ -225,7 +227,45 @@ impl Scenario {
     /// What moves the guests.
     #[must_use]
     pub fn guest_walk(&self) -> GuestWalk {
-        self.guest_motion.walk()
+        match &self.guest_motion {
+            GuestMotion::Random => GuestWalk::Random,
+            GuestMotion::Recorded(recorded) => GuestWalk::Recorded(recorded.walk()),
+            GuestMotion::Crowd(guests) => GuestWalk::Crowd(CrowdGuests {
+                model: guests.model,
+                wants: guests.wants.iter().map(|want| self.want(want)).collect(),
+            }),
+        }
+    }
+
+    /// What guests want, where it is in the environment.
+    fn want(&self, want: &GuestWant) -> Want {
+        let goal = match &want.goal {
+            WantGoal::Site(name) => {
+                let site = self.sites.get(name);
+                Goal::Place(self.inside(site.map_or_else(Default::default, |site| to_world(site.at))))
+            }
+            WantGoal::Place(at) => Goal::Place(self.inside(*at)),
+            WantGoal::Exit(at) => Goal::Exit(self.inside(*at)),
+            WantGoal::Treat(name) => {
+                let mut robots = self.robots.keys();
+                Goal::Robot(robots.position(|robot| robot == name).unwrap_or_default())
+            }
+        };
+        Want {
+            goal,
+            weight: want.weight,
+            within_m: want.within_m,
+            stay_s: want.stay_s,
+            give_up: want.give_up,
+        }
+    }
+
+    /// The closest place where a body is inside the field.
+    fn inside(&self, at: world::Point) -> world::Point {
+        let half_m = self.body_m / 2.0;
+        let [width_m, height_m] = self.field_m;
+        let within = |x: f64, side_m: f64| x.min(side_m - half_m).max(half_m);
+        world::Point::new(within(at.x, width_m), within(at.y, height_m))
     }
 
     /// The initial environment; robots are in the order of their names. Recorded guests are no part of it.

@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 use std::num::NonZeroU64;
 use std::sync::Arc;
 
-use protocol::Tick;
-use world::{CrowdModel, GuestWalk, Recorded, Track};
+use protocol::{RobotName, Tick};
+use world::{CrowdModel, Point, Recorded, Track, Triangular};
 
 /// What moves the guests.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -16,8 +16,8 @@ pub enum GuestMotion {
     Random,
     /// A record of people.
     Recorded(RecordedGuests),
-    /// A model of how people walk, which gets guests where the random walk has them want to go.
-    Crowd(CrowdModel),
+    /// A model of how people walk.
+    Crowd(ModeledGuests),
 }
 
 impl GuestMotion {
@@ -29,15 +29,43 @@ impl GuestMotion {
             Self::Random | Self::Crowd(_) => None,
         }
     }
+}
 
-    /// The same for the environment.
-    pub(crate) fn walk(&self) -> GuestWalk {
-        match self {
-            Self::Random => GuestWalk::Random,
-            Self::Recorded(recorded) => GuestWalk::Recorded(recorded.walk()),
-            Self::Crowd(model) => GuestWalk::Crowd(*model),
-        }
-    }
+/// Guests who walk by a model of how people walk.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModeledGuests {
+    /// The model.
+    pub model: CrowdModel,
+    /// What they want, one thing after the other. Without any they want what the random walk has them do.
+    pub wants: Vec<GuestWant>,
+}
+
+/// One of the things that guests want.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GuestWant {
+    /// What it is.
+    pub goal: WantGoal,
+    /// How often it is wanted, in proportion to the others.
+    pub weight: f64,
+    /// How near a guest goes to it, meters.
+    pub within_m: f64,
+    /// For how long a guest stays there, seconds; for an exit, outside: without it, for good.
+    pub stay_s: Option<Triangular>,
+    /// How long a guest tries, ticks.
+    pub give_up: Tick,
+}
+
+/// What guests want.
+#[derive(Debug, Clone, PartialEq)]
+pub enum WantGoal {
+    /// A site, by name.
+    Site(String),
+    /// A place, meters.
+    Place(Point),
+    /// To leave at a place, meters.
+    Exit(Point),
+    /// Something that a robot counts as served.
+    Treat(RobotName),
 }
 
 /// Guests who walk as recorded people did.
@@ -59,7 +87,7 @@ pub struct RecordedGuests {
 
 impl RecordedGuests {
     /// The same for the environment.
-    fn walk(&self) -> Recorded {
+    pub(crate) fn walk(&self) -> Recorded {
         let thousand = NonZeroU64::MIN.saturating_add(999);
         let period_us = self.length_ms.saturating_mul(thousand);
         Recorded {

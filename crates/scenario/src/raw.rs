@@ -21,6 +21,7 @@ mod solids;
 mod times;
 mod tracks;
 mod unplaced;
+mod want;
 pub(super) mod words;
 
 use std::collections::BTreeMap;
@@ -55,11 +56,13 @@ use solids::{Fixed, FloorPlanTable, ObstacleTable, Size, WallTable};
 use times::Times;
 use tracks::TracksTable;
 use unplaced::unplaced;
+use want::WantSetting;
 
 pub(super) use expect::Expectations;
 
 use super::change::Parent;
 use super::checked::{self, DEFAULT_SEED, RecordContents, RobotSpec, inradii_m, to_wire, to_world};
+use super::guests::GuestMotion;
 use super::lateness::Lateness;
 use super::network::Radio;
 use super::placing::{self, PlacingCause, PlacingError};
@@ -255,7 +258,8 @@ impl ScenarioFile {
             },
             source,
         };
-        let guest_motion = guests::motion(guests, record_setting)?;
+        let mut guest_motion = guests::motion(guests, record_setting)?;
+        let wants = guests.map_or(&[][..], |table| &table.wants);
         let guests = guests::walks(self.guests.as_ref(), guest_motion.recorded(), source)?;
         let max_speed = field.and_then(|field| field.max_speed);
         let display_unit = field.and_then(|field| field.display_unit);
@@ -276,6 +280,19 @@ impl ScenarioFile {
                 source,
             },
         )?;
+        if let GuestMotion::Crowd(guests) = &mut guest_motion {
+            guests.wants = want::check(
+                wants,
+                &WantSetting {
+                    sites: &sites,
+                    robots: &robots,
+                    field_m: size.0.map(|length| length.0),
+                    has_requests: guest_rules.requests.is_some(),
+                    tick_s,
+                    source,
+                },
+            )?;
+        }
         let record = record(self.record, source)?;
         let network = network::check(self.network, &robots, tick_s, source)?;
         let faults = fault::check(self.faults, &robots, &lateness, tick_s, settled, source)?;

@@ -9,7 +9,7 @@ use std::fs;
 use std::path::Path;
 
 use config::{Changes, FileError, Source};
-use scenario::{GuestMotion, Scenario};
+use scenario::{GuestMotion, Scenario, WantGoal};
 use world::{Point, Track};
 
 const ROBOT: &str = "[[robot]]\nname = \"A\"\nat = [\"8 m\", \"8 m\"]\n";
@@ -424,4 +424,70 @@ fn models_of_walking_are_written_and_read() {
     let large = format!("[field]\nsize = [\"40 m\", \"40 m\"]\nbody = \"2 m\"\n[guests]\ncount = 5\nmodel = \"social-force\"\n{ROBOT}");
     let error = shown(parse(&large));
     assert!(error.contains("body_m of guests who walk by a model"), "{error}");
+}
+
+#[test]
+fn what_guests_want_is_written_and_read() {
+    let text = format!(
+        "[guests]\ncount = 5\n\
+         wants = [{{ site = \"bar\", weight = 2 }}, {{ at = [\"3 m\", \"4 m\"], within = \"2 m\", stay = {{ min = \"1 s\", mode = \"2 s\", max = \"3 s\" }} }}, \
+         {{ exit = [\"0 m\", \"7 m\"], give_up = \"30 s\" }}, {{ treat = \"A\" }}]\n\
+         [guests.requests]\n[[site]]\nname = \"bar\"\nat = [\"9 m\", \"9 m\"]\n{ROBOT}"
+    );
+    let scenario = parse(&text).unwrap();
+    let GuestMotion::Crowd(guests) = &scenario.guest_motion else {
+        panic!("{:?}", scenario.guest_motion);
+    };
+    assert_eq!(guests.wants.len(), 4);
+    assert_eq!(guests.wants[0].goal, WantGoal::Site("bar".to_owned()));
+    assert_eq!(guests.wants[2].stay_s, None);
+    assert_eq!(guests.wants[2].give_up, 60);
+    let written = scenario.to_toml().unwrap();
+    let read = parse(&written).unwrap();
+    assert_eq!(read.guest_motion, scenario.guest_motion, "{written}");
+    assert_eq!(read.to_toml().unwrap(), written);
+
+    // In the environment bodies are within the edge.
+    let world::GuestWalk::Crowd(walk) = scenario.guest_walk() else {
+        panic!("they walk by a model");
+    };
+    assert_eq!(walk.wants[0].goal, world::Goal::Place(Point::new(9.0, 9.0)));
+    assert_eq!(walk.wants[2].goal, world::Goal::Exit(Point::new(0.3048, 7.0)));
+    assert_eq!(walk.wants[3].goal, world::Goal::Robot(0));
+}
+
+#[test]
+fn what_guests_cannot_want_is_refused() {
+    let of = |want: &str| {
+        let text = format!("[guests]\ncount = 5\nwants = [{{ {want} }}]\n{ROBOT}");
+        shown(parse(&text))
+    };
+    for (want, reason) in [
+        ("weight = 1", "guests want one of these"),
+        ("site = \"bar\", treat = \"A\"", "guests want one of these"),
+        ("site = \"bar\"", "there is no [[site]] called bar"),
+        ("treat = \"B\"", "there is no robot called B"),
+        ("treat = \"A\"", "add that table"),
+        ("at = [\"3 m\", \"99 m\"]", "not on the field"),
+        ("exit = [\"1 m\", \"1 m\"], weight = 0", "a weight must be more than zero"),
+        ("exit = [\"1 m\", \"1 m\"], weight = 1e7", "a weight is at most"),
+        ("exit = [\"1 m\", \"1 m\"], within = \"0 m\"", "more than zero"),
+        ("exit = [\"1 m\", \"1 m\"], color = 1", "unknown field"),
+    ] {
+        let error = of(want);
+        assert!(error.contains(reason), "{want}: {error}");
+    }
+
+    let many = vec!["{ at = [\"3 m\", \"3 m\"] }"; 65].join(", ");
+    let error = shown(parse(&format!("[guests]\ncount = 5\nwants = [{many}]\n{ROBOT}")));
+    assert!(error.contains("more than 64 things to want"), "{error}");
+
+    let random = "[guests]\ncount = 5\nmodel = \"random\"\nwants = [{ at = [\"3 m\", \"3 m\"] }]\n";
+    let error = shown(parse(&format!("{random}{ROBOT}")));
+    assert!(error.contains("walk by a model"), "{error}");
+
+    let stay = "stay = { min = \"1 s\", mode = \"2 s\", max = \"3 s\" }";
+    let text = format!("[guests]\ncount = 5\nwants = [{{ treat = \"A\", {stay} }}]\n[guests.requests]\n{ROBOT}");
+    let error = shown(parse(&text));
+    assert!(error.contains("waits at the robot"), "{error}");
 }

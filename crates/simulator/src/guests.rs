@@ -25,6 +25,8 @@ pub(crate) struct GuestState {
     guests: Vec<Guest>,
     /// What each robot has counted up to its last report: served, missed.
     counted: BTreeMap<RobotName, [f64; 2]>,
+    /// The guests that were served in the last tick, and the robots that did it, by index.
+    served: Vec<(usize, usize)>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -51,7 +53,13 @@ impl GuestState {
             rules,
             guests: vec![content; count],
             counted: BTreeMap::new(),
+            served: Vec::new(),
         }
+    }
+
+    /// The guests that were served in the last tick, and the robots that did it, by index.
+    pub(crate) fn served(&self) -> &[(usize, usize)] {
+        &self.served
     }
 
     /// Whether guests see faces at all.
@@ -128,6 +136,7 @@ impl GuestState {
             return Vec::new();
         };
 
+        self.served.clear();
         let before: Vec<GuestMood> = self.guests.iter().map(|guest| guest.mood).collect();
         for (robot, name, report) in reports {
             let [served, missed] = self.count(name, &report.state_variables);
@@ -184,8 +193,9 @@ impl GuestState {
         let served = usize::try_from(served).unwrap_or(usize::MAX);
         let missed = usize::try_from(missed).unwrap_or(usize::MAX);
         let (lucky, others) = asking.split_at(served.min(asking.len()));
-        for guest in lucky {
-            let guest = &mut self.guests[*guest];
+        for &guest in lucky {
+            self.served.push((guest, robot));
+            let guest = &mut self.guests[guest];
             guest.set_mood(GuestMood::Content, tick);
             guest.robot = robot;
             if stop > 0 {

@@ -27,7 +27,8 @@ use crate::medium::{Arrival, ForcedVerdict, Medium, SentCommand};
 use crate::sensing::{Viewpoint, ranges_m};
 use crate::sites::{SiteOrders, Sites};
 use scenario::{
-    ChanceKind, Change, FaultEnd, Lateness, Override, Reseed, Scenario, to_wire, to_world,
+    ChanceKind, Change, FaultEnd, GuestMotion, Lateness, Override, Reseed, Scenario, to_wire,
+    to_world,
 };
 
 /// Most bodies in the news of a robot, so that the news fit into a message.
@@ -151,7 +152,10 @@ impl Simulation {
     /// [`HallError`] if its bodies cannot be placed.
     pub fn new(scenario: Scenario, epoch: Epoch) -> Result<Self, HallError> {
         let walk = scenario.guest_walk();
-        let world = World::with_guests(&scenario.hall(), walk, stream(scenario.seed, "guests"))?;
+        let mut world = World::with_guests(&scenario.hall(), walk, stream(scenario.seed, "guests"))?;
+        if let GuestMotion::Crowd(_) = scenario.guest_motion {
+            world.set_threads(std::thread::available_parallelism().map_or(1, usize::from));
+        }
         let names = scenario.roster();
         let mut medium = Medium::new(
             scenario.seed,
@@ -785,6 +789,9 @@ impl Simulation {
         });
         let changes = self.guests.take(self.now, reported, &self.world);
         self.events.extend(changes);
+        for &(guest, robot) in self.guests.served() {
+            self.world.satisfy(guest, robot);
+        }
     }
 
     /// Records who has entered the field and who has left it.

@@ -7,7 +7,7 @@
 //! The rules are those of the paper (CARS, 2002, section "Obstacles"). Every body occupies a square of the same
 //! size, unless the hall gives it another [`Shape`] (chosen here, as are walls). Guests walk in a straight line for a while, then choose a new one, unless they react to a robot
 //! ([`Reaction`], chosen here), or walk as recorded people did ([`Recorded`], chosen here) or
-//! as a model of people has them ([`CrowdModel`], chosen here). A body whose proposed location collides is not advanced. How a robot reacts to a collision is up to the robot and not part of this crate.
+//! as a model of people has them ([`CrowdGuests`], chosen here). A body whose proposed location collides is not advanced. How a robot reacts to a collision is up to the robot and not part of this crate.
 //!
 //! # One tick
 //!
@@ -28,7 +28,8 @@
 //! 1. In [`World::new`], the guests' positions, in index order: x, then y, for each attempt. If rejection sampling
 //!    fails, one more number per guest, which selects one of the remaining free positions (see [`Guests`]).
 //! 2. In [`World::new`], the guests' first courses, in index order: direction, speed, duration.
-//! 3. In each tick, for every guest whose course is over, in index order: direction, speed, duration.
+//! 3. In [`World::with_guests`], for guests who [`Want`] something, one number for each, in index order.
+//! 4. In each tick, for every guest whose course is over, in index order: direction, speed, duration.
 //!
 //! The behavior of robots never changes how many numbers are drawn.
 //!
@@ -83,6 +84,7 @@ mod sweep;
 mod tracks;
 mod triangular;
 mod walk;
+mod wants;
 mod wheels;
 
 pub use bodies::{Blocker, Body, Near};
@@ -98,8 +100,9 @@ pub use reactions::{Reaction, Response};
 pub use shape::{Shape, Wall};
 pub use shapes::Shapes;
 pub use sight::{Crossed, Opaque, is_hidden};
-pub use social::CrowdModel;
+pub use social::{CrowdGuests, CrowdModel};
 pub use tracks::{Recorded, Track, TrackPoint};
 pub use triangular::Triangular;
 pub use walk::Passage;
+pub use wants::{Goal, Want};
 pub use wheels::{Pose, Velocity, Wheels};

@@ -10,7 +10,7 @@ use crate::placing::{place, place_absent};
 use crate::point::Point;
 use crate::reactions::{Reaction, directions};
 use crate::shape::{Shape, Wall};
-use crate::social::{CrowdModel, SocialWalk};
+use crate::social::{CrowdGuests, SocialWalk};
 use crate::tracks::{Recorded, RecordedWalk};
 use crate::walk::{GuestFloor, GuestOutcomes, GuestWalker, Passage};
 use crate::wheels::{DriveStep, Pose, Velocity, Wheels};
@@ -59,8 +59,8 @@ pub enum GuestWalk {
     Random,
     /// Recorded people, in the place of [`Hall::guests`].
     Recorded(Recorded),
-    /// A model of how people walk. What each guest wants is what the random walk by [`Hall::guests`] has it do.
-    Crowd(CrowdModel),
+    /// Guests of [`Hall::guests`] who walk by a model.
+    Crowd(CrowdGuests),
 }
 
 /// The guests, as what moves them has them.
@@ -118,12 +118,12 @@ impl<R: Rng> World<R> {
                 let walk = RandomWalk::new(hall.guests, hall.tick_s, &mut rng);
                 (bodies, Crowd::Random(walk))
             }
-            GuestWalk::Crowd(model) => {
+            GuestWalk::Crowd(guests) => {
                 let mut bodies = place(hall, &mut rng)?;
                 let wishes = RandomWalk::new(hall.guests, hall.tick_s, &mut rng);
                 let mut outcomes = GuestOutcomes::default();
                 let floor = GuestFloor::new(&mut bodies, &[], &mut outcomes, hall.tick_s);
-                let walk = SocialWalk::new(model, hall, wishes, &floor)?;
+                let walk = SocialWalk::new(guests, hall, wishes, &floor, &mut rng)?;
                 (bodies, Crowd::Social(Box::new(walk)))
             }
             GuestWalk::Recorded(recorded) => {
@@ -165,9 +165,10 @@ impl<R: Rng> World<R> {
         })
     }
 
-    /// Has guests draw from another stream from the next tick on. The courses that they are on stay.
+    /// Has guests draw from another stream from the next tick on. The courses that they are on, and what they want now, stay.
     pub fn reseed(&mut self, rng: R) {
         self.rng = rng;
+        self.crowd.walk().reseed(&mut self.rng);
     }
 
     /// Advances the world by one tick, in which no guest reacts to a robot. See [`World::advance_with`].
@@ -328,6 +329,20 @@ impl<R> World<R> {
         }
     }
 
+    /// A guest has got something from a robot. One that [wants](crate::Goal::Robot) that wants something else from the next tick on.
+    pub fn satisfy(&mut self, guest: usize, robot: usize) {
+        if let Crowd::Social(walk) = &mut self.crowd {
+            walk.satisfy(guest, robot);
+        }
+    }
+
+    /// How many threads walk large crowds of guests by a model, 1 at first. Nothing else depends on it.
+    pub fn set_threads(&mut self, threads: usize) {
+        if let Crowd::Social(walk) = &mut self.crowd {
+            walk.set_threads(threads);
+        }
+    }
+
     /// The field and the size of bodies.
     #[must_use]
     pub fn field(&self) -> &Field {
@@ -373,8 +388,9 @@ impl<R> World<R> {
     /// Whether guests enter and leave; otherwise all are on the field all the time.
     #[must_use]
     pub fn has_passages(&self) -> bool {
-        match self.crowd {
-            Crowd::Random(_) | Crowd::Social(_) => false,
+        match &self.crowd {
+            Crowd::Random(_) => false,
+            Crowd::Social(walk) => walk.has_exits(),
             Crowd::Recorded(_) => true,
         }
     }

@@ -13,6 +13,9 @@ pub(crate) trait GuestWalker {
     /// Has the guests enter that are on the field at the beginning. By default guests are placed already, and stay.
     fn begin(&mut self, _floor: &mut GuestFloor<'_>, _rng: &mut dyn Rng) {}
 
+    /// Draws anew what follows from numbers that were drawn before. By default nothing does.
+    fn reseed(&mut self, _rng: &mut dyn Rng) {}
+
     /// Moves every guest by one tick, in index order. Robots have moved.
     fn advance(&mut self, floor: &mut GuestFloor<'_>, rng: &mut dyn Rng);
 }

@@ -77,6 +77,47 @@ eventually = { sites = "T*", by = "any", variable = "done" }
 within = "10 s"
 "#;
 
+/// Guests who walk by a model, want a site, an exit and treats, stop for Butler and come closer to him.
+const PEOPLE: &str = r#"
+seed = 5
+duration = "120 s"
+
+[guests]
+count = 30
+model = "collision-free"
+speed = { min = "0.5 m/s", mode = "1 m/s", max = "1.5 m/s" }
+
+[[guests.wants]]
+site = "bar"
+stay = { min = "2 s", mode = "5 s", max = "10 s" }
+[[guests.wants]]
+exit = ["0 m", "7 m"]
+stay = { min = "2 s", mode = "5 s", max = "10 s" }
+[[guests.wants]]
+treat = "Butler"
+give_up = "20 s"
+weight = 2
+
+[guests.requests]
+stop = "2 s"
+come_closer = true
+
+[[site]]
+name = "bar"
+at = "random"
+
+[[obstacle]]
+at = ["2 ft", "2 ft"]
+
+[[robot]]
+name = "Butler"
+at = ["25 ft", "25 ft"]
+params = { table = ["4 ft", "4 ft"] }
+[[robot]]
+name = "Leguin"
+at = ["4 ft", "4 ft"]
+"#;
+
 struct Parent {
     lab: Lab,
     ticks: u64,
@@ -85,9 +126,11 @@ struct Parent {
 impl Parent {
     fn of(file: &str, more: &[&str]) -> Self {
         let lab = Lab::new();
-        let file = match file {
-            WORLD => lab.write("world.toml", WORLD),
-            file => file.into(),
+        let is_text = file.contains('\n');
+        let file = if is_text {
+            lab.write("world.toml", file)
+        } else {
+            file.into()
         };
         let file = file.display().to_string();
         lab.ok(&[&["run", &file, "--run", "parent", "-q"], more].concat());
@@ -125,6 +168,8 @@ fn forks_without_a_change_at_any_tick_are_the_run() {
         ),
         ("swarm", &["--duration", "40 s"]),
         (WORLD, &[]),
+        (PEOPLE, &[]),
+        (PEOPLE, &["--set", "guests.model=social-force"]),
     ] {
         let parent = Parent::of(file, more);
         let Parent { ticks, .. } = parent;
@@ -299,6 +344,20 @@ fn any_number_of_processes_killed_or_not_give_the_same_world() {
     }
     let file = launch_of(lab, "by-4.toml", &scenario, &[("S*", "cars-bidder", 4)]);
     killed_and_resumed(lab, "resumed", &file, [20, 45]);
+    parent.assert_is_parent("resumed");
+}
+
+#[test]
+fn guests_who_walk_by_a_model_are_resumed_as_they_were() {
+    let parent = Parent::of(PEOPLE, &[]);
+    let events = String::from_utf8(parent.lab.bytes("parent")).unwrap();
+    for event in ["guest_entered", "guest_left", "\"guest\",\"guest\""] {
+        assert!(events.contains(event), "no {event}");
+    }
+    let scenario = parent.lab.out().join("world.toml");
+    let processes = [("Butler", "cars-butler", 1), ("Leguin", "cars-leguin", 1)];
+    let file = launch_of(&parent.lab, "people.toml", &scenario, &processes);
+    killed_and_resumed(&parent.lab, "resumed", &file, [30, 90]);
     parent.assert_is_parent("resumed");
 }
 

@@ -16,9 +16,10 @@ use super::numbers::{Range, positive, triangular};
 use super::place::{Lengths, point};
 use super::tracks::TracksTable;
 use super::unplaced::unplaced;
+use super::want::WantTable;
 use crate::checked::check_guests;
 use crate::files::RECORDING;
-use crate::guests::{Faces, GuestMotion, GuestRules, RecordedGuests, Requests};
+use crate::guests::{Faces, GuestMotion, GuestRules, ModeledGuests, RecordedGuests, Requests};
 use crate::network::ticks;
 use crate::tracks::{self, MAX_RATE_HZ, TrackFormat, TrackPlacement, TrackSet, is_rate};
 
@@ -63,6 +64,9 @@ pub(super) struct GuestsTable {
     duration: Option<Spanned<Range<Time>>>,
     faces: Option<Spanned<FacesTable>>,
     requests: Option<RequestsTable>,
+    /// What guests want who walk by a model. They do by a default one if nothing else is said.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) wants: Vec<Spanned<WantTable>>,
 }
 
 /// What moves guests.
@@ -171,12 +175,23 @@ pub(super) fn motion(
     let Some(table) = table else {
         return Ok(GuestMotion::Random);
     };
-    Ok(match table.model(setting.tracks) {
-        GuestModel::Random => GuestMotion::Random,
-        GuestModel::Recorded => GuestMotion::Recorded(recorded(table, setting)?),
-        GuestModel::CollisionFree => GuestMotion::Crowd(CrowdModel::CollisionFree),
-        GuestModel::SocialForce => GuestMotion::Crowd(CrowdModel::SocialForce),
-    })
+    let model = match table.model(setting.tracks) {
+        GuestModel::CollisionFree => CrowdModel::CollisionFree,
+        GuestModel::SocialForce => CrowdModel::SocialForce,
+        GuestModel::Random | GuestModel::Recorded if !table.wants.is_empty() => {
+            let model = table.model.as_ref().map(Spanned::span);
+            let reason = "guests who want something walk by a model, \"collision-free\" or \"social-force\"";
+            let span = model.or(table.wants.first().map(Spanned::span));
+            return Err(FileError::at(setting.source, span, reason));
+        }
+        GuestModel::Random => return Ok(GuestMotion::Random),
+        GuestModel::Recorded => return Ok(GuestMotion::Recorded(recorded(table, setting)?)),
+    };
+    // What they want is read when sites and robots are known.
+    Ok(GuestMotion::Crowd(ModeledGuests {
+        model,
+        wants: Vec::new(),
+    }))
 }
 
 fn recorded(table: &GuestsTable, setting: RecordSetting<'_>) -> Result<RecordedGuests, FileError> {
@@ -303,6 +318,7 @@ impl GuestsTable {
         match &self.model {
             Some(model) => *model.get_ref(),
             None if self.from.is_some() || tracks.is_some() => GuestModel::Recorded,
+            None if !self.wants.is_empty() => GuestModel::CollisionFree,
             None => GuestModel::Random,
         }
     }
@@ -407,8 +423,14 @@ impl GuestsTable {
         let model = match motion {
             GuestMotion::Random => None,
             GuestMotion::Recorded(_) => Some(GuestModel::Recorded),
-            GuestMotion::Crowd(CrowdModel::CollisionFree) => Some(GuestModel::CollisionFree),
-            GuestMotion::Crowd(CrowdModel::SocialForce) => Some(GuestModel::SocialForce),
+            GuestMotion::Crowd(guests) => Some(match guests.model {
+                CrowdModel::CollisionFree => GuestModel::CollisionFree,
+                CrowdModel::SocialForce => GuestModel::SocialForce,
+            }),
+        };
+        let wants = match motion {
+            GuestMotion::Crowd(guests) => guests.wants.as_slice(),
+            GuestMotion::Random | GuestMotion::Recorded(_) => &[],
         };
         let recorded = motion.recorded();
         let from = recorded.filter(|recorded| !recorded.from.is_empty());
@@ -441,6 +463,10 @@ impl GuestsTable {
             })),
             faces: faces.map(unplaced),
             requests,
+            wants: wants
+                .iter()
+                .map(|want| unplaced(WantTable::of(want, tick_s)))
+                .collect(),
         }
     }
 }

@@ -15,4 +15,5 @@ mod recorded;
 mod shapes;
 mod sight;
 mod social;
+mod wants;
 mod wheels;

@@ -1,16 +1,23 @@
 //! Guests who walk by a model of how people walk: what they want is the random walk's, and they are where bodies can be.
 
 use crate::halls::{is_inside, overlap, reception, rng};
-use world::{CrowdModel, GuestWalk, HallError, MoveOutcome, Point, Reaction, Response, World};
+use world::{CrowdGuests, CrowdModel, GuestWalk, HallError, MoveOutcome, Point, Reaction, Response, World};
 
 const MODELS: [CrowdModel; 2] = [CrowdModel::CollisionFree, CrowdModel::SocialForce];
+
+fn walk(model: CrowdModel) -> GuestWalk {
+    GuestWalk::Crowd(CrowdGuests {
+        model,
+        wants: Vec::new(),
+    })
+}
 
 #[test]
 fn wishes_are_those_of_the_random_walk_and_draw_the_same_numbers() {
     for model in MODELS {
         let hall = reception(100);
         let mut random = World::new(&hall, rng(5)).unwrap();
-        let mut social = World::with_guests(&hall, GuestWalk::Crowd(model), rng(5)).unwrap();
+        let mut social = World::with_guests(&hall, walk(model), rng(5)).unwrap();
         assert_eq!(random.guests(), social.guests());
         for _ in 0..100 {
             random.advance(&[]);
@@ -31,7 +38,7 @@ fn guests_of_a_model_stay_off_robots_obstacles_and_the_edge_and_keep_apart() {
         hall.robots = vec![Point::new(7.6, 7.6), Point::new(2.0, 2.0)];
         hall.obstacles = vec![Point::new(5.0, 5.0), Point::new(10.0, 4.0)];
         let body_m = hall.field.body_m;
-        let mut world = World::with_guests(&hall, GuestWalk::Crowd(model), rng(3)).unwrap();
+        let mut world = World::with_guests(&hall, walk(model), rng(3)).unwrap();
         let mut moved = 0;
         for tick in 0..200 {
             let before = world.guests().to_vec();
@@ -68,7 +75,7 @@ fn guests_of_a_model_stay_off_robots_obstacles_and_the_edge_and_keep_apart() {
 fn copies_of_a_crowd_walk_alike() {
     for model in MODELS {
         let hall = reception(60);
-        let mut world = World::with_guests(&hall, GuestWalk::Crowd(model), rng(8)).unwrap();
+        let mut world = World::with_guests(&hall, walk(model), rng(8)).unwrap();
         for _ in 0..20 {
             world.advance(&[]);
         }
@@ -90,7 +97,7 @@ fn guests_of_a_model_react_to_robots() {
         let mut hall = reception(1);
         hall.robots = vec![Point::new(7.6, 7.6)];
         hall.tick_s = 0.5;
-        let mut world = World::with_guests(&hall, GuestWalk::Crowd(model), rng(4)).unwrap();
+        let mut world = World::with_guests(&hall, walk(model), rng(4)).unwrap();
         let approach = Reaction {
             robot: 0,
             range_m: 100.0,
@@ -111,6 +118,22 @@ fn guests_of_a_model_react_to_robots() {
 fn bodies_that_no_person_has_are_refused() {
     let mut hall = reception(1);
     hall.field.body_m = 1.9;
-    let error = World::with_guests(&hall, GuestWalk::Crowd(CrowdModel::SocialForce), rng(1));
+    let error = World::with_guests(&hall, walk(CrowdModel::SocialForce), rng(1));
     assert!(matches!(error, Err(HallError::OutOfRange { .. })), "{error:?}");
+}
+
+#[test]
+fn a_large_crowd_is_the_same_for_any_number_of_threads() {
+    let mut hall = reception(25_000);
+    hall.field.size_m = (250.0, 250.0);
+    hall.tick_s = 0.5;
+    hall.robots = vec![Point::new(7.6, 7.6)];
+    let mut alone = World::with_guests(&hall, walk(CrowdModel::CollisionFree), rng(2)).unwrap();
+    let mut shared = alone.clone();
+    shared.set_threads(3);
+    for _ in 0..3 {
+        alone.advance(&[None]);
+        shared.advance(&[None]);
+    }
+    assert_eq!(alone, shared);
 }
