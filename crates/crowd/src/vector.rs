@@ -1,5 +1,6 @@
 //! Places and displacements in the plane.
 
+use std::fmt;
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 
 /// A place, m, a displacement, m, or a velocity, m/s.
@@ -49,6 +50,12 @@ impl Vector {
     #[must_use]
     pub fn length(self) -> f64 {
         self.length_squared().sqrt()
+    }
+
+    /// The distance from this place to another one, m.
+    #[must_use]
+    pub fn distance_m(self, other: Self) -> f64 {
+        (other - self).length()
     }
 
     /// The vector of length 1 in the same direction; that without a length stays as it is.
@@ -109,5 +116,12 @@ impl Mul<f64> for Vector {
 
     fn mul(self, factor: f64) -> Self {
         Self::new(self.x * factor, self.y * factor)
+    }
+}
+
+/// Formats the vector as `(1.5, 2)`, for error messages.
+impl fmt::Display for Vector {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "({}, {})", self.x, self.y)
     }
 }

@@ -94,7 +94,7 @@ impl<'a> Viewpoint<'a> {
             return true;
         }
         let offset = at - self.at;
-        let distance_m = offset.length_squared_m2().sqrt();
+        let distance_m = offset.length();
         let ahead = direction(self.heading_rad);
         let forward_m = offset.x * ahead.x + offset.y * ahead.y;
         forward_m >= libm::cos(field_rad * 0.5) * distance_m

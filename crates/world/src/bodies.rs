@@ -422,7 +422,7 @@ impl Bodies {
         let mut ids = Vec::new();
         self.grid.visit_around(point, range_m, |id| {
             let offset = self.centers[id] - point;
-            if offset.length_squared_m2() <= range_m * range_m {
+            if offset.length_squared() <= range_m * range_m {
                 ids.push(id);
             }
         });

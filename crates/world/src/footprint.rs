@@ -5,7 +5,7 @@
 //! [`TOLERANCE_M`].
 
 use crate::limits::TOLERANCE_M;
-use crate::point::{Point, cross, dot};
+use crate::point::Point;
 use crate::shape::{Shape, Wall};
 use crate::wheels::Wheels;
 
@@ -81,7 +81,7 @@ impl Footprint {
         match self.shape {
             Shape::Rectangle { .. } => {
                 let (half_x_m, half_y_m) = self.shape.half_m();
-                Point::new(half_x_m, half_y_m).length_squared_m2().sqrt()
+                Point::new(half_x_m, half_y_m).length()
             }
             Shape::Disc { radius_m } => radius_m,
         }
@@ -113,7 +113,7 @@ impl Footprint {
     /// How far a rectangle extends from its center along a direction of length 1, m.
     fn reach_m(self, axis: Point) -> f64 {
         let (half_x_m, half_y_m) = self.shape.half_m();
-        half_x_m * dot(axis, self.ahead).abs() + half_y_m * dot(axis, self.left()).abs()
+        half_x_m * axis.dot(self.ahead).abs() + half_y_m * axis.dot(self.left()).abs()
     }
 
     /// The direction of the height.
@@ -124,8 +124,8 @@ impl Footprint {
     /// A displacement as seen along the width and the height.
     pub(crate) fn to_local(self, displacement: Point) -> Point {
         Point::new(
-            dot(displacement, self.ahead),
-            dot(displacement, self.left()),
+            displacement.dot(self.ahead),
+            displacement.dot(self.left()),
         )
     }
 
@@ -175,7 +175,7 @@ impl Footprint {
             Shape::Rectangle { .. } => {
                 rectangle_to_point_m(self.shape.half_m(), self.to_local(offset))
             }
-            Shape::Disc { radius_m } => (offset.length_squared_m2().sqrt() - radius_m).max(0.0),
+            Shape::Disc { radius_m } => (offset.length() - radius_m).max(0.0),
         }
     }
 
@@ -213,8 +213,8 @@ impl Footprint {
         ];
         axes.into_iter().flatten().all(|axis| {
             let reach_m = self.reach_m(axis) + other.reach_m(axis);
-            let center_m = dot(offset, axis);
-            shadows_overlap(dot(path, axis), (center_m, center_m), reach_m, slack_m)
+            let center_m = offset.dot(axis);
+            shadows_overlap(path.dot(axis), (center_m, center_m), reach_m, slack_m)
         })
     }
 
@@ -238,8 +238,8 @@ impl Footprint {
                     normal(path),
                 ];
                 axes.into_iter().flatten().all(|axis| {
-                    let ends = (dot(one, axis), dot(other, axis));
-                    shadows_overlap(dot(path, axis), ends, self.reach_m(axis), slack_m)
+                    let ends = (one.dot(axis), other.dot(axis));
+                    shadows_overlap(path.dot(axis), ends, self.reach_m(axis), slack_m)
                 })
             }
         }
@@ -263,7 +263,7 @@ fn squared(length_m: f64) -> f64 {
 
 /// The direction at a right angle to a displacement, of length 1; `None` for a displacement that is none.
 fn normal(displacement: Point) -> Option<Point> {
-    let length_m = displacement.length_squared_m2().sqrt();
+    let length_m = displacement.length();
     (length_m > 0.0).then(|| Point::new(-displacement.y, displacement.x) * (1.0 / length_m))
 }
 
@@ -285,8 +285,8 @@ fn enters_rectangle(half_m: (f64, f64), offset: Point, path: Point) -> bool {
     ];
     axes.into_iter().flatten().all(|axis| {
         let reach_m = half_m.0 * axis.x.abs() + half_m.1 * axis.y.abs();
-        let center_m = dot(offset, axis);
-        shadows_overlap(dot(path, axis), (center_m, center_m), reach_m, 0.0)
+        let center_m = offset.dot(axis);
+        shadows_overlap(path.dot(axis), (center_m, center_m), reach_m, 0.0)
     })
 }
 
@@ -295,7 +295,7 @@ fn rectangle_to_point_m(half_m: (f64, f64), point: Point) -> f64 {
     let beside_m = (point.x.abs() - half_m.0).max(0.0);
     let above_m = (point.y.abs() - half_m.1).max(0.0);
 
-    Point::new(beside_m, above_m).length_squared_m2().sqrt()
+    Point::new(beside_m, above_m).length()
 }
 
 /// The distance from a path from the origin to a rectangle at `offset` that it does not enter, m.
@@ -313,20 +313,20 @@ fn segment_to_rectangle_m(half_m: (f64, f64), offset: Point, path: Point) -> f64
 
 /// The squared distance from a path from the origin to a point, m².
 fn segment_to_point_m2(path: Point, point: Point) -> f64 {
-    let length_m2 = path.length_squared_m2();
+    let length_m2 = path.length_squared();
     let share = if length_m2 > 0.0 {
-        (dot(point, path) / length_m2).clamp(0.0, 1.0)
+        (point.dot(path) / length_m2).clamp(0.0, 1.0)
     } else {
         0.0
     };
-    (point - path * share).length_squared_m2()
+    (point - path * share).length_squared()
 }
 
 /// Whether a path from the origin crosses the line between two ends.
 fn segments_cross(path: Point, one: Point, other: Point) -> bool {
     let along = other - one;
-    let ends_differ = cross(path, one) * cross(path, other) < 0.0;
-    let places_differ = cross(along, one) * cross(along, one - path) < 0.0;
+    let ends_differ = path.cross(one) * path.cross(other) < 0.0;
+    let places_differ = along.cross(one) * along.cross(one - path) < 0.0;
     ends_differ && places_differ
 }
 

@@ -231,7 +231,7 @@ fn random_in_disc(center: Point, radius_m: f64, rng: &mut impl Rng) -> Point {
     let half = Point::new(radius_m, radius_m);
     for _ in 0..64 {
         let at = random_between(center - half, center + half, rng);
-        if (at - center).length_squared_m2() <= radius_m * radius_m {
+        if (at - center).length_squared() <= radius_m * radius_m {
             return at;
         }
     }

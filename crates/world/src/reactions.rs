@@ -5,7 +5,7 @@
 
 use crate::bodies::{Bodies, Body};
 use crate::limits::TOLERANCE_M;
-use crate::point::{Point, dot};
+use crate::point::Point;
 
 /// What guests near a robot do in one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,7 +51,7 @@ pub(crate) fn directions(
             if reaction.guest.is_some_and(|only| only != guest) {
                 continue;
             }
-            let distance_m2 = (near.center - center).length_squared_m2();
+            let distance_m2 = (near.center - center).length_squared();
             if nearest[guest].is_none_or(|(least_m2, _)| distance_m2 < least_m2) {
                 nearest[guest] = Some((distance_m2, reaction));
             }
@@ -78,7 +78,7 @@ impl Response {
         match self {
             Self::Stay => Some(Point::default()),
             Self::Approach => {
-                let is_there = offset.length_squared_m2() <= 4.0 * body_m * body_m;
+                let is_there = offset.length_squared() <= 4.0 * body_m * body_m;
                 if is_there {
                     Some(Point::default())
                 } else {
@@ -90,8 +90,8 @@ impl Response {
                     return unit(offset);
                 };
                 let left = Point::new(-ahead.y, ahead.x);
-                let ahead_m = dot(offset, ahead);
-                let left_m = dot(offset, left);
+                let ahead_m = offset.dot(ahead);
+                let left_m = offset.dot(left);
                 let is_in_the_way = ahead_m > 0.0 && left_m.abs() < 2.0 * body_m;
                 is_in_the_way.then(|| left * if left_m < 0.0 { -1.0 } else { 1.0 })
             }
@@ -101,6 +101,6 @@ impl Response {
 
 /// The vector of length 1 in a direction; `None` for a displacement that is none.
 fn unit(displacement: Point) -> Option<Point> {
-    let length_m = displacement.length_squared_m2().sqrt();
+    let length_m = displacement.length();
     (length_m > TOLERANCE_M).then(|| displacement * (1.0 / length_m))
 }

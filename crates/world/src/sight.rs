@@ -4,7 +4,7 @@ use crate::bodies::Body;
 use crate::footprint::Footprint;
 use crate::limits::TOLERANCE_M;
 use crate::motion::World;
-use crate::point::{Point, cross, dot};
+use crate::point::Point;
 use crate::shape::{Shape, Wall};
 
 /// Something that is not looked through.
@@ -54,12 +54,12 @@ fn crossed_rectangle(from: Point, to: Point, center: Point, half_m: (f64, f64)) 
 fn crossed_disc(from: Point, to: Point, center: Point, radius_m: f64) -> Option<(f64, f64)> {
     let (step, offset) = (to - from, from - center);
     // |offset + share step| = radius is a quadratic equation in the share.
-    let step_m2 = step.length_squared_m2();
-    let outside_m2 = offset.length_squared_m2() - radius_m * radius_m;
+    let step_m2 = step.length_squared();
+    let outside_m2 = offset.length_squared() - radius_m * radius_m;
     if step_m2 == 0.0 {
         return (outside_m2 < 0.0).then_some((f64::NEG_INFINITY, f64::INFINITY));
     }
-    let half_b = dot(offset, step);
+    let half_b = offset.dot(step);
     let discriminant = half_b * half_b - step_m2 * outside_m2;
     if discriminant <= 0.0 {
         return None;
@@ -74,8 +74,8 @@ fn crossed_wall(from: Point, to: Point, wall: &Wall) -> Option<f64> {
     let one = wall.from - from;
     let other = wall.to - from;
     // Walls that meet have the same numbers here for the end that they share: no way passes between them by rounding.
-    let one_side = cross(step, one);
-    let other_side = cross(step, other);
+    let one_side = step.cross(one);
+    let other_side = step.cross(other);
     let apart = one_side - other_side;
     let is_between = one_side.min(other_side) <= 0.0 && one_side.max(other_side) >= 0.0;
     if !is_between || apart == 0.0 {
@@ -84,7 +84,7 @@ fn crossed_wall(from: Point, to: Point, wall: &Wall) -> Option<f64> {
     }
 
     let crossing = one + (other - one) * (one_side / apart);
-    let share = dot(crossing, step) / step.length_squared_m2();
+    let share = crossing.dot(step) / step.length_squared();
     (0.0..1.0).contains(&share).then_some(share)
 }
 

@@ -13,7 +13,7 @@ use crate::walk::{GuestFloor, GuestWalker};
 use crate::wants::{Errand, Want, Wants};
 use crowd::{
     CollisionFree, CrowdError, Disc, Itinerary, Pedestrian, Pedestrians, Premises, SocialForce,
-    Surroundings, Vector, WalkingModel, WallLine,
+    Surroundings, WalkingModel, WallLine,
 };
 use rand::Rng;
 
@@ -62,7 +62,7 @@ impl WalkingModel for EitherModel {
         self.chosen().body_radius_m()
     }
 
-    fn velocity(&self, seen: &Surroundings<'_>) -> Vector {
+    fn velocity(&self, seen: &Surroundings<'_>) -> Point {
         self.chosen().velocity(seen)
     }
 }
@@ -165,9 +165,9 @@ impl SocialWalk {
         for (index, (&now, &before)) in floor.robots().iter().zip(&self.robots).enumerate() {
             let (half_x_m, half_y_m) = floor.half_m(Body::Robot(index));
             discs.push(Disc {
-                center: vector(now),
+                center: now,
                 radius_m: half_x_m.max(half_y_m),
-                velocity: vector((now - before) * (1.0 / floor.tick_s())),
+                velocity: (now - before) * (1.0 / floor.tick_s()),
             });
         }
         discs
@@ -256,12 +256,11 @@ impl GuestWalker for SocialWalk {
             let Some(person) = self.ids[index].and_then(|id| self.crowd.get(id)) else {
                 continue;
             };
-            let to = Point::new(person.position.x, person.position.y);
-            if !floor.go(index, to) {
-                let here = vector(floor.guest(index));
+            if !floor.go(index, person.position) {
+                let here = floor.guest(index);
                 self.change(index, |person| {
                     person.position = here;
-                    person.velocity = Vector::ZERO;
+                    person.velocity = Point::ZERO;
                 });
             }
         }
@@ -284,7 +283,7 @@ fn people(
         walls.extend(rectangle(at - half, at + half));
     }
     for wall in floor.walls() {
-        walls.push(WallLine::new(vector(wall.from), vector(wall.to)));
+        walls.push(WallLine::new(wall.from, wall.to));
     }
 
     let premises = Premises {
@@ -295,7 +294,7 @@ fn people(
     for degrees in 0..DIRECTIONS {
         let angle_rad = f64::from(degrees) * std::f64::consts::PI / 180.0;
         let (sin, cos) = libm::sincos(angle_rad);
-        crowd.add_itinerary(Itinerary::along(Vector::new(cos, sin)))?;
+        crowd.add_itinerary(Itinerary::along(Point::new(cos, sin)))?;
     }
     for &at in floor.guests() {
         crowd.add(person(at, body_m))?;
@@ -308,17 +307,17 @@ fn person(at: Point, body_m: f64) -> Pedestrian {
     Pedestrian {
         radius_m: body_m / 2.0,
         desired_mps: 0.0,
-        ..Pedestrian::at(vector(at))
+        ..Pedestrian::at(at)
     }
 }
 
 /// The sides of a rectangle between two corners.
 fn rectangle(low: Point, high: Point) -> [WallLine; 4] {
     let corners = [
-        Vector::new(low.x, low.y),
-        Vector::new(high.x, low.y),
-        Vector::new(high.x, high.y),
-        Vector::new(low.x, high.y),
+        Point::new(low.x, low.y),
+        Point::new(high.x, low.y),
+        Point::new(high.x, high.y),
+        Point::new(low.x, high.y),
     ];
     [0, 1, 2, 3].map(|side| WallLine::new(corners[side], corners[(side + 1) % 4]))
 }
@@ -329,10 +328,6 @@ fn degrees(direction: Point) -> u16 {
     let degrees = (angle_rad * 180.0 / std::f64::consts::PI).round();
     let positive = if degrees < 0.0 { degrees + 360.0 } else { degrees };
     (positive as u16) % DIRECTIONS
-}
-
-fn vector(at: Point) -> Vector {
-    Vector::new(at.x, at.y)
 }
 
 fn reason(error: &CrowdError) -> &'static str {

@@ -307,7 +307,7 @@ proptest! {
         let (eye, one, other) = (point(eye), point(ends.0), point(ends.1));
         let side = |from: Point, to: Point| {
             let (along, offset) = (to - from, eye - from);
-            (along.x * offset.y - along.y * offset.x) / along.length_squared_m2().sqrt()
+            (along.x * offset.y - along.y * offset.x) / along.length()
         };
         let on = one + (other - one) * share;
         prop_assume!(side(one, other).abs() > 0.01);

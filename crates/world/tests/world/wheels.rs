@@ -236,7 +236,7 @@ fn is_within(polygon: &[Point], point: Point) -> bool {
 /// Places at which a body of this half extent touches a wall, or overlaps it by about as much as is allowed.
 fn touching(wall: &Wall, half_m: f64, share: f64, off_m: f64) -> Point {
     let along = wall.to - wall.from;
-    let length_m = along.length_squared_m2().sqrt();
+    let length_m = along.length();
     let normal = Point::new(-along.y, along.x) * (1.0 / length_m);
     wall.from + along * share + normal * (half_m + off_m)
 }
