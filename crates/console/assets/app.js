@@ -304,7 +304,9 @@ function drawBar() {
     plan.touch();
     drawBar();
   });
-  const { walls, sensing } = store.frame?.static_world ?? {};
+  const { walls, sensing, guest_sample } = store.frame?.static_world ?? {};
+  box("guest-sample").hidden = !guest_sample;
+  box("guest-sample").textContent = `(one in ${guest_sample} is shown)`;
   box("legend-wall").hidden = !walls?.length;
   box("legend-view").hidden = !plan.chosen || !sensing?.field_of_view_rad;
   box("legend-rays").hidden = !plan.chosen || !sensing?.rays;

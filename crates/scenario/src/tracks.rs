@@ -14,9 +14,10 @@ use serde::{Deserialize, Serialize};
 use world::{Point, Track, TrackPoint};
 use xxhash_rust::xxh3::xxh3_128;
 
-use crate::checked::MAX_GUESTS;
 use crate::files::RECORDING;
 
+/// Most people of a record.
+const MAX_PEOPLE: usize = 20_000;
 /// Most observations of a record.
 const MAX_OBSERVATIONS: usize = 1_000_000;
 /// Most frames in a second: times are whole milliseconds.
@@ -90,8 +91,8 @@ pub(crate) fn read(source: &Source, placement: &TrackPlacement) -> Result<TrackS
             let reason = format!("person {} is in frame {} twice", row.person, row.frame);
             return Err(refuse(RefusedText::of(line, &source.text, &reason)));
         }
-        if people.len() > MAX_GUESTS {
-            let reason = format!("more than {MAX_GUESTS} people");
+        if people.len() > MAX_PEOPLE {
+            let reason = format!("more than {MAX_PEOPLE} people");
             return Err(refuse(RefusedText::of(line, &source.text, &reason)));
         }
     }
@@ -185,8 +186,8 @@ pub(crate) fn read_run(folder: &Path, placement: &TrackPlacement) -> Result<Trac
             people[person].insert(time_ms(now), at);
             open.insert(number, (now, person));
         }
-        if people.len() > MAX_GUESTS {
-            return Err(format!("more than {MAX_GUESTS} people"));
+        if people.len() > MAX_PEOPLE {
+            return Err(format!("more than {MAX_PEOPLE} people"));
         }
     }
     if people.is_empty() {
@@ -467,9 +468,9 @@ pub(crate) fn of_texts<'a>(
         let refuse = |reason: String| (Some(index), reason);
         let observations = of_text(text).map_err(refuse)?;
         count += observations.len();
-        if people.len() == MAX_GUESTS || count > MAX_OBSERVATIONS {
+        if people.len() == MAX_PEOPLE || count > MAX_OBSERVATIONS {
             return Err(refuse(format!(
-                "more than {MAX_GUESTS} people, or than {MAX_OBSERVATIONS} observations"
+                "more than {MAX_PEOPLE} people, or than {MAX_OBSERVATIONS} observations"
             )));
         }
         people.push(observations);

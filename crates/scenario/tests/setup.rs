@@ -64,7 +64,7 @@ fn what_is_changed_is_changed_and_the_rest_stays() {
 #[test]
 fn the_number_of_guests_has_a_limit() {
     let mut setup = scenario().setup();
-    setup.field_m = [400.0, 400.0];
+    setup.field_m = [1000.0, 1000.0];
     setup.guests = u32::try_from(MAX_GUESTS).unwrap();
     assert!(scenario().with_setup(&setup).is_ok());
 
@@ -73,7 +73,7 @@ fn the_number_of_guests_has_a_limit() {
     assert_eq!(errors[0].field, "guests");
     assert_eq!(
         errors[0].reason,
-        "20001 guests, more than the 20000 allowed"
+        "1000001 guests, more than the 1000000 allowed"
     );
 }
 

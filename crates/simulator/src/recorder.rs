@@ -584,7 +584,7 @@ fn set_frame(frame: &mut Frame, simulation: &Simulation, record: &TickRecord) {
     }
 
     frame.guests_mm.clear();
-    for (_, guest) in simulation.world().present_guests() {
+    for (_, guest) in simulation.shown_guests() {
         frame.guests_mm.push((guest.x * 1000.0).round() as i64);
         frame.guests_mm.push((guest.y * 1000.0).round() as i64);
     }

@@ -26,6 +26,7 @@ use crate::layers::Layers;
 use crate::medium::{Arrival, ForcedVerdict, Medium, SentCommand};
 use crate::sensing::{Viewpoint, ranges_m};
 use crate::sites::{SiteOrders, Sites};
+use crate::static_world::guest_sample;
 use scenario::{
     ChanceKind, Change, FaultEnd, GuestMotion, Lateness, Override, Reseed, Scenario, to_wire,
     to_world,
@@ -1420,23 +1421,29 @@ impl Simulation {
         pose(&self.world, self.index(name)?)
     }
 
-    /// The numbers of the guests that are on the field, in their order; empty where guests do not enter and leave.
+    /// The guests that frames have, their number and their center: all that are on the field, or every so manyth of very many.
+    pub fn shown_guests(&self) -> impl Iterator<Item = (usize, world::Point)> + '_ {
+        let step = guest_sample(self.world.guests().len()).unwrap_or(1) as usize;
+        let present = self.world.present_guests();
+        present.filter(move |(guest, _)| guest % step == 0)
+    }
+
+    /// The numbers of the guests that frames have, in their order; empty where all are on the field all the time.
     #[must_use]
     pub fn guest_numbers(&self) -> Vec<u32> {
-        if !self.world.has_passages() {
+        let are_counted = guest_sample(self.world.guests().len()).is_none();
+        if are_counted && !self.world.has_passages() {
             return Vec::new();
         }
-        let present = self.world.present_guests();
-        present
+        self.shown_guests()
             .map(|(guest, _)| u32::try_from(guest).unwrap_or(u32::MAX))
             .collect()
     }
 
-    /// Guests that are not content, by their index among those that are on the field, by mood.
+    /// Guests that are not content, by their index among those that frames have, by mood.
     #[must_use]
     pub fn guest_moods(&self) -> BTreeMap<GuestMood, Vec<u32>> {
-        let present = self.world.present_guests();
-        self.guests.moods(present.map(|(guest, _)| guest))
+        self.guests.moods(self.shown_guests().map(|(guest, _)| guest))
     }
 
     /// The sites.

@@ -12,6 +12,7 @@ pub(crate) fn static_world(scenario: &Scenario) -> StaticWorld {
     let mut of_scenario = StaticWorld {
         walls: lines(&scenario.walls),
         sensing: sensing_limits(&scenario.sensing),
+        guest_sample: guest_sample(scenario.guests.count),
         ..StaticWorld::default()
     };
     for obstacle in &scenario.obstacles {
@@ -27,6 +28,15 @@ pub(crate) fn static_world(scenario: &Scenario) -> StaticWorld {
         }
     }
     of_scenario
+}
+
+/// Most guests of a frame, so that it fits into a message.
+const MAX_FRAME_GUESTS: usize = 20_000;
+
+/// Frames have every so manyth of so many guests; `None` if they have all.
+pub(crate) fn guest_sample(guests: usize) -> Option<u32> {
+    let step = guests.div_ceil(MAX_FRAME_GUESTS);
+    u32::try_from(step).ok().filter(|step| *step > 1)
 }
 
 /// Walls of which one begins where the one before ends are one line.

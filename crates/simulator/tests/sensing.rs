@@ -56,6 +56,11 @@ fn news(sensing: &str, heading_rad: f64, ticks: usize) -> Vec<TickUpdate> {
 
 /// The same of another file.
 fn news_of(file: &str, heading_rad: f64, ticks: usize) -> Vec<TickUpdate> {
+    played(file, heading_rad, ticks).1
+}
+
+/// The same, and the simulation after them.
+fn played(file: &str, heading_rad: f64, ticks: usize) -> (Simulation, Vec<TickUpdate>) {
     let mut simulation = Simulation::new(parse(file).unwrap(), 1).unwrap();
     let names = simulation.names().to_vec();
     let a = names[0].clone();
@@ -76,8 +81,8 @@ fn news_of(file: &str, heading_rad: f64, ticks: usize) -> Vec<TickUpdate> {
         simulation.step(&mut watchers).unwrap();
     }
     let news = watchers.news.into_iter();
-    news.map(|mut news| news.remove(&a).unwrap_or_default())
-        .collect()
+    let news = news.map(|mut news| news.remove(&a).unwrap_or_default());
+    (simulation, news.collect())
 }
 
 /// The names of robots and sites that A senses, and how many obstacles.
@@ -249,5 +254,49 @@ fn a_ray_that_meets_nothing_is_as_long_as_the_rays() {
         let ranges = &news[1].ranges;
         assert_eq!(ranges[0], range_m.min(0.75), "{range}");
         assert_eq!(ranges[2..], [range_m; 2], "{range}");
+    }
+}
+
+/// Guests on a field with room for one on each square meter.
+fn many_guests(count: usize, model: &str) -> String {
+    let side_m = (count as f64).sqrt();
+    let middle_m = side_m / 2.0;
+    format!(
+        "duration = \"10 s\"\ntick = \"0.1 s\"\n[field]\nsize = [\"{side_m} m\", \"{side_m} m\"]\nbody = \"0.4 m\"\n\
+         [guests]\ncount = {count}\nmodel = \"{model}\"\n[sensing]\nrange = \"5 m\"\n\
+         [[robot]]\nname = \"A\"\nat = [\"{middle_m} m\", \"{middle_m} m\"]\n"
+    )
+}
+
+/// A robot senses all guests around it, and frames have so many of all.
+fn check_many_guests(count: usize, model: &str, shown: usize, step: u32) {
+    let (simulation, news) = played(&many_guests(count, model), 0.0, 2);
+    let world = simulation.world();
+    let near = world.near(world.robots()[0], 5.0).into_iter();
+    let near = near.filter(|near| matches!(near.body, world::Body::Guest(_)));
+    let near: Vec<Point> = near.map(|near| scenario::to_wire(near.center)).collect();
+    let bodies = news[2].bodies.iter();
+    let sensed: Vec<Point> = bodies.map(|body| body.location).collect();
+    assert_eq!(sensed, near);
+    assert!(sensed.len() > 40, "{}", sensed.len());
+
+    assert_eq!(simulation.shown_guests().count(), shown);
+    let numbers = simulation.guest_numbers();
+    assert_eq!(numbers.get(1).copied().unwrap_or(1), step);
+    assert!(numbers.is_empty() || numbers.len() == shown);
+    assert!(simulation.shown_guests().all(|(guest, at)| world.guests()[guest] == at));
+}
+
+#[test]
+fn frames_have_a_sample_of_very_many_guests() {
+    check_many_guests(20_000, "random", 20_000, 1);
+    check_many_guests(20_001, "random", 10_001, 2);
+}
+
+#[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
+fn a_robot_among_a_million_guests_senses_those_around_it() {
+    for model in ["random", "collision-free"] {
+        check_many_guests(1_000_000, model, 20_000, 50);
     }
 }

@@ -918,6 +918,10 @@ export interface SiteFrame {
  */
 export interface StaticWorld {
   /**
+   * Frames have every so manyth guest only, because all would be longer than a message; left out where frames have all.
+   */
+  guest_sample?: number | null;
+  /**
    * Shapes of the fixed obstacles, in their order, `null` for squares of the run's size; empty if all are.
    */
   obstacle_shapes?: (BodyShape | null)[];

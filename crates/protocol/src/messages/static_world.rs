@@ -45,6 +45,9 @@ pub struct StaticWorld {
     /// Where robots look, if they do not look all around, or measure ranges.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sensing: Option<SensingLimits>,
+    /// Frames have every so manyth guest only, because all would be longer than a message; left out where frames have all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub guest_sample: Option<u32>,
 }
 
 impl StaticWorld {

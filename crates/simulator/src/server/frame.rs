@@ -35,8 +35,8 @@ pub(super) fn frame(
     WorldFrame {
         robots,
         // In whole millimeters, as in the recording: a tick looks the same live and recorded.
-        guests: world
-            .present_guests()
+        guests: simulation
+            .shown_guests()
             .map(|(_, guest)| [millimeters(guest.x), millimeters(guest.y)])
             .collect(),
         guest_numbers: simulation.guest_numbers(),
