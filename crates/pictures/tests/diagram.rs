@@ -300,6 +300,27 @@ fn a_delayed_command_waits_beside_the_lane_of_its_target() {
 }
 
 #[test]
+fn a_command_in_the_queue_of_a_radio_says_so() {
+    let queued = Event::CommandDelayed {
+        from: name("Butler"),
+        to: name("Leguin"),
+        seq: 1,
+        until: 20,
+        because: Some(Cause::Queue),
+    };
+    let events = [(10, sent(1, "refill")), (11, queued), (20, delivered(1))];
+    let svg = draw(&events, 0, 40);
+    let document = Document::parse(&svg).unwrap();
+    let command = of_class(&document, "command")[0];
+    let expected = format!("held back until tick 20 (10 s), {}", Cause::Queue);
+    assert!(title(command).contains(&expected), "{}", title(command));
+    assert!(svg.contains(">in the queue<"), "the legend");
+
+    let both = [&events[..], &[(10, sent(2, "hurry")), (11, delayed(2, 14))]].concat();
+    assert!(draw(&both, 0, 40).contains(">held back or in the queue<"));
+}
+
+#[test]
 fn a_doubled_command_forks() {
     let events = [
         (10, sent(1, "refill")),

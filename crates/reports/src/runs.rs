@@ -550,7 +550,7 @@ fn links_table(runs: &[ReportedRun]) -> Table {
         links.entry(link).or_default().add(counts);
     }
 
-    let mut table = Table::new("Link | sent | arrived | lost | why | held back | doubled");
+    let mut table = Table::new("Link | sent | arrived | lost | held back | doubled | why lost");
     for ((from, to), counts) in links {
         let mut row = vec![format!("{from} → {to}").into()];
         let causes: Vec<String> = counts
@@ -558,9 +558,11 @@ fn links_table(runs: &[ReportedRun]) -> Table {
             .iter()
             .map(|(because, count)| format!("{count} {because}"))
             .collect();
-        row.extend([counts.sent, counts.delivered, counts.lost()].map(Cell::Count));
+        let fates = [counts.sent, counts.delivered, counts.lost(), counts.delayed];
+        row.extend(fates.map(Cell::Count));
+        row.push(Cell::Count(counts.duplicated));
+        // The last column is the one that wraps, so that the table is no wider than the page.
         row.push(causes.join(", ").into());
-        row.extend([counts.delayed, counts.duplicated].map(Cell::Count));
         table.row(row);
     }
     table

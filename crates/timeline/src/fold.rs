@@ -133,7 +133,7 @@ impl Timeline {
                     sent: tick,
                     until: None,
                     is_doubled: false,
-                    is_named: false,
+                    because: None,
                     ends: Vec::new(),
                 };
                 // Numbers are unique within an epoch. Should one come again, the command before is
@@ -149,13 +149,13 @@ impl Timeline {
                 ..
             } => self.change_command(from, *seq, |command| {
                 command.until = Some(*until);
-                command.is_named |= *because == Some(Cause::Scripted);
+                command.because = because.or(command.because);
             }),
             Event::CommandDuplicated {
                 from, seq, because, ..
             } => self.change_command(from, *seq, |command| {
                 command.is_doubled = true;
-                command.is_named |= *because == Some(Cause::Scripted);
+                command.because = because.or(command.because);
             }),
             Event::CommandDelivered { from, seq, .. } => {
                 let end = CommandEnd { tick, lost: None };

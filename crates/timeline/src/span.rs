@@ -172,8 +172,8 @@ pub struct CommandSpan {
     pub until: Option<Tick>,
     /// Whether the medium doubled it.
     pub is_doubled: bool,
-    /// Whether the scenario names it as one that is held back or doubled.
-    pub is_named: bool,
+    /// Why it is held back or doubled, if it is not by chance: the scenario names it, or it waits in a queue.
+    pub because: Option<Cause>,
     /// What became of its copies so far; one that is missing is still under way.
     pub ends: Vec<CommandEnd>,
 }

@@ -1,5 +1,6 @@
 //! Draws the legend: signs and colors that the window has.
 
+use protocol::event::Cause;
 use std::collections::BTreeSet;
 use timeline::{CommandSpan, StateKind};
 
@@ -22,6 +23,18 @@ const SIGN_PX: f64 = 17.0;
 /// Draws a sign from `x` on; `y` is its middle.
 type Draw = fn(&mut Markup, f64, f64);
 
+/// What commands that wait do.
+fn held_back(commands: &[CommandSpan]) -> &'static str {
+    let held = commands.iter().filter(|command| command.until.is_some());
+    let (queued, others): (Vec<_>, Vec<_>) =
+        held.partition(|command| command.because == Some(Cause::Queue));
+    match (queued.is_empty(), others.is_empty()) {
+        (false, true) => "in the queue",
+        (false, false) => "held back or in the queue",
+        (true, _) => "held back",
+    }
+}
+
 /// The signs that a window has, with their names.
 fn signs(window: VisibleTicks, items: &Items) -> Vec<(&'static str, Draw)> {
     let commands = &items.commands;
@@ -34,7 +47,7 @@ fn signs(window: VisibleTicks, items: &Items) -> Vec<(&'static str, Draw)> {
         }),
         (
             commands.iter().any(|command| command.until.is_some()),
-            "held back",
+            held_back(commands),
             |svg, x, y| svg.line("wait", &[(x, y), (x + SIGN_PX, y)]),
         ),
         (

@@ -99,8 +99,8 @@ impl Titles {
         if command.is_doubled {
             title += "; doubled";
         }
-        if command.is_named {
-            title += &format!(", {}", Cause::Scripted);
+        if let Some(because) = command.because {
+            title += &format!(", {because}");
         }
         for end in &command.ends {
             let tick = self.tick(end.tick);
