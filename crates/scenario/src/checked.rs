@@ -242,7 +242,9 @@ impl Scenario {
         let goal = match &want.goal {
             WantGoal::Site(name) => {
                 let site = self.sites.get(name);
-                Goal::Place(self.inside(site.map_or_else(Default::default, |site| to_world(site.at))))
+                Goal::Place(
+                    self.inside(site.map_or_else(Default::default, |site| to_world(site.at))),
+                )
             }
             WantGoal::Place(at) => Goal::Place(self.inside(*at)),
             WantGoal::Exit(at) => Goal::Exit(self.inside(*at)),

@@ -36,9 +36,7 @@ pub use checked::{
 };
 pub use checked::{to_wire, to_world};
 pub use fault::{Fault, FaultEnd, Interruption};
-pub use guests::{
-    GuestMotion, GuestRules, GuestWant, ModeledGuests, RecordedGuests, WantGoal,
-};
+pub use guests::{GuestMotion, GuestRules, GuestWant, ModeledGuests, RecordedGuests, WantGoal};
 pub use lateness::Lateness;
 pub use layers::{LayerSpec, Peak};
 pub use network::Network;

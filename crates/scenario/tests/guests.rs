@@ -415,15 +415,25 @@ fn models_of_walking_are_written_and_read() {
         assert_eq!(scenario.guests.count, 5);
         assert_eq!(scenario.hall().guests.count, 5);
         let written = scenario.to_toml().unwrap();
-        assert!(written.contains(&format!("model = \"{model}\"")), "{written}");
+        assert!(
+            written.contains(&format!("model = \"{model}\"")),
+            "{written}"
+        );
         assert_eq!(parse(&written).unwrap().guest_motion, scenario.guest_motion);
     }
-    let error = shown(parse(&format!("[guests]\ncount = 5\nmodel = \"boids\"\n{ROBOT}")));
+    let error = shown(parse(&format!(
+        "[guests]\ncount = 5\nmodel = \"boids\"\n{ROBOT}"
+    )));
     assert!(error.contains("unknown variant"), "{error}");
 
-    let large = format!("[field]\nsize = [\"40 m\", \"40 m\"]\nbody = \"2 m\"\n[guests]\ncount = 5\nmodel = \"social-force\"\n{ROBOT}");
+    let large = format!(
+        "[field]\nsize = [\"40 m\", \"40 m\"]\nbody = \"2 m\"\n[guests]\ncount = 5\nmodel = \"social-force\"\n{ROBOT}"
+    );
     let error = shown(parse(&large));
-    assert!(error.contains("body_m of guests who walk by a model"), "{error}");
+    assert!(
+        error.contains("body_m of guests who walk by a model"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -452,7 +462,10 @@ fn what_guests_want_is_written_and_read() {
         panic!("they walk by a model");
     };
     assert_eq!(walk.wants[0].goal, world::Goal::Place(Point::new(9.0, 9.0)));
-    assert_eq!(walk.wants[2].goal, world::Goal::Exit(Point::new(0.3048, 7.0)));
+    assert_eq!(
+        walk.wants[2].goal,
+        world::Goal::Exit(Point::new(0.3048, 7.0))
+    );
     assert_eq!(walk.wants[3].goal, world::Goal::Robot(0));
 }
 
@@ -469,9 +482,18 @@ fn what_guests_cannot_want_is_refused() {
         ("treat = \"B\"", "there is no robot called B"),
         ("treat = \"A\"", "add that table"),
         ("at = [\"3 m\", \"99 m\"]", "not on the field"),
-        ("exit = [\"1 m\", \"1 m\"], weight = 0", "a weight must be more than zero"),
-        ("exit = [\"1 m\", \"1 m\"], weight = 1e7", "a weight is at most"),
-        ("exit = [\"1 m\", \"1 m\"], within = \"0 m\"", "more than zero"),
+        (
+            "exit = [\"1 m\", \"1 m\"], weight = 0",
+            "a weight must be more than zero",
+        ),
+        (
+            "exit = [\"1 m\", \"1 m\"], weight = 1e7",
+            "a weight is at most",
+        ),
+        (
+            "exit = [\"1 m\", \"1 m\"], within = \"0 m\"",
+            "more than zero",
+        ),
         ("exit = [\"1 m\", \"1 m\"], color = 1", "unknown field"),
     ] {
         let error = of(want);
@@ -479,7 +501,9 @@ fn what_guests_cannot_want_is_refused() {
     }
 
     let many = vec!["{ at = [\"3 m\", \"3 m\"] }"; 65].join(", ");
-    let error = shown(parse(&format!("[guests]\ncount = 5\nwants = [{many}]\n{ROBOT}")));
+    let error = shown(parse(&format!(
+        "[guests]\ncount = 5\nwants = [{many}]\n{ROBOT}"
+    )));
     assert!(error.contains("more than 64 things to want"), "{error}");
 
     let random = "[guests]\ncount = 5\nmodel = \"random\"\nwants = [{ at = [\"3 m\", \"3 m\"] }]\n";
@@ -487,7 +511,9 @@ fn what_guests_cannot_want_is_refused() {
     assert!(error.contains("walk by a model"), "{error}");
 
     let stay = "stay = { min = \"1 s\", mode = \"2 s\", max = \"3 s\" }";
-    let text = format!("[guests]\ncount = 5\nwants = [{{ treat = \"A\", {stay} }}]\n[guests.requests]\n{ROBOT}");
+    let text = format!(
+        "[guests]\ncount = 5\nwants = [{{ treat = \"A\", {stay} }}]\n[guests.requests]\n{ROBOT}"
+    );
     let error = shown(parse(&text));
     assert!(error.contains("waits at the robot"), "{error}");
 }

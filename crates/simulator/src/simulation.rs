@@ -153,7 +153,8 @@ impl Simulation {
     /// [`HallError`] if its bodies cannot be placed.
     pub fn new(scenario: Scenario, epoch: Epoch) -> Result<Self, HallError> {
         let walk = scenario.guest_walk();
-        let mut world = World::with_guests(&scenario.hall(), walk, stream(scenario.seed, "guests"))?;
+        let mut world =
+            World::with_guests(&scenario.hall(), walk, stream(scenario.seed, "guests"))?;
         if let GuestMotion::Crowd(_) = scenario.guest_motion {
             world.set_threads(std::thread::available_parallelism().map_or(1, usize::from));
         }
@@ -1443,7 +1444,8 @@ impl Simulation {
     /// Guests that are not content, by their index among those that frames have, by mood.
     #[must_use]
     pub fn guest_moods(&self) -> BTreeMap<GuestMood, Vec<u32>> {
-        self.guests.moods(self.shown_guests().map(|(guest, _)| guest))
+        self.guests
+            .moods(self.shown_guests().map(|(guest, _)| guest))
     }
 
     /// The sites.

@@ -284,7 +284,11 @@ fn check_many_guests(count: usize, model: &str, shown: usize, step: u32) {
     let numbers = simulation.guest_numbers();
     assert_eq!(numbers.get(1).copied().unwrap_or(1), step);
     assert!(numbers.is_empty() || numbers.len() == shown);
-    assert!(simulation.shown_guests().all(|(guest, at)| world.guests()[guest] == at));
+    assert!(
+        simulation
+            .shown_guests()
+            .all(|(guest, at)| world.guests()[guest] == at)
+    );
 }
 
 #[test]

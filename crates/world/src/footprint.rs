@@ -123,10 +123,7 @@ impl Footprint {
 
     /// A displacement as seen along the width and the height.
     pub(crate) fn to_local(self, displacement: Point) -> Point {
-        Point::new(
-            displacement.dot(self.ahead),
-            displacement.dot(self.left()),
-        )
+        Point::new(displacement.dot(self.ahead), displacement.dot(self.left()))
     }
 
     /// Whether a body of this shape at `at` is entirely on a field of this size, within [`TOLERANCE_M`].

@@ -202,7 +202,11 @@ impl SocialWalk {
         let is_standing = direction == Point::default();
         self.change(index, |person| {
             person.itinerary = degrees(direction);
-            person.desired_mps = if is_standing { 0.0 } else { speed_mps.min(10.0) };
+            person.desired_mps = if is_standing {
+                0.0
+            } else {
+                speed_mps.min(10.0)
+            };
         });
     }
 
@@ -326,7 +330,11 @@ fn rectangle(low: Point, high: Point) -> [WallLine; 4] {
 fn degrees(direction: Point) -> u16 {
     let angle_rad = libm::atan2(direction.y, direction.x);
     let degrees = (angle_rad * 180.0 / std::f64::consts::PI).round();
-    let positive = if degrees < 0.0 { degrees + 360.0 } else { degrees };
+    let positive = if degrees < 0.0 {
+        degrees + 360.0
+    } else {
+        degrees
+    };
     (positive as u16) % DIRECTIONS
 }
 

@@ -180,7 +180,8 @@ pub(super) fn motion(
         GuestModel::SocialForce => CrowdModel::SocialForce,
         GuestModel::Random | GuestModel::Recorded if !table.wants.is_empty() => {
             let model = table.model.as_ref().map(Spanned::span);
-            let reason = "guests who want something walk by a model, \"collision-free\" or \"social-force\"";
+            let reason =
+                "guests who want something walk by a model, \"collision-free\" or \"social-force\"";
             let span = model.or(table.wants.first().map(Spanned::span));
             return Err(FileError::at(setting.source, span, reason));
         }

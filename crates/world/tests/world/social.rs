@@ -1,7 +1,9 @@
 //! Guests who walk by a model of how people walk: what they want is the random walk's, and they are where bodies can be.
 
 use crate::halls::{is_inside, overlap, reception, rng};
-use world::{CrowdGuests, CrowdModel, GuestWalk, HallError, MoveOutcome, Point, Reaction, Response, World};
+use world::{
+    CrowdGuests, CrowdModel, GuestWalk, HallError, MoveOutcome, Point, Reaction, Response, World,
+};
 
 const MODELS: [CrowdModel; 2] = [CrowdModel::CollisionFree, CrowdModel::SocialForce];
 
@@ -51,7 +53,10 @@ fn guests_of_a_model_stay_off_robots_obstacles_and_the_edge_and_keep_apart() {
             for (guest, &at) in world.guests().iter().enumerate() {
                 assert!(is_inside(&hall.field, at), "guest {guest} at {at}");
                 for &other in &fixed {
-                    assert!(!overlap(body_m, at, other), "guest {guest} at {at} on {other}");
+                    assert!(
+                        !overlap(body_m, at, other),
+                        "guest {guest} at {at} on {other}"
+                    );
                 }
                 moved += usize::from(at.distance_m(before[guest]) > 0.01);
             }
@@ -104,13 +109,17 @@ fn guests_of_a_model_react_to_robots() {
             response: Response::Approach,
             guest: None,
         };
-        let distance_m = |world: &crate::halls::TestWorld| world.guests()[0].distance_m(world.robots()[0]);
+        let distance_m =
+            |world: &crate::halls::TestWorld| world.guests()[0].distance_m(world.robots()[0]);
         let before_m = distance_m(&world);
         for _ in 0..60 {
             world.advance_with(&[None], &[approach]);
         }
         let after_m = distance_m(&world);
-        assert!(after_m < before_m - 2.0 || after_m < 1.5, "{before_m} m, then {after_m} m");
+        assert!(
+            after_m < before_m - 2.0 || after_m < 1.5,
+            "{before_m} m, then {after_m} m"
+        );
     }
 }
 
@@ -119,7 +128,10 @@ fn bodies_that_no_person_has_are_refused() {
     let mut hall = reception(1);
     hall.field.body_m = 1.9;
     let error = World::with_guests(&hall, walk(CrowdModel::SocialForce), rng(1));
-    assert!(matches!(error, Err(HallError::OutOfRange { .. })), "{error:?}");
+    assert!(
+        matches!(error, Err(HallError::OutOfRange { .. })),
+        "{error:?}"
+    );
 }
 
 #[test]

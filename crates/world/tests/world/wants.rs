@@ -145,7 +145,8 @@ fn who_does_not_come_to_it_gives_it_up() {
     let mut hall = hall(1);
     // Nobody comes to a table behind a wall of obstacles.
     for index in 0..25 {
-        hall.obstacles.push(Point::new(7.62, 0.3048 + 0.6096 * f64::from(index)));
+        hall.obstacles
+            .push(Point::new(7.62, 0.3048 + 0.6096 * f64::from(index)));
     }
     let (left, right) = (Point::new(2.0, 7.0), Point::new(13.0, 7.0));
     let short = |at| Want {
@@ -176,7 +177,11 @@ fn weights_are_how_often_something_is_wanted() {
     for _ in 0..60 {
         world.advance(&[None]);
     }
-    let at_table = world.guests().iter().filter(|at| at.distance_m(TABLE) <= 2.0).count();
+    let at_table = world
+        .guests()
+        .iter()
+        .filter(|at| at.distance_m(TABLE) <= 2.0)
+        .count();
     // The first want of each; 3 in 4 of them within five standard deviations, less those who are still on their way.
     assert!((28..=60).contains(&at_table), "{at_table}");
 }
