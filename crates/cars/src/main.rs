@@ -3,6 +3,7 @@
 mod check;
 mod conform;
 mod control;
+mod crowd;
 mod diagram;
 mod emotions;
 mod errors;
@@ -66,6 +67,7 @@ Compare:
   expect       Judge a recorded run by expectations
   fork         Execute a recorded run up to a tick, and go on with changes, or with other chance
   why          Find what decided a recorded run: where its outcome became likely, and by which event
+  crowd        Compare models of walking with what was measured with people
 
 Control a run in progress:
   ctl          Start, pause, step, stop, set, cut, crash, query, command, and more
@@ -137,6 +139,9 @@ enum Subcommands {
     ///
     /// It is computed from forks with other chance, and each cause is confirmed by forks without it.
     Why(why::WhyArgs),
+    /// Models of walking, compared with what was measured with people: `cars crowd check collision-free`.
+    #[command(subcommand)]
+    Crowd(crowd::CrowdCommand),
     /// Show a recorded run to consoles and other observers as if it were in progress: start, pause, step, seek, speed.
     Replay(replay::ReplayArgs),
     /// Control a run in progress, or a replay: init, start, pause, step, stop, speed, status; query and command its robots.
@@ -205,6 +210,7 @@ fn dispatch(subcommand: Subcommands) -> Result<ExitCode> {
         Subcommands::Expect(args) => expect::expect(&args),
         Subcommands::Fork(args) => fork::fork(args),
         Subcommands::Why(args) => why::why(&args),
+        Subcommands::Crowd(command) => crowd::crowd(&command),
         Subcommands::Replay(args) => replay::replay(&args),
         Subcommands::Ctl(args) => control::ctl(args),
         Subcommands::Log(args) => control::log(&args),

@@ -9,6 +9,7 @@ mod star;
 mod subject;
 mod table;
 mod tcp;
+mod walking;
 mod workload;
 
 use std::ffi::OsString;
@@ -39,7 +40,7 @@ struct Cli {
     process: Option<Process>,
 }
 
-/// A process of a measurement.
+/// A process of a measurement, or a measurement of its own.
 #[derive(Debug, Subcommand)]
 enum Process {
     /// An idle robot of the bare lock-step.
@@ -58,6 +59,8 @@ enum Process {
     Star(star::StarArgs),
     #[command(hide = true)]
     StarClient(star::ClientArgs),
+    /// Measures crowds: agent-steps per second by number of people.
+    Crowd(walking::WalkingArgs),
 }
 
 #[derive(Debug, Args)]
@@ -107,6 +110,7 @@ fn main() -> ExitCode {
         Some(Process::Echo(args)) => tcp::echo(&args),
         Some(Process::Star(args)) => star::router(&args),
         Some(Process::StarClient(args)) => star::client(&args),
+        Some(Process::Crowd(args)) => walking::measure(&args),
     };
     result.unwrap_or_else(|error| {
         terminal::note(format_args!("Error: {error:?}"));

@@ -147,6 +147,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         "cars",
         &[
             "affect",
+            "crowd",
             "launch",
             "reports",
             "experiments",
@@ -187,6 +188,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     (
         "bench",
         &[
+            "crowd",
             "launch",
             "scenario",
             "record",
