@@ -27,15 +27,18 @@ pub(crate) enum CrowdCommand {
 pub(crate) struct CrowdCheckArgs {
     /// The model.
     model: ModelArg,
-    /// Ten runs of each case, not 50.
-    #[arg(long)]
+    /// Ten runs of each case, one of each population.
+    #[arg(long, conflicts_with = "runs")]
     quick: bool,
-    /// The measured speeds by density that the model has to keep to.
+    /// Number of runs of each case. IMO MSC.1/Circ.1238 asks for 50.
+    #[arg(long, value_name = "N", default_value_t = 50, value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    runs: u64,
+    /// The measured speeds by density by which the model is judged. The table shows all three.
     #[arg(long, value_name = "DATA", default_value = "weidmann")]
     against: DataArg,
     /// Only the cases with this text in their titles.
-    #[arg(long, value_name = "TEXT", default_value = "")]
-    only: String,
+    #[arg(long, value_name = "TEXT")]
+    only: Option<String>,
     /// The seed of all runs.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
@@ -77,11 +80,16 @@ impl ValueEnum for DataArg {
     }
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
-        Some(PossibleValue::new(match self.0 {
-            SpeedData::Corridor => "corridor",
-            SpeedData::Open => "open",
-            SpeedData::Weidmann => "weidmann",
-        }))
+        Some(match self.0 {
+            SpeedData::Corridor => PossibleValue::new("corridor")
+                .help("Zhang 2012: a corridor of 1.8 m that leads back into itself"),
+            SpeedData::Open => {
+                PossibleValue::new("open").help("Zhang 2012: in one direction, with open ends")
+            }
+            SpeedData::Weidmann => {
+                PossibleValue::new("weidmann").help("Weidmann 1993: a line over 25 authors")
+            }
+        })
     }
 }
 
@@ -97,16 +105,20 @@ fn check(args: &CrowdCheckArgs) -> Result<ExitCode> {
         Some(jobs) => jobs as usize,
         None => available_parallelism().map_or(1, usize::from),
     };
-    let mut options = CheckOptions {
+    let runs = if args.quick {
+        QUICK_RUNS
+    } else {
+        args.runs as usize
+    };
+    let only = args.only.clone().unwrap_or_default();
+    let options = CheckOptions {
+        runs,
         threads,
         seed: args.seed,
         against: args.against.0,
-        only: args.only.clone(),
+        only: only.clone(),
         ..CheckOptions::default()
     };
-    if args.quick {
-        options.runs = QUICK_RUNS;
-    }
 
     let style = ProgressStyle::with_template("{bar:30} {pos} of {len} runs, {elapsed}")?;
     let bar = ProgressBar::new(0).with_style(style);
@@ -119,11 +131,11 @@ fn check(args: &CrowdCheckArgs) -> Result<ExitCode> {
         return Err(refusal!(
             help = "leave --only out to see all titles",
             "no case has {:?} in its title",
-            args.only
+            only
         ));
     }
 
-    terminal::print_line(text(&rows))?;
+    terminal::print_line(text(args.model.0, args.against.0, &rows))?;
     if rows.iter().all(|row| row.is_passed) {
         Ok(ExitCode::SUCCESS)
     } else {
@@ -131,15 +143,19 @@ fn check(args: &CrowdCheckArgs) -> Result<ExitCode> {
     }
 }
 
-/// A table for each case, and the verdict.
-fn text(rows: &[CheckedRow]) -> String {
+/// Tables for each case, and the verdict.
+fn text(model: KnownModel, against: SpeedData, rows: &[CheckedRow]) -> String {
     let mut text = String::new();
     for case in rows.chunk_by(|one, other| one.case == other.case) {
-        let title = case[0].case;
-        let runs = case[0].runs;
+        text += &format!("{}, {} runs\n", case[0].case, case[0].runs);
+        let (speeds, others): (Vec<_>, Vec<_>) =
+            case.iter().partition(|row| row.measured_mps.is_some());
+        if !speeds.is_empty() {
+            text += &speed_table(model, against, &speeds);
+        }
         let head = ["", "mean", "95 %", "published", "off by", "result"];
-        let table = terminal::table(head, case.iter().map(cells), 1, 1);
-        text += &format!("{title}, {runs} runs\n{table}\n\n");
+        let table = terminal::table(head, others.into_iter().map(cells), 1, 1);
+        text += &format!("{table}\n\n");
     }
 
     let failed = rows.iter().filter(|row| !row.is_passed).count();
@@ -151,25 +167,69 @@ fn text(rows: &[CheckedRow]) -> String {
     }
 }
 
+/// Speeds by density beside the sets of data.
+fn speed_table(model: KnownModel, against: SpeedData, rows: &[&CheckedRow]) -> String {
+    let [corridor, open, weidmann] = SpeedData::ALL.map(SpeedData::name);
+    let head = ["per m²", "mean", "95 %", corridor, open, weidmann, "result"];
+    let table = terminal::table(head, rows.iter().map(|row| speed_cells(row)), 1, 1);
+    let calibrated = match model.calibrated_to() {
+        Some(data) => format!("calibrated to {}", data.name()),
+        None => "not calibrated to any of them".to_owned(),
+    };
+    format!(
+        "Speed by density, m/s, and how far the mean is from three sets of data.\n\
+         {} is {calibrated}, and judged by {}.\n{table}\n",
+        model.name(),
+        against.name()
+    )
+}
+
+fn speed_cells(row: &CheckedRow) -> [String; 7] {
+    let density = row.measure.trim_start_matches("speed at ");
+    let beside = |measured_mps: f64| format!("{measured_mps:.2} {:+.2}", row.mean - measured_mps);
+    let [corridor, open, weidmann] = row.measured_mps.unwrap_or_default().map(beside);
+    [
+        density.trim_end_matches("/m², m/s").to_owned(),
+        number(row.mean),
+        interval(row),
+        corridor,
+        open,
+        weidmann,
+        result(row).to_owned(),
+    ]
+}
+
 fn cells(row: &CheckedRow) -> [String; 6] {
-    let (low, high) = row.interval;
     let published = row.published.map(|published| format!("{published:.2}"));
     let off_by = row
         .published
         .map(|published| format!("{:+.2}", row.mean - published));
-    let result = match (row.requirement, row.is_passed) {
+    [
+        row.measure.clone(),
+        number(row.mean),
+        interval(row),
+        published.unwrap_or_default(),
+        off_by.unwrap_or_default(),
+        result(row).to_owned(),
+    ]
+}
+
+fn interval(row: &CheckedRow) -> String {
+    let (low, high) = row.interval;
+    format!("{} to {}", number(low), number(high))
+}
+
+fn number(value: f64) -> String {
+    let decimals = if value.abs() < 100.0 { 2 } else { 1 };
+    format!("{value:.decimals$}")
+}
+
+fn result(row: &CheckedRow) -> &'static str {
+    match (row.requirement, row.is_passed) {
         (None, _) => "",
         (_, true) => "ok",
         (_, false) => "FAIL",
-    };
-    [
-        row.measure.clone(),
-        format!("{:.2}", row.mean),
-        format!("{low:.2} to {high:.2}"),
-        published.unwrap_or_default(),
-        off_by.unwrap_or_default(),
-        result.to_owned(),
-    ]
+    }
 }
 
 #[cfg(test)]
@@ -183,10 +243,12 @@ mod tests {
             only: "RiMEA 1,".to_owned(),
             ..CheckOptions::default()
         };
-        let mut rows = KnownModel::CollisionFree.check(&options, &|_, _| {});
-        assert!(text(&rows).ends_with("passed: all 3 rows that are judged"));
+        let model = KnownModel::CollisionFree;
+        let mut rows = model.check(&options, &|_, _| {});
+        let passed = text(model, SpeedData::Weidmann, &rows);
+        assert!(passed.ends_with("passed: all 3 rows that are judged"));
         rows[1].is_passed = false;
-        let text = text(&rows);
+        let text = text(model, SpeedData::Weidmann, &rows);
         assert!(text.contains("FAIL"), "{text}");
         assert!(
             text.ends_with("failed: 1 of 3 rows that are judged"),

@@ -19,6 +19,7 @@ mod components;
 mod conform;
 mod console;
 mod control;
+mod crowd;
 mod dependencies;
 mod determinism;
 mod diagram;

@@ -2,7 +2,7 @@
 //! what was published.
 //!
 //! As IMO MSC.1/Circ.1238 asks, cases are played 50 times with at least 10 populations, and of times the 95 % value counts. Other
-//! rows are judged by their mean or by all runs. Each row has a bootstrap interval of its mean (2,000 resamples of runs, 95 %).
+//! rows are judged by their mean or by all runs. Each row has a bootstrap interval of its mean (2,000 resamples of populations, 95 %).
 
 mod bootstrap;
 mod cases;
@@ -36,6 +36,15 @@ impl KnownModel {
     /// All of them.
     pub const ALL: [Self; 2] = [Self::CollisionFree, Self::SocialForce];
 
+    /// The measured speeds to which its parameters are calibrated, if they are.
+    #[must_use]
+    pub fn calibrated_to(self) -> Option<SpeedData> {
+        match self {
+            Self::CollisionFree => Some(SpeedData::Weidmann),
+            Self::SocialForce => None,
+        }
+    }
+
     /// Its name, as people type it.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -61,7 +70,7 @@ impl KnownModel {
 /// How a model is checked.
 #[derive(Clone, Debug)]
 pub struct CheckOptions {
-    /// Runs of each case; those with 1,000 people are played a fifth as often.
+    /// Runs of each case.
     pub runs: usize,
     /// Number of populations, which take turns.
     pub populations: usize,
@@ -98,9 +107,11 @@ pub struct CheckedRow {
     pub measure: String,
     /// What was published, in the same unit.
     pub published: Option<f64>,
+    /// Measured speeds at the density of the row, m/s, in the order of [`SpeedData::ALL`].
+    pub measured_mps: Option<[f64; 3]>,
     /// Mean over runs.
     pub mean: f64,
-    /// Bootstrap interval of the mean, 95 %.
+    /// Bootstrap interval of the mean, 95 %: populations are resampled.
     pub interval: (f64, f64),
     /// The 95 % value: that of 95 % of the runs is at most as large.
     pub high: f64,
@@ -126,8 +137,8 @@ pub fn check_with<M: WalkingModel + Clone>(
     let mut cases = cases::<M>(options.against);
     cases.retain(|case| case.title.contains(&options.only));
     let mut jobs = Vec::new();
-    for (case, of) in cases.iter().enumerate() {
-        for run in 0..runs_of(of, options) {
+    for case in 0..cases.len() {
+        for run in 0..options.runs.max(1) {
             jobs.push((case, run));
         }
     }
@@ -143,18 +154,10 @@ pub fn check_with<M: WalkingModel + Clone>(
             .collect();
         for (column, spec) in case.rows.iter().enumerate() {
             let values: Vec<f64> = runs.iter().map(|values| values[column]).collect();
-            rows.push(row(case.title, spec, &values));
+            rows.push(row(case.title, spec, &values, options));
         }
     }
     rows
-}
-
-fn runs_of<M>(case: &CrowdCase<M>, options: &CheckOptions) -> usize {
-    if case.is_large {
-        (options.runs / 5).max(1)
-    } else {
-        options.runs.max(1)
-    }
 }
 
 /// Plays jobs by several threads; the values of each are at its index.
@@ -198,7 +201,7 @@ fn play_all<M: WalkingModel + Clone>(
     played.into_iter().map(|(_, values)| values).collect()
 }
 
-fn row(case: &'static str, spec: &RowSpec, values: &[f64]) -> CheckedRow {
+fn row(case: &'static str, spec: &RowSpec, values: &[f64], options: &CheckOptions) -> CheckedRow {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     let count = sorted.len();
@@ -219,8 +222,9 @@ fn row(case: &'static str, spec: &RowSpec, values: &[f64]) -> CheckedRow {
         case,
         measure: spec.measure.clone(),
         published: spec.published,
+        measured_mps: spec.measured_mps,
         mean,
-        interval: mean_interval(&sorted),
+        interval: mean_interval(values, options.populations.max(1)),
         high,
         runs: count,
         requirement: spec.requirement,
