@@ -15,8 +15,9 @@ use crate::vector::Vector;
 const PEOPLE_MAX: usize = 10_000_000;
 /// Most itineraries, walls, columns and robots.
 const PARTS_MAX: usize = 60_000;
-/// People of one piece of work: few enough to share evenly, and enough for a thread to be worth it.
-const PIECE: usize = 2_048;
+/// Most people of one piece of work, and fewest: few enough to share evenly, and enough for a thread to be worth it.
+const PIECE_MAX: usize = 2_048;
+const PIECE_MIN: usize = 64;
 /// People and columns that one person takes notice of at most, in the order of cells. \[I\]
 const NEIGHBORS_MAX: usize = 256;
 /// The cell of those who have left.
@@ -81,8 +82,12 @@ pub struct Pedestrians<M> {
     cell_of: Vec<u32>,
     /// The buffer that a step writes.
     next: Vec<Pedestrian>,
+    /// Where each of `people` is during a step: what is searched for neighbors lies close together.
+    places: Vec<Vector>,
     /// First index of each cell in `people` during a step.
     begin: Vec<u32>,
+    /// Buffers of each thread.
+    buffers: Vec<StepBuffers>,
     /// Index in `people` by number.
     index_of: Vec<u32>,
     /// Lowest and highest coordinates that were added.
@@ -130,7 +135,9 @@ impl<M: WalkingModel> Pedestrians<M> {
             people: Vec::new(),
             cell_of: Vec::new(),
             next: Vec::new(),
+            places: Vec::new(),
             begin: Vec::new(),
+            buffers: Vec::new(),
             index_of: Vec::new(),
             bounds: bounds_of(premises),
             now_s: 0.0,
@@ -329,20 +336,22 @@ impl<M: WalkingModel> Pedestrians<M> {
             discs_of: &self.discs_of,
             itineraries: &self.itineraries,
             people: &self.people,
+            places: &self.places,
             begin: &self.begin,
             now_s: self.now_s,
             step_s,
             wall_reach_m: wall_reach_m(&self.model),
         };
+        // Four pieces for each thread, so that none waits long for another one.
+        let piece = (self.people.len() / (4 * threads.max(1))).clamp(PIECE_MIN, PIECE_MAX);
         let pieces = self
             .people
-            .chunks(PIECE)
-            .zip(self.next.chunks_mut(PIECE))
-            .zip(self.cell_of.chunks_mut(PIECE));
+            .chunks(piece)
+            .zip(self.next.chunks_mut(piece))
+            .zip(self.cell_of.chunks_mut(piece));
         let threads = threads.clamp(1, pieces.len().max(1));
         let pieces = Mutex::new(pieces);
-        let work = || {
-            let mut scratch = StepBuffers::default();
+        let work = |scratch: &mut StepBuffers| {
             let mut counts = StepCounts::default();
             loop {
                 // The lock is poisoned only if another thread has panicked, which ends the step anyway.
@@ -354,18 +363,22 @@ impl<M: WalkingModel> Pedestrians<M> {
                     return counts;
                 };
                 for ((person, next), cell) in people.iter().zip(next).zip(cells) {
-                    frozen.walk(person, next, cell, &mut scratch, &mut counts);
+                    frozen.walk(person, next, cell, scratch, &mut counts);
                 }
             }
         };
+        if self.buffers.len() < threads {
+            self.buffers.resize_with(threads, StepBuffers::default);
+        }
+        let (own, others) = self.buffers.split_at_mut(1);
         let counts = std::thread::scope(|scope| {
-            let mut others = Vec::new();
-            for _ in 1..threads {
-                others.push(scope.spawn(work));
+            let mut running = Vec::new();
+            for scratch in &mut others[..threads - 1] {
+                running.push(scope.spawn(|| work(scratch)));
             }
-            let mut counts = work();
-            for other in others {
-                match other.join() {
+            let mut counts = work(&mut own[0]);
+            for thread in running {
+                match thread.join() {
                     Ok(more) => counts.add(more),
                     Err(panic) => std::panic::resume_unwind(panic),
                 }
@@ -416,8 +429,10 @@ impl<M: WalkingModel> Pedestrians<M> {
                 here.sort_unstable_by_key(|person| person.id);
             }
         }
+        self.places.clear();
         for (index, person) in self.next.iter().enumerate() {
             self.index_of[person.id as usize] = index as u32;
+            self.places.push(person.position);
         }
 
         std::mem::swap(&mut self.people, &mut self.next);
@@ -513,8 +528,10 @@ impl StepCounts {
 }
 
 /// Buffers of one thread.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 struct StepBuffers {
+    /// Indices of people within reach.
+    near: Vec<u32>,
     others: Vec<Neighbor>,
     walls: Vec<NearWall>,
     lines: Vec<WallLine>,
@@ -532,6 +549,7 @@ struct Frozen<'a, M> {
     discs_of: &'a Lookup,
     itineraries: &'a [Itinerary],
     people: &'a [Pedestrian],
+    places: &'a [Vector],
     begin: &'a [u32],
     now_s: f64,
     step_s: f64,
@@ -621,34 +639,33 @@ impl<M: WalkingModel> Frozen<'_, M> {
     fn see_others(&self, person: &Pedestrian, cell: usize, scratch: &mut StepBuffers) {
         scratch.others.clear();
         scratch.discs.clear();
-        let reach_m = self.model.reach_m();
-        let reach_squared = reach_m * reach_m;
-        for (begin, end) in self.cells.around(cell, self.begin) {
-            for other in &self.people[begin..end] {
-                let offset = self.offset(person.position, other.position);
-                let distance_squared = offset.length_squared();
-                if distance_squared > reach_squared || other.id == person.id {
-                    continue;
-                }
-                self.see(
-                    person,
-                    Neighbor {
-                        offset,
-                        distance_m: distance_squared.sqrt(),
-                        radius_m: other.radius_m,
-                        velocity: other.velocity,
-                    },
-                    other.id,
-                    scratch,
-                );
+        let mut near = std::mem::take(&mut scratch.near);
+        self.find_near(person.position, cell, &mut near);
+        for index in &near {
+            let other = &self.people[*index as usize];
+            if other.id == person.id {
+                continue;
             }
+            let offset = self.offset(person.position, other.position);
+            self.see(
+                person,
+                Neighbor {
+                    offset,
+                    distance_m: offset.length(),
+                    radius_m: other.radius_m,
+                    velocity: other.velocity,
+                },
+                other.id,
+                scratch,
+            );
         }
+        scratch.near = near;
 
         for index in self.discs_of.at(cell) {
             let disc = self.discs[*index as usize];
             let offset = disc.center - person.position;
             let distance_m = offset.length();
-            if distance_m - disc.radius_m <= reach_m.max(WALL_REACH_M) {
+            if distance_m - disc.radius_m <= self.wall_reach_m {
                 scratch.discs.push(disc);
                 self.see(
                     person,
@@ -663,6 +680,27 @@ impl<M: WalkingModel> Frozen<'_, M> {
                 );
             }
         }
+    }
+
+    /// Lists the indices of people within reach, the person included.
+    ///
+    /// Two of three who are looked at are too far, in no order that a processor could guess, so every index is written, and the next one over
+    /// it where it is too far.
+    fn find_near(&self, from: Vector, cell: usize, near: &mut Vec<u32>) {
+        let reach_m = self.model.reach_m();
+        let reach_squared = reach_m * reach_m;
+        let mut count = 0;
+        for (begin, end) in self.cells.around(cell, self.begin) {
+            let places = &self.places[begin..end];
+            if near.len() < count + places.len() {
+                near.resize(count + places.len(), 0);
+            }
+            for (index, place) in places.iter().enumerate() {
+                near[count] = (begin + index) as u32;
+                count += usize::from(self.offset(from, *place).length_squared() <= reach_squared);
+            }
+        }
+        near.truncate(count);
     }
 
     /// Takes notice of another body unless a wall hides it.
