@@ -1,6 +1,6 @@
 //! The collision-free speed model.
 
-use crate::model::{NearWall, Neighbor, Surroundings, WalkingModel};
+use crate::model::{NearWall, Surroundings, WalkingModel};
 use crate::vector::Vector;
 
 /// The collision-free speed model: direction from repulsion, speed from the gap in front. \[D\] Tordeux, Chraibi, Seyfried 2016,
@@ -10,15 +10,17 @@ use crate::vector::Vector;
 /// radii. Speed: V = min(v0, max(0, (s - l)/T)), with the distance s to the closest neighbor in front. No step is longer than the
 /// gap, so in continuous time nobody touches anybody.
 ///
-/// The default parameters are calibrated to the line of Weidmann (1993) between 0.5 and 3 persons per m² in a corridor of 2 m, with
-/// Weidmann's spread of desired speeds, and, in a hurry, to the flow through a gate of 0.5 m. Two rules are added, because people of
-/// different speeds overtake each other, and pass each other sideways: `turns` and `breadth`. \[I\]
+/// The default parameters are calibrated, all of them at once, to the line of Weidmann (1993) between 0.5 and 3 persons per m² in a
+/// corridor of 2 m, with Weidmann's spread of desired speeds, and to the flow through a gate of 0.5 m. Three rules are added:
+/// `anticipation_s`, because people behind a gate walk away from those who follow; `breadth` and `breadth_left`, because people
+/// who meet in front of it go one after the other; `turns`, because people of different speeds overtake each other. \[I\]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CollisionFree {
     /// T, the time gap to who is in front, s. \[D\] 1.0, here calibrated.
     pub time_gap_s: f64,
-    /// T of people in a hurry, s. \[I\] Calibrated to the flow through the gate.
-    pub hurried_gap_s: f64,
+    /// τ, how far ahead people think of who walks away from them, s. Who is followed at the gap s - l, and walks at u, is followed at
+    /// (s - l + τ u)/(T + τ), if that is more than (s - l)/T. Where all walk at the same speed this changes nothing. \[D\] 0. \[I\]
+    pub anticipation_s: f64,
     /// a, strength of the repulsion by neighbors. \[D\] 5.
     pub repulsion: f64,
     /// D, range of the repulsion by neighbors, m. \[D\] 0.1.
@@ -27,8 +29,11 @@ pub struct CollisionFree {
     pub wall_repulsion: f64,
     /// Range of the repulsion by walls, m. \[D\] 0.02, in JuPedSim.
     pub wall_range_m: f64,
-    /// Share of l within which a neighbor beside the way ahead is in front. \[D\] 1.
+    /// Share of l within which a neighbor to the right of the way ahead is in front. \[D\] 1.
     pub breadth: f64,
+    /// The same to the left. Where it is smaller, people let those from the right go first, and two in front of a door do not wait
+    /// for each other. \[D\] 1. \[I\] People have a side preference: Moussaïd et al. 2009.
+    pub breadth_left: f64,
     /// Number of directions to each side, 15 degrees apart, that people who are slowed down look at, and of which they take the
     /// one in which they come closest to where they want to go. Up to 6. \[D\] 0; the rule is that of Moussaïd, Helbing, Theraulaz
     /// 2011, "How simple rules determine pedestrian behavior", with the gap as the free distance. \[I\]
@@ -59,12 +64,13 @@ impl CollisionFree {
     pub const fn published() -> Self {
         Self {
             time_gap_s: 1.0,
-            hurried_gap_s: 1.0,
+            anticipation_s: 0.0,
             repulsion: 5.0,
             range_m: 0.1,
             wall_repulsion: 5.0,
             wall_range_m: 0.02,
             breadth: 1.0,
+            breadth_left: 1.0,
             turns: 0,
             radius_m: 0.15,
         }
@@ -96,12 +102,6 @@ impl CollisionFree {
         }
     }
 
-    /// The velocity of a person who walks in a direction, m/s.
-    fn velocity_in(&self, seen: &Surroundings<'_>, direction: Vector) -> Vector {
-        let gap_m = self.gap_m(seen.person.radius_m, seen.others, direction);
-        direction * (gap_m / self.time_gap_s).clamp(0.0, seen.desired_mps)
-    }
-
     /// The way to the closest wall in a direction, m; infinite if there is none.
     fn wall_gap_m(&self, seen: &Surroundings<'_>, direction: Vector) -> f64 {
         let mut gap_m = f64::INFINITY;
@@ -115,33 +115,50 @@ impl CollisionFree {
         gap_m
     }
 
-    /// The gap to who is in front in a direction, m; infinite if nobody is.
-    fn gap_m(&self, radius_m: f64, others: &[Neighbor], direction: Vector) -> f64 {
-        let mut gap_m = f64::INFINITY;
-        for other in others {
-            let contact_m = radius_m + other.radius_m;
-            let is_in_front = direction.dot(other.offset) > 0.0
-                && direction.cross(other.offset).abs() <= self.breadth * contact_m;
-            if is_in_front {
-                gap_m = gap_m.min(other.distance_m - contact_m);
+    /// How fast a person may walk in a direction, m/s: at the desired speed if nobody is in front.
+    fn speed_mps(&self, seen: &Surroundings<'_>, direction: Vector) -> f64 {
+        let mut speed_mps = seen.desired_mps;
+        for other in seen.others {
+            let contact_m = seen.person.radius_m + other.radius_m;
+            let aside_m = direction.cross(other.offset);
+            let breadth = if aside_m > 0.0 {
+                self.breadth_left
+            } else {
+                self.breadth
+            };
+            if direction.dot(other.offset) > 0.0 && aside_m.abs() <= breadth * contact_m {
+                let gap_m = other.distance_m - contact_m;
+                let away_mps = direction.dot(other.velocity);
+                speed_mps = speed_mps.min(self.following_mps(gap_m, away_mps, seen.step_s));
             }
         }
-        gap_m
+        speed_mps.max(0.0)
+    }
+
+    /// How fast somebody is followed at a gap, who walks away at a speed, m/s. No step is longer than the gap.
+    fn following_mps(&self, gap_m: f64, away_mps: f64, step_s: f64) -> f64 {
+        let steady_mps = gap_m / self.time_gap_s;
+        if away_mps <= steady_mps {
+            return steady_mps;
+        }
+        let anticipated_m = gap_m + self.anticipation_s * away_mps;
+        (anticipated_m / (self.time_gap_s + self.anticipation_s)).min(gap_m / step_s)
     }
 }
 
 impl Default for CollisionFree {
     fn default() -> Self {
         Self {
-            time_gap_s: 1.15,
-            hurried_gap_s: 0.56,
-            repulsion: 2.0,
+            time_gap_s: 1.4,
+            anticipation_s: 0.25,
+            repulsion: 1.2,
             range_m: 0.1,
-            wall_repulsion: 1.0,
+            wall_repulsion: 1.6,
             wall_range_m: 0.1,
-            breadth: 0.8,
+            breadth: 0.77,
+            breadth_left: 0.66,
             turns: 2,
-            radius_m: 0.18,
+            radius_m: 0.17,
         }
     }
 }
@@ -162,35 +179,33 @@ impl WalkingModel for CollisionFree {
         self.radius_m
     }
 
-    fn hurried(&self) -> Self {
-        Self {
-            time_gap_s: self.hurried_gap_s,
-            ..*self
-        }
-    }
-
     fn velocity(&self, seen: &Surroundings<'_>) -> Vector {
         if seen.desired_mps <= 0.0 {
             return Vector::ZERO;
         }
         let direction = self.direction(seen);
-        let mut best = self.velocity_in(seen, direction);
-        let mut best_mps = best.dot(seen.toward);
-        if best.length() >= seen.desired_mps {
+        let speed_mps = self.speed_mps(seen, direction);
+        let mut best = direction * speed_mps;
+        if speed_mps >= seen.desired_mps {
             return best;
         }
+
+        let mut best_mps = best.dot(seen.toward);
         for (cosine, sine) in TURNS.iter().take(self.turns) {
             for sine in [*sine, -sine] {
                 let turned = Vector::new(
                     direction.x * cosine - direction.y * sine,
                     direction.x * sine + direction.y * cosine,
                 );
+                let toward = turned.dot(seen.toward);
+                if toward * seen.desired_mps <= best_mps {
+                    continue;
+                }
                 let free_mps = self.wall_gap_m(seen, turned) / self.time_gap_s;
-                let velocity = self.velocity_in(seen, turned).at_most(free_mps);
-                let mps = velocity.dot(seen.toward);
-                if mps > best_mps {
-                    best = velocity;
-                    best_mps = mps;
+                let speed_mps = self.speed_mps(seen, turned).min(free_mps);
+                if speed_mps * toward > best_mps {
+                    best = turned * speed_mps;
+                    best_mps = speed_mps * toward;
                 }
             }
         }
@@ -201,6 +216,7 @@ impl WalkingModel for CollisionFree {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::Neighbor;
     use crate::pedestrian::Pedestrian;
 
     fn velocity(model: &CollisionFree, others: &[Neighbor]) -> Vector {
@@ -247,6 +263,39 @@ mod tests {
             velocity(&model, &[at(1.3, 0.35)]).length() < 1.3,
             "in front"
         );
+    }
+
+    #[test]
+    fn who_walks_away_is_followed_sooner_and_at_the_same_speed_as_before() {
+        let model = CollisionFree {
+            anticipation_s: 0.5,
+            ..CollisionFree::published()
+        };
+        let following_mps = |gap_m, away_mps| model.following_mps(gap_m, away_mps, 0.05);
+        // All walk at the same speed: what the source has.
+        assert!((following_mps(0.8, 0.8) - 0.8).abs() < 1e-12);
+        // (s - l + τ u)/(T + τ) for those who walk away, and (s - l)/T for those who stand or come closer.
+        assert!((following_mps(0.4, 1.0) - 0.6).abs() < 1e-12);
+        assert!((following_mps(0.4, 0.0) - 0.4).abs() < 1e-12);
+        assert!((following_mps(0.4, -1.0) - 0.4).abs() < 1e-12);
+        // No step is longer than the gap.
+        assert!(following_mps(0.001, 1.3) <= 0.001 / 0.05);
+        assert!(following_mps(0.0, 1.3) <= 0.0);
+    }
+
+    #[test]
+    fn of_two_who_meet_the_one_from_the_right_goes_first() {
+        let model = CollisionFree {
+            repulsion: 0.0,
+            turns: 0,
+            ..CollisionFree::default()
+        };
+        // Beside the way by 0.7 l: within the breadth to the right, and not within that to the left.
+        let beside_m = 0.7 * 0.36;
+        let right = velocity(&model, &[at(0.3, -beside_m)]);
+        let left = velocity(&model, &[at(0.3, beside_m)]);
+        assert!(right.x < 0.1, "{right:?}");
+        assert_eq!(left, Vector::new(1.34, 0.0));
     }
 
     #[test]

@@ -56,17 +56,6 @@ pub trait WalkingModel: Sync {
     /// Radius of the bodies for which the model's parameters were chosen, m.
     fn body_radius_m(&self) -> f64;
 
-    /// The same model for people who are in a hurry, as those in the experiment at the gate were told to be. \[D\] Rzezonka, Chraibi,
-    /// Seyfried, Hein, Schadschneider 2022: motivation changes the time gap that people keep. Without a rule for it, the model
-    /// itself.
-    #[must_use]
-    fn hurried(&self) -> Self
-    where
-        Self: Sized + Clone,
-    {
-        self.clone()
-    }
-
     /// Velocity of a person in the next step, m/s.
     fn velocity(&self, seen: &Surroundings<'_>) -> Vector;
 }

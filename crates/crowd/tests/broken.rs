@@ -1,6 +1,8 @@
 //! A model that is broken in one way fails a case, and the calibrated one passes the same case.
 
-use crowd::checks::{CheckOptions, check};
+#![expect(clippy::unwrap_used, reason = "helpers of tests")]
+
+use crowd::checks::{CheckOptions, GATE_FLOW_PER_S, check};
 use crowd::{CollisionFree, Surroundings, Vector, WalkingModel};
 
 #[derive(Clone, Copy, Debug)]
@@ -103,27 +105,21 @@ fn no_row_depends_on_the_number_of_threads() {
     assert_eq!(with(1), with(3));
 }
 
+/// The parameters were chosen with seed 1.
 #[test]
-fn the_calibrated_model_keeps_to_the_line_of_weidmann_within_a_tenth_of_a_meter_per_second() {
-    let options = CheckOptions {
-        runs: 10,
-        populations: 10,
-        ..options("RiMEA 4")
-    };
-    let rows = check(&CollisionFree::default(), &options);
-    for row in rows.iter().filter(|row| row.published.is_some()) {
-        let away = row.mean - row.published.unwrap();
-        assert!(away.abs() <= 0.10, "{row:#?}");
+fn one_set_of_parameters_keeps_to_the_line_of_weidmann_and_to_the_flow_of_the_gate_out_of_sample() {
+    for (case, runs, width) in [("RiMEA 4", 4, 0.10), ("gate", 20, 0.10 * GATE_FLOW_PER_S)] {
+        let options = CheckOptions {
+            runs,
+            populations: 10,
+            seed: 2,
+            ..options(case)
+        };
+        let rows = check(&CollisionFree::default(), &options);
+        let judged = rows.iter().filter(|row| row.requirement.is_some());
+        for row in judged.filter(|row| row.published.is_some()) {
+            let away = row.mean - row.published.unwrap();
+            assert!(away.abs() <= width, "{row:#?}");
+        }
     }
-}
-
-#[test]
-fn the_calibrated_model_has_the_flow_of_the_gate_within_a_tenth() {
-    let options = CheckOptions {
-        runs: 20,
-        populations: 10,
-        ..options("gate")
-    };
-    let rows = check(&CollisionFree::default(), &options);
-    assert!(rows[0].is_passed, "{:#?}", rows[0]);
 }

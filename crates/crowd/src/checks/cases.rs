@@ -407,7 +407,7 @@ pub(crate) fn two_rooms<M: WalkingModel + Clone>(model: &M, chance: &mut RunChan
     ]
 }
 
-/// 75 people, told to hurry, through a gate of 0.5 m at the end of a corridor of 5.6 m. The flow, and that of the middle 60 % of
+/// 75 people through a gate of 0.5 m at the end of a corridor of 5.6 m. The flow, and that of the middle 60 % of
 /// them, 1/s.
 pub(crate) fn gate<M: WalkingModel + Clone>(model: &M, chance: &mut RunChance) -> Vec<f64> {
     let premises = Premises {
@@ -423,7 +423,7 @@ pub(crate) fn gate<M: WalkingModel + Clone>(model: &M, chance: &mut RunChance) -
         line((10.0, 1.8), (10.0, 3.8)),
     ];
     let area = (Vector::ZERO, Vector::new(6.0, 5.6));
-    let times_s = flow_times(&model.hurried(), chance, &premises, &lines, area, 75);
+    let times_s = flow_times(model, chance, &premises, &lines, area, 75);
     let passed = &times_s[0];
     let cut = passed.len() / 5;
     vec![

@@ -50,7 +50,8 @@ pub fn weidmann_mps(density_per_m2: f64) -> f64 {
 pub const SINGLE_FILE: [(f64, f64); 4] = [(0.75, 0.89), (1.25, 0.45), (1.75, 0.19), (2.25, 0.07)];
 
 /// Flow of 75 people through a gate of 0.5 m at the end of a corridor of 5.6 m, 1/s. \[D\] Adrian, Seyfried, Sieben 2020, run
-/// `040_c_56_h`, as PedPy ships it.
+/// `040_c_56_h-`, as PedPy ships it. They were in no hurry: `h-` is the second run, in which people had been told that everyone will see
+/// the stage.
 pub const GATE_FLOW_PER_S: f64 = 1.15;
 
 #[cfg(test)]
