@@ -6,6 +6,8 @@ use crate::draws::Draws;
 const RESAMPLES: usize = 2_000;
 /// Fewest groups of runs that are resampled.
 const GROUPS_MIN: usize = 5;
+/// Differences of less than this share are rounding.
+const ROUNDING: f64 = 1e-9;
 
 /// Bootstrap interval of the mean of runs, 95 %: bootstrap-t (Efron 1979; Hall 1988) over the means of populations, because runs of the same
 /// population are alike. Run k is of population k % `populations`. With fewer than five populations it reaches from the lowest to the
@@ -14,7 +16,7 @@ pub(crate) fn mean_interval(values: &[f64], populations: usize) -> (f64, f64) {
     let groups = group_means(values, populations);
     let low = groups.iter().copied().fold(f64::INFINITY, f64::min);
     let high = groups.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    if groups.len() < GROUPS_MIN || low == high {
+    if groups.len() < GROUPS_MIN || high - low <= ROUNDING * high.abs() {
         return (low, high);
     }
 
@@ -28,7 +30,7 @@ pub(crate) fn mean_interval(values: &[f64], populations: usize) -> (f64, f64) {
         }
         let (resampled_mean, resampled_error) = mean_and_error(&resample);
         // A resample of one value only has no ratio.
-        if resampled_error > 0.0 {
+        if resampled_error > ROUNDING * error {
             ratios.push((resampled_mean - mean) / resampled_error);
         }
     }
@@ -98,5 +100,16 @@ mod tests {
         assert_eq!(mean_interval(&[2.0; 50], 10), (2.0, 2.0));
         assert_eq!(mean_interval(&[1.0, 2.0, 4.0], 10), (1.0, 4.0));
         assert_eq!(mean_interval(&[7.0], 10), (7.0, 7.0));
+        // Times are sums of steps, so equal ones differ by rounding.
+        let mut rounded = [30.1; 50];
+        rounded[7] += 1e-13;
+        let (low, high) = mean_interval(&rounded, 10);
+        assert!(
+            (low - 30.1).abs() + (high - 30.1).abs() < 1e-9,
+            "{low} {high}"
+        );
+        rounded[11] += 1.0;
+        let (low, high) = mean_interval(&rounded, 10);
+        assert!(low > 29.0 && high < 32.0, "{low} {high}");
     }
 }
