@@ -19,9 +19,9 @@ const CHUNK_BYTES: usize = 256 << 10;
 /// What was handed over is in the file at most this long after: what a crash can lose.
 const CHUNK_INTERVAL: Duration = Duration::from_secs(1);
 /// Ticks that may wait to be encoded. The run waits when there are more.
-const QUEUE: usize = 64;
+const QUEUE: usize = 256;
 /// Ticks that are encoded together: to wake the other thread for each one would take longer than to encode it.
-const BATCH: usize = 16;
+const BATCH: usize = 64;
 /// Coordinates of guests that may wait, so that large crowds take no more memory than this and one tick.
 const QUEUE_COORDINATES: usize = 1 << 20;
 
