@@ -15,7 +15,8 @@ const RADIO: [&str; 2] = [
 fn why_messages_were_lost_is_the_same_in_processes_and_is_shown() {
     let lab = Lab::new();
     let play = |command: &str, run: &str, more: &[&str]| {
-        let arguments = [&[command, "swarm", "--run", run][..], &RADIO, more].concat();
+        let named = [command, "swarm", "--run", run, "--duration", "30 s"];
+        let arguments = [&named[..], &RADIO, more].concat();
         lab.ok(&arguments);
     };
     play("run", "run", &[]);

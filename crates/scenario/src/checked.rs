@@ -7,7 +7,8 @@ use protocol::messages::{DisplayUnit, Parameters, Point};
 use protocol::{RobotName, Tick};
 use serde::{Deserialize, Serialize};
 use world::{
-    CrowdGuests, Field, Goal, GuestWalk, Guests, Hall, Region, Shape, Shapes, Wall, Want, Wheels,
+    CrowdGuests, Field, GuestWalk, Guests, Hall, Region, Shape, Shapes, Wall, Want, WantTarget,
+    Wheels,
 };
 
 use super::change::{Change, Parent};
@@ -242,15 +243,15 @@ impl Scenario {
         let goal = match &want.goal {
             WantGoal::Site(name) => {
                 let site = self.sites.get(name);
-                Goal::Place(
+                WantTarget::Place(
                     self.inside(site.map_or_else(Default::default, |site| to_world(site.at))),
                 )
             }
-            WantGoal::Place(at) => Goal::Place(self.inside(*at)),
-            WantGoal::Exit(at) => Goal::Exit(self.inside(*at)),
+            WantGoal::Place(at) => WantTarget::Place(self.inside(*at)),
+            WantGoal::Exit(at) => WantTarget::Exit(self.inside(*at)),
             WantGoal::Treat(name) => {
                 let mut robots = self.robots.keys();
-                Goal::Robot(robots.position(|robot| robot == name).unwrap_or_default())
+                WantTarget::Robot(robots.position(|robot| robot == name).unwrap_or_default())
             }
         };
         Want {

@@ -461,12 +461,15 @@ fn what_guests_want_is_written_and_read() {
     let world::GuestWalk::Crowd(walk) = scenario.guest_walk() else {
         panic!("they walk by a model");
     };
-    assert_eq!(walk.wants[0].goal, world::Goal::Place(Point::new(9.0, 9.0)));
+    assert_eq!(
+        walk.wants[0].goal,
+        world::WantTarget::Place(Point::new(9.0, 9.0))
+    );
     assert_eq!(
         walk.wants[2].goal,
-        world::Goal::Exit(Point::new(0.3048, 7.0))
+        world::WantTarget::Exit(Point::new(0.3048, 7.0))
     );
-    assert_eq!(walk.wants[3].goal, world::Goal::Robot(0));
+    assert_eq!(walk.wants[3].goal, world::WantTarget::Robot(0));
 }
 
 #[test]

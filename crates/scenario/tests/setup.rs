@@ -64,7 +64,7 @@ fn what_is_changed_is_changed_and_the_rest_stays() {
 #[test]
 fn the_number_of_guests_has_a_limit() {
     let mut setup = scenario().setup();
-    setup.field_m = [1000.0, 1000.0];
+    setup.field_m = [4000.0, 4000.0];
     setup.guests = u32::try_from(MAX_GUESTS).unwrap();
     assert!(scenario().with_setup(&setup).is_ok());
 

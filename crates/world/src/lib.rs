@@ -104,5 +104,5 @@ pub use social::{CrowdGuests, CrowdModel};
 pub use tracks::{Recorded, Track, TrackPoint};
 pub use triangular::Triangular;
 pub use walk::Passage;
-pub use wants::{Goal, Want};
+pub use wants::{Want, WantTarget};
 pub use wheels::{Pose, Velocity, Wheels};

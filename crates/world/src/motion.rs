@@ -329,7 +329,7 @@ impl<R> World<R> {
         }
     }
 
-    /// A guest has got something from a robot. One that [wants](crate::Goal::Robot) that wants something else from the next tick on.
+    /// A guest has got something from a robot. One that [wants](crate::WantTarget::Robot) that wants something else from the next tick on.
     pub fn satisfy(&mut self, guest: usize, robot: usize) {
         if let Crowd::Social(walk) = &mut self.crowd {
             walk.satisfy(guest, robot);

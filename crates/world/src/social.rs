@@ -10,7 +10,7 @@ use crate::guests::RandomWalk;
 use crate::hall::Hall;
 use crate::point::Point;
 use crate::walk::{GuestFloor, GuestWalker};
-use crate::wants::{Errand, Want, Wants};
+use crate::wants::{GuestStep, Want, Wants};
 use crowd::{
     CollisionFree, CrowdError, Disc, Itinerary, Pedestrian, Pedestrians, Premises, SocialForce,
     Surroundings, WalkingModel, WallLine,
@@ -177,20 +177,20 @@ impl SocialWalk {
     fn decide(&mut self, floor: &mut GuestFloor<'_>, rng: &mut dyn Rng) {
         for index in 0..self.ids.len() {
             let course = self.wishes.next(index, rng);
-            let errand = self.wants.as_mut().map(|wants| wants.errand(index, floor));
-            let wanted = match errand {
+            let step = self.wants.as_mut().map(|wants| wants.step(index, floor));
+            let wanted = match step {
                 None => course.step_m,
-                Some(Errand::Go(at)) => at - floor.guest(index),
-                Some(Errand::Stand) => Point::default(),
-                Some(Errand::Leave) => {
+                Some(GuestStep::Go(at)) => at - floor.guest(index),
+                Some(GuestStep::Stand) => Point::default(),
+                Some(GuestStep::Leave) => {
                     self.leave(index, floor);
                     continue;
                 }
-                Some(Errand::Return(at)) => {
+                Some(GuestStep::Return(at)) => {
                     self.come_back(index, at, floor);
                     continue;
                 }
-                Some(Errand::Away) => continue,
+                Some(GuestStep::Away) => continue,
             };
             let direction = floor.direction(index).unwrap_or(wanted);
             self.head(index, direction, course.speed_mps);

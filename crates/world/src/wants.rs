@@ -14,7 +14,7 @@ use rand_xoshiro::SplitMix64;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Want {
     /// What it is.
-    pub goal: Goal,
+    pub goal: WantTarget,
     /// How often it is wanted, in proportion to the others; above 0.
     pub weight: f64,
     /// How near a guest goes to it, m.
@@ -27,7 +27,7 @@ pub struct Want {
 
 /// What a guest wants.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Goal {
+pub enum WantTarget {
     /// To be at a place, m.
     Place(Point),
     /// To leave the field at a place, m.
@@ -38,7 +38,7 @@ pub enum Goal {
 
 /// What a guest does in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Errand {
+pub(crate) enum GuestStep {
     /// It goes to a place.
     Go(Point),
     /// It stands.
@@ -70,11 +70,11 @@ struct Wanting {
     want: usize,
     /// It gives up, or has stayed, after so many ticks.
     ticks_left: u64,
-    progress: Progress,
+    progress: WantProgress,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Progress {
+enum WantProgress {
     Going,
     Staying,
     Outside,
@@ -96,7 +96,7 @@ impl Wants {
             count: 0,
             want: 0,
             ticks_left: 0,
-            progress: Progress::Going,
+            progress: WantProgress::Going,
         };
         let mut all = Self {
             wants,
@@ -119,37 +119,37 @@ impl Wants {
 
     pub(crate) fn has_exits(&self) -> bool {
         let mut wants = self.wants.iter();
-        wants.any(|want| matches!(want.goal, Goal::Exit(_)))
+        wants.any(|want| matches!(want.goal, WantTarget::Exit(_)))
     }
 
     /// A guest has got something from a robot: if it wanted that, it wants something else.
     pub(crate) fn satisfy(&mut self, guest: usize, robot: usize) {
-        if self.wants[self.guests[guest].want].goal == Goal::Robot(robot) {
+        if self.wants[self.guests[guest].want].goal == WantTarget::Robot(robot) {
             self.want_next(guest);
         }
     }
 
     /// What a guest does in this tick.
-    pub(crate) fn errand(&mut self, guest: usize, floor: &GuestFloor<'_>) -> Errand {
+    pub(crate) fn step(&mut self, guest: usize, floor: &GuestFloor<'_>) -> GuestStep {
         let wanting = &mut self.guests[guest];
         let want = &self.wants[wanting.want];
         let is_over = wanting.ticks_left == 0;
         wanting.ticks_left = wanting.ticks_left.saturating_sub(1);
 
         match (wanting.progress, want.goal) {
-            (Progress::Outside, Goal::Exit(at)) if is_over => Errand::Return(at),
-            (Progress::Outside, _) => Errand::Away,
-            (Progress::Staying, _) if !is_over => Errand::Stand,
-            (Progress::Staying, _) => self.next_errand(guest, floor),
-            (Progress::Going, goal) => {
+            (WantProgress::Outside, WantTarget::Exit(at)) if is_over => GuestStep::Return(at),
+            (WantProgress::Outside, _) => GuestStep::Away,
+            (WantProgress::Staying, _) if !is_over => GuestStep::Stand,
+            (WantProgress::Staying, _) => self.next_step(guest, floor),
+            (WantProgress::Going, goal) => {
                 let at = goal.place(floor);
                 let is_there = floor.guest(guest).distance_m(at) <= want.within_m;
                 match goal {
-                    Goal::Exit(_) if is_there => self.go_outside(guest),
-                    Goal::Place(_) if is_there => self.stay(guest),
-                    _ if is_over => self.next_errand(guest, floor),
-                    Goal::Robot(_) if is_there => Errand::Stand,
-                    _ => Errand::Go(at),
+                    WantTarget::Exit(_) if is_there => self.go_outside(guest),
+                    WantTarget::Place(_) if is_there => self.stay(guest),
+                    _ if is_over => self.next_step(guest, floor),
+                    WantTarget::Robot(_) if is_there => GuestStep::Stand,
+                    _ => GuestStep::Go(at),
                 }
             }
         }
@@ -160,21 +160,21 @@ impl Wants {
         self.want_next(guest);
     }
 
-    fn next_errand(&mut self, guest: usize, floor: &GuestFloor<'_>) -> Errand {
+    fn next_step(&mut self, guest: usize, floor: &GuestFloor<'_>) -> GuestStep {
         self.want_next(guest);
-        Errand::Go(self.wants[self.guests[guest].want].goal.place(floor))
+        GuestStep::Go(self.wants[self.guests[guest].want].goal.place(floor))
     }
 
-    fn go_outside(&mut self, guest: usize) -> Errand {
+    fn go_outside(&mut self, guest: usize) -> GuestStep {
         self.guests[guest].ticks_left = self.draw_stay(guest).unwrap_or(u64::MAX);
-        self.guests[guest].progress = Progress::Outside;
-        Errand::Leave
+        self.guests[guest].progress = WantProgress::Outside;
+        GuestStep::Leave
     }
 
-    fn stay(&mut self, guest: usize) -> Errand {
+    fn stay(&mut self, guest: usize) -> GuestStep {
         self.guests[guest].ticks_left = self.draw_stay(guest).unwrap_or(0);
-        self.guests[guest].progress = Progress::Staying;
-        Errand::Stand
+        self.guests[guest].progress = WantProgress::Staying;
+        GuestStep::Stand
     }
 
     fn want_next(&mut self, guest: usize) {
@@ -193,7 +193,7 @@ impl Wants {
         let wanting = &mut self.guests[guest];
         wanting.want = chosen;
         wanting.ticks_left = self.wants[chosen].give_up;
-        wanting.progress = Progress::Going;
+        wanting.progress = WantProgress::Going;
     }
 
     /// For how many ticks a guest stays, from a draw of its own.
@@ -208,12 +208,13 @@ impl Wants {
     /// The stream of the thing that a guest wants.
     fn draws(&self, guest: usize) -> SplitMix64 {
         let Wanting { key, count, .. } = self.guests[guest];
-        // Streams of neighboring seeds of SplitMix64 overlap, so the number is spread by the fraction of the golden ratio's double.
+        // The state of SplitMix64 counts up, so numbers side by side would give streams that overlap: a multiplier of Steele and
+        // Vigna (2021) spreads them.
         SplitMix64::seed_from_u64(key ^ count.wrapping_mul(0xd134_2543_de82_ef95))
     }
 }
 
-impl Goal {
+impl WantTarget {
     fn place(self, floor: &GuestFloor<'_>) -> Point {
         match self {
             Self::Place(at) | Self::Exit(at) => at,

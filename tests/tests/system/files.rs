@@ -295,7 +295,7 @@ fn a_file_named_by_another_is_a_regular_one() {
 fn the_number_of_guests_has_a_limit() {
     let folder = tempfile::tempdir().unwrap();
     let text = |count: usize| {
-        format!("[field]\nsize = [\"1000 m\", \"1000 m\"]\n[guests]\ncount = {count}\n")
+        format!("[field]\nsize = [\"4000 m\", \"4000 m\"]\n[guests]\ncount = {count}\n")
     };
     let most = scenario::MAX_GUESTS;
     let (code, printed) = check(folder.path(), "most.toml", &text(most));

@@ -10,13 +10,9 @@ use system_tests::root;
 use super::boundaries::sources;
 
 /// Types of several crates with one name: they are the same idea, on the two sides of a border that no dependency crosses.
-const SHARED: [(&str, &str); 7] = [
+const SHARED: [(&str, &str); 6] = [
     ("Blocker", "what the environment finds, and the event of it"),
     ("Cars", "what a robot sees in a tick, in Rust and in Python"),
-    (
-        "Point",
-        "a place on the field, in messages and in the environment",
-    ),
     (
         "Pose",
         "where a robot that drives is, in messages and in the environment",

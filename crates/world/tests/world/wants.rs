@@ -2,12 +2,12 @@
 
 use crate::halls::{TestWorld, is_inside, overlap, reception, rng, triangular};
 use proptest::prelude::*;
-use world::{CrowdGuests, CrowdModel, Goal, GuestWalk, Hall, Point, Want, World};
+use world::{CrowdGuests, CrowdModel, GuestWalk, Hall, Point, Want, WantTarget, World};
 
 const TABLE: Point = Point::new(3.0, 3.0);
 const DOOR: Point = Point::new(15.24 - 0.3048, 7.62);
 
-fn want(goal: Goal) -> Want {
+fn want(goal: WantTarget) -> Want {
     Want {
         goal,
         weight: 1.0,
@@ -67,7 +67,10 @@ fn assert_stands(world: &mut TestWorld, ticks: usize) {
 #[test]
 fn a_guest_goes_to_a_place_stays_and_goes_to_the_next() {
     let corner = Point::new(12.0, 3.0);
-    let wants = [want(Goal::Place(TABLE)), want(Goal::Place(corner))];
+    let wants = [
+        want(WantTarget::Place(TABLE)),
+        want(WantTarget::Place(corner)),
+    ];
     let mut world = world_of(&hall(1), &wants, 4);
     let mut visits = [0, 0];
     for _ in 0..12 {
@@ -86,7 +89,7 @@ fn a_guest_goes_to_a_place_stays_and_goes_to_the_next() {
 
 #[test]
 fn who_leaves_by_an_exit_comes_back_only_with_a_time_to_stay_away() {
-    let mut world = world_of(&hall(1), &[want(Goal::Exit(DOOR))], 2);
+    let mut world = world_of(&hall(1), &[want(WantTarget::Exit(DOOR))], 2);
     assert!(world.has_passages());
     assert_eq!(world.passages(), [], "it is there at the beginning");
     ticks_until(&mut world, |world| !world.is_present(0));
@@ -99,7 +102,7 @@ fn who_leaves_by_an_exit_comes_back_only_with_a_time_to_stay_away() {
 
     let for_good = Want {
         stay_s: None,
-        ..want(Goal::Exit(DOOR))
+        ..want(WantTarget::Exit(DOOR))
     };
     let mut world = world_of(&hall(1), &[for_good], 2);
     ticks_until(&mut world, |world| !world.is_present(0));
@@ -113,12 +116,12 @@ fn who_leaves_by_an_exit_comes_back_only_with_a_time_to_stay_away() {
 fn who_wants_what_a_robot_gives_waits_at_it_until_it_has_it() {
     let treat = Want {
         stay_s: None,
-        ..want(Goal::Robot(0))
+        ..want(WantTarget::Robot(0))
     };
     let mut hall = hall(1);
     // In a corner, so that it is not in the way to the table.
     hall.robots = vec![Point::new(14.5, 14.5)];
-    let mut world = world_of(&hall, &[treat, want(Goal::Place(TABLE))], 1);
+    let mut world = world_of(&hall, &[treat, want(WantTarget::Place(TABLE))], 1);
     let robot = world.robots()[0];
     let mut served = 0;
     let mut tables = 0;
@@ -151,7 +154,7 @@ fn who_does_not_come_to_it_gives_it_up() {
     let (left, right) = (Point::new(2.0, 7.0), Point::new(13.0, 7.0));
     let short = |at| Want {
         give_up: 60,
-        ..want(Goal::Place(at))
+        ..want(WantTarget::Place(at))
     };
     let mut world = world_of(&hall, &[short(left), short(right)], 3);
     let is_left = world.guests()[0].x < 7.62;
@@ -168,9 +171,9 @@ fn who_does_not_come_to_it_gives_it_up() {
 fn weights_are_how_often_something_is_wanted() {
     let often = Want {
         weight: 3.0,
-        ..want(Goal::Place(TABLE))
+        ..want(WantTarget::Place(TABLE))
     };
-    let seldom = want(Goal::Place(Point::new(12.0, 12.0)));
+    let seldom = want(WantTarget::Place(Point::new(12.0, 12.0)));
     let mut hall = hall(60);
     hall.field.body_m = 0.05;
     let mut world = world_of(&hall, &[often, seldom], 5);
@@ -194,7 +197,7 @@ proptest! {
         let mut hall = hall(40);
         hall.obstacles = vec![Point::new(5.0, 5.0)];
         hall.max_speed_mps = 1.0;
-        let wants = [want(Goal::Place(Point::new(5.0, 5.0))), want(Goal::Exit(DOOR)), want(Goal::Robot(0))];
+        let wants = [want(WantTarget::Place(Point::new(5.0, 5.0))), want(WantTarget::Exit(DOOR)), want(WantTarget::Robot(0))];
         let mut world = world_of(&hall, &wants, seed);
         let mut calm = world.clone();
         for tick in 0..200 {
