@@ -221,7 +221,12 @@ fn interval(row: &CheckedRow) -> String {
 
 fn number(value: f64) -> String {
     let decimals = if value.abs() < 100.0 { 2 } else { 1 };
-    format!("{value:.decimals$}")
+    let text = format!("{value:.decimals$}");
+    if text == "-0.00" {
+        "0.00".to_owned()
+    } else {
+        text
+    }
 }
 
 fn result(row: &CheckedRow) -> &'static str {

@@ -1,7 +1,5 @@
 //! A model that is broken in one way fails a case, and the calibrated one passes the same case.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests")]
-
 use crowd::checks::{CheckOptions, GATE_FLOW_PER_S, check};
 use crowd::{CollisionFree, Surroundings, Vector, WalkingModel};
 

@@ -11,7 +11,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("world", &["crowd"]),
     ("radio", &[]),
     ("affect", &[]),
-    ("crowd", &[]),
+    ("crowd", &["pictures"]),
     ("protocol", &[]),
     ("lockstep", &["protocol"]),
     ("config", &["protocol"]),
