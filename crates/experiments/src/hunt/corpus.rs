@@ -6,9 +6,10 @@ use std::sync::Arc;
 use protocol::Tick;
 
 use super::coverage::{Feature, MAX_FEATURES};
+use super::draw::MAX_STEPS;
 use super::fault::PlannedFault;
 use super::sent::{Link, Onset};
-use super::trial::{PlayedPlan, SavedRun, TrialPlan};
+use super::trial::{PlayedPlan, SavedRun, TrialPlan, TrialResult};
 
 /// Most states; a hunt that has as many goes on from these.
 const MAX_STATES: usize = 4096;
@@ -79,7 +80,8 @@ impl Corpus {
             if *tick <= plan.after {
                 continue;
             }
-            if self.is_new(feature) {
+            // A state from which nothing can go on is left to a plan with fewer faults.
+            if self.is_new(feature) && begun(plan, *tick, result).len() < MAX_STEPS {
                 new.entry(*tick).or_default().push(feature.clone());
                 if let Feature::Message { link, .. } = feature {
                     *self.texts.entry(link.clone()).or_default() += 1;
@@ -100,8 +102,7 @@ impl Corpus {
             let saved = saved.filter(|_| self.saved < MAX_SAVED);
             self.saved += usize::from(saved.is_some());
 
-            let mut faults = plan.case.faults.clone();
-            faults.retain(|fault| fault.has_begun(tick, &result.sent));
+            let faults = begun(plan, tick, result);
             self.states.push(ReachedState {
                 faults,
                 onset: Onset::of(&result.sent, tick),
@@ -113,12 +114,18 @@ impl Corpus {
     }
 }
 
+/// The faults of a plan that had begun by a tick of its run.
+fn begun(plan: &TrialPlan, tick: Tick, result: &TrialResult) -> Vec<PlannedFault> {
+    let mut faults = plan.case.faults.clone();
+    faults.retain(|fault| fault.has_begun(tick, &result.sent));
+    faults
+}
+
 #[cfg(test)]
 mod tests {
     use protocol::RobotName;
 
     use super::super::case::FaultCase;
-    use super::super::trial::TrialResult;
     use super::*;
 
     fn change(to: &str) -> Feature {
@@ -164,6 +171,29 @@ mod tests {
         assert!(!corpus.is_new(&Feature::Fault {
             kind: super::super::fault::FaultClass::Lose
         }));
+    }
+
+    #[test]
+    fn a_state_from_which_nothing_can_go_on_is_left_to_another_plan() {
+        let (mut plan, mut result) = played(0, &[("X", 5)]);
+        let reseed = |at| PlannedFault::Reseed {
+            at,
+            seed: 1,
+            of: Vec::new(),
+        };
+        plan.case = FaultCase::of(
+            (1..=MAX_STEPS as Tick)
+                .map(|at| reseed(at.min(4)))
+                .collect(),
+        );
+        assert_eq!(plan.case.faults.len(), MAX_STEPS);
+        let mut corpus = Corpus::default();
+        corpus.add(&plan, &mut result);
+        assert!(corpus.states.is_empty() && corpus.is_new(&change("X")));
+
+        let (plan, mut result) = played(0, &[("X", 7)]);
+        corpus.add(&plan, &mut result);
+        assert_eq!(corpus.states[0].onset.after, 7);
     }
 
     #[test]

@@ -14,7 +14,7 @@ use super::trial::TrialResult;
 /// Most faults of a plan that is drawn anew.
 const MAX_FAULTS: usize = 4;
 /// Most faults of a plan that goes on from a state, with those that led to it.
-const MAX_STEPS: usize = 8;
+pub(super) const MAX_STEPS: usize = 8;
 /// How often the time after a state is halved at most, so that faults soon after it are as likely as later ones.
 const HALVINGS: usize = 6;
 /// Seeds of re-seeds are below this number, so that people can read them.
