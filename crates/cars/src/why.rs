@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use clap::Args;
 use experiments::why::{WhyAnswer, WhyBudget, WhyOptions, why as find_out};
 use indicatif::{ProgressBar, ProgressStyle};
+use lab::LabError;
 use lab::folder::{find, recorded_epoch, run_name};
 use lab::run::project_robots;
 use protocol::Epoch;
@@ -14,10 +15,12 @@ use protocol::time::time_s;
 use record::names::LATEST;
 use terminal::OutputError;
 
-use crate::errors::Result;
+use crate::errors::{Result, refusal};
 
 /// Most jumps and causes that are printed.
 const MAX_ROWS: usize = 20;
+/// The exit status after a second Ctrl-C, as shells have it.
+const INTERRUPTED: i32 = 130;
 /// Set by Ctrl-C: what was played is kept.
 static STOP: AtomicBool = AtomicBool::new(false);
 
@@ -54,7 +57,12 @@ pub(crate) struct WhyArgs {
 pub(crate) fn why(args: &WhyArgs) -> Result<ExitCode> {
     let folder = find(&args.out, &args.run)?.resolved()?;
     let files = recorded_epoch(&folder, args.epoch)?;
-    ctrlc::set_handler(|| STOP.store(true, Ordering::Relaxed))?;
+    ctrlc::set_handler(|| {
+        if STOP.swap(true, Ordering::Relaxed) {
+            // Whoever asks a second time does not want to wait for the forks in progress.
+            std::process::exit(INTERRUPTED);
+        }
+    })?;
 
     let jobs = match args.jobs {
         Some(jobs) => jobs as usize,
@@ -69,7 +77,7 @@ pub(crate) fn why(args: &WhyArgs) -> Result<ExitCode> {
     };
     let style = ProgressStyle::with_template("{spinner} {msg}, {elapsed}")?;
     let bar = ProgressBar::new_spinner().with_style(style);
-    let (answer, path) = find_out(
+    let found = find_out(
         &folder,
         &run_name(&folder),
         &files,
@@ -81,8 +89,15 @@ pub(crate) fn why(args: &WhyArgs) -> Result<ExitCode> {
             ));
             bar.tick();
         },
-    )?;
+    );
     bar.finish_and_clear();
+    let (answer, path) = found.map_err(|error| match error {
+        LabError::Interrupted => refusal!(
+            help = "the forks that were played are kept: the same command goes on",
+            "interrupted"
+        ),
+        error => error.into(),
+    })?;
 
     let printed = if args.json {
         let json = serde_json::to_string_pretty(&answer)?;
@@ -113,7 +128,8 @@ fn in_words(answer: &WhyAnswer) -> String {
             "after".to_owned(),
             jump.shown.after.in_words_with_count(is_share),
         ]);
-        for tried in &jump.tried {
+        // What other chance could not leave out was not tried.
+        for tried in jump.tried.iter().filter(|tried| tried.without.n > 0) {
             let restores = if tried.restores { " *" } else { "" };
             let what = format!("without: {}{restores}", tried.what);
             rows.push([
@@ -132,10 +148,14 @@ fn in_words(answer: &WhyAnswer) -> String {
             effect.without.in_words_with_count(is_share),
         ]);
     }
+    let left_out = rows.len().saturating_sub(MAX_ROWS);
     rows.truncate(MAX_ROWS);
     if !rows.is_empty() {
         let head = ["time", "forks", "outcome"];
         text += &format!("\n{}\n", terminal::table(head, rows, 2, head.len()));
+    }
+    if left_out > 0 {
+        text += &format!("{left_out} further rows are in the file of the answer\n");
     }
 
     if !answer.kinds.is_empty() {

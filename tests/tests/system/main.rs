@@ -64,5 +64,6 @@ mod temporary;
 mod threads;
 mod timeline;
 mod wall_clock;
+mod why;
 mod wire;
 mod worlds;

@@ -83,11 +83,23 @@ pub fn why(
     let mut rungs = BTreeMap::from([(0, trunk.snapshot()?)]);
 
     // As it is, or, if it was stopped, as it would have gone on.
-    trunk.go_to(trunk.last())?;
+    while trunk.tick() < trunk.last() {
+        if options.stop.load(Ordering::Relaxed) {
+            return Err(LabError::Interrupted);
+        }
+        trunk.go_to(trunk.tick() + 1)?;
+    }
     let whole = trunk.snapshot()?;
     let digest = trunk.simulation().digest();
     let is_share = asked.question.is_share();
-    let outcome = asked.outcome(&mut trunk.into_branch()?)?;
+    let outcome = asked.outcome(&mut trunk.into_branch()?);
+    let outcome = outcome.map_err(|error| match error {
+        LabError::Robot(error) => LabError::refused(format!(
+            "the run has no outcome, because a robot ends it: {error}"
+        ))
+        .with_help("mend the robot, and ask about a run that goes to its end"),
+        error => error,
+    })?;
     rungs.insert(whole.last(), whole);
 
     let name = file_name(&asked.question);

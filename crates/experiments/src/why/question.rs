@@ -121,7 +121,8 @@ impl AskedRun {
     fn of_condition(condition: &str, scenario: &Scenario) -> Result<Self, LabError> {
         let source = Source {
             name: "the question".to_owned(),
-            text: format!("[[expect]]\nname = \"{ASKED}\"\nnever = {condition}\n"),
+            // In one line, so that an error shows the condition.
+            text: format!("expect = [{{ name = \"{ASKED}\", never = {condition} }}]\n"),
         };
         let mut expected: Vec<Expectation> = scenario::expectations(&source, &scenario.setting())?;
         let mut asked = scenario.clone();
@@ -154,6 +155,11 @@ impl AskedRun {
 
     fn of_summary(path: &str, scenario: &Scenario) -> Result<Self, LabError> {
         Summary::check_path(path).map_err(LabError::refused)?;
+        if path.starts_with("wall.") {
+            return Err(LabError::refused(format!(
+                "{path} is wall clock: it says nothing about the run, and is another number whenever it is executed"
+            )));
+        }
         let mut table = toml::Table::new();
         table.insert("name".to_owned(), ASKED.into());
         table.insert("summary".to_owned(), path.into());

@@ -95,18 +95,24 @@ pub(super) fn search(run: &SearchedRun<'_>, forks: &mut dyn Forks) -> Result<Fou
         points: BTreeMap::new(),
         is_complete: true,
     };
+    // What the scenario plans is few and may be all of the answer, so a small budget goes there.
+    search.reach(0, SCOUTS)?;
+    let planned = search.planned()?;
     search.scout()?;
     let least_jump = search.least_jump();
     let ticks = search.narrow(least_jump)?;
     let jumps = search.confirm(&ticks, least_jump)?;
     let kinds = search.kinds()?;
-    let planned = search.planned(least_jump)?;
+    let planned = planned.into_iter().map(|(mut effect, change)| {
+        effect.matters = effect.p <= LEVEL && change.abs() >= least_jump;
+        effect
+    });
 
     Ok(FoundJumps {
         curve: search.curve(),
         jumps,
         kinds,
-        planned,
+        planned: planned.collect(),
         least_jump,
         is_complete: search.is_complete,
     })
@@ -407,9 +413,9 @@ impl Search<'_> {
         Ok(effects)
     }
 
-    /// What the scenario plans, and whether it matters.
-    fn planned(&mut self, least_jump: f64) -> Result<Vec<PlannedEffect>, LabError> {
-        let mut effects = Vec::new();
+    /// What the scenario plans, with how far the outcome is another one without it. Whether that matters is not said yet.
+    fn planned(&mut self) -> Result<Vec<(PlannedEffect, f64)>, LabError> {
+        let mut effects: Vec<(PlannedEffect, f64)> = Vec::new();
         let mut p_values = Vec::new();
         for (tick, what, event) in &self.run.planned {
             if !self.goes_on() {
@@ -424,18 +430,18 @@ impl Search<'_> {
             let without = self.forks.play(&plan, numbers)?;
             let change = differences(&with, without.iter());
             p_values.push(SignFlip::of(&change).p);
-            effects.push(PlannedEffect {
+            let effect = PlannedEffect {
                 what: what.clone(),
                 tick: *tick,
                 with: outcomes_of(&with, self.run.is_share),
                 without: outcomes_of(&without, self.run.is_share),
                 p: 1.0,
-                matters: mean(&change).abs() >= least_jump,
-            });
+                matters: false,
+            };
+            effects.push((effect, mean(&change)));
         }
-        for (effect, p) in effects.iter_mut().zip(holm(&p_values)) {
+        for ((effect, _), p) in effects.iter_mut().zip(holm(&p_values)) {
             effect.p = p;
-            effect.matters &= p <= LEVEL;
         }
         Ok(effects)
     }
