@@ -32,6 +32,8 @@ const TRYING: u64 = 200;
 const LEAST_JUMP: f64 = 0.1;
 /// The same of a number, in its largest standard deviation over the run.
 const LEAST_JUMP_SD: f64 = 0.5;
+/// Part of the least jump that a jump must surely exceed.
+const SURE_PART: f64 = 0.5;
 /// Share of the least jump that both halves of an interval together must have, so that it is looked at.
 const WORTH_A_LOOK: f64 = 0.7;
 /// Points of the grid on each side of an interval that are looked at together, and how many standard errors must lie between them.
@@ -291,7 +293,13 @@ impl Search<'_> {
             }
             let before = self.fresh(tick - 1, CONFIRMING)?;
             let after = self.fresh(tick, CONFIRMING)?;
-            p_values.push(SignFlip::of(&differences(&before, after.iter())).p);
+            let mut beyond = differences(&before, after.iter());
+            // Chance in any tick changes the outcome a little: a jump must surely be more than that.
+            let surely = mean(&beyond).signum() * least_jump * SURE_PART;
+            for difference in &mut beyond {
+                *difference -= surely;
+            }
+            p_values.push(SignFlip::of(&beyond).p);
             sides.push((tick, before, after));
         }
 
