@@ -74,7 +74,7 @@ def test_what_decided_a_run_is_a_sentence_and_frames(kind: str) -> None:
     why = run.why()
     assert str(why) == why.sentence == "waited was decided at 30 s." and "waited" in repr(why)
     curve, jumps = why.frames(kind)
-    assert list(curve.columns) == ["tick", "time_s", "value", "low", "high", "n"]
+    assert list(curve.columns) == ["tick", "time_s", "value", "low", "high", "n", "failed"]
     assert list(curve["time_s"]) == [0.0, 30.0] and list(curve["value"]) == [0.12, 1.0]
     assert list(jumps["after_value"]) == [0.94, 0.94]
     assert [cause if isinstance(cause, str) else None for cause in jumps["cause"]] == ["command 9 was lost", None]

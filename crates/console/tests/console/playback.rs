@@ -801,7 +801,7 @@ fn what_decided_the_run_is_shown_with_what_is_damaged() {
     assert_eq!(answer["sentence"], "waited is 3.");
     assert_eq!(
         answer["curve"][1],
-        json!({"tick": 20, "n": 1, "value": 3.0, "low": null, "high": null})
+        json!({"tick": 20, "n": 1, "failed": 0, "value": 3.0, "low": null, "high": null})
     );
     assert_eq!(answer["range"], json!([0.5, 3.0]));
     assert_eq!(answer["told"], json!(["3.5 s, tick 7: 1 → 3"]));
