@@ -431,7 +431,7 @@ fn models_of_walking_are_written_and_read() {
     );
     let error = shown(parse(&large));
     assert!(
-        error.contains("body_m of guests who walk by a model"),
+        error.contains("the size in meters of bodies, [field] body"),
         "{error}"
     );
 }
@@ -479,9 +479,9 @@ fn what_guests_cannot_want_is_refused() {
         shown(parse(&text))
     };
     for (want, reason) in [
-        ("weight = 1", "guests want one of these"),
-        ("site = \"bar\", treat = \"A\"", "guests want one of these"),
-        ("site = \"bar\"", "there is no [[site]] called bar"),
+        ("weight = 1", "has exactly one of these"),
+        ("site = \"bar\", treat = \"A\"", "has exactly one of these"),
+        ("site = \"bar\"", "there is no [[site]] called \"bar\""),
         ("treat = \"B\"", "there is no robot called B"),
         ("treat = \"A\"", "add that table"),
         ("at = [\"3 m\", \"99 m\"]", "not on the field"),

@@ -199,7 +199,7 @@ impl GuestState {
             guest.set_mood(GuestMood::Content, tick);
             guest.robot = robot;
             if stop > 0 {
-                guest.stops_until = tick + 1 + stop;
+                guest.stops_until = tick.saturating_add(1).saturating_add(stop);
             }
         }
         let content = others
@@ -458,6 +458,12 @@ mod tests {
         after(&mut plain, 0, &report("neutral", 0.0, 0.0, &[]));
         after(&mut plain, 1, &report("neutral", 1.0, 1.0, &[]));
         assert_eq!(responses(&plain, 2), []);
+
+        // A stop that no run outlasts.
+        let mut endless = self::hall(&format!("{RULES}stop = \"1e300 s\"\n"));
+        after(&mut endless, 0, &report("neutral", 0.0, 0.0, &[]));
+        after(&mut endless, 1, &report("neutral", 1.0, 1.0, &[]));
+        assert_eq!(responses(&endless, Tick::MAX - 1), [Response::Stay]);
     }
 
     #[test]

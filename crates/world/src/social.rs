@@ -116,7 +116,7 @@ impl SocialWalk {
         let body_m = hall.field.body_m;
         if body_m > BODY_MAX_M {
             return Err(HallError::OutOfRange {
-                name: "body_m of guests who walk by a model",
+                name: "the size in meters of bodies, [field] body, where guests walk by a model,",
                 value: body_m,
                 min: 0.0,
                 max: BODY_MAX_M,

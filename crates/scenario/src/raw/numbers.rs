@@ -7,7 +7,10 @@ use world::Triangular;
 
 /// Smallest, most likely and largest value.
 #[derive(Debug, Clone, Copy, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
+#[serde(
+    deny_unknown_fields,
+    expecting = "a table with `min`, `mode` and `max`"
+)]
 pub(super) struct Range<Q> {
     pub(super) min: Q,
     pub(super) mode: Q,

@@ -43,7 +43,7 @@ const MAX_STEPS: usize = 16;
 const MOST_LOST: f64 = 0.999;
 
 #[derive(Debug, Default, Deserialize, Serialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "the keys of [network.radio]")]
 pub(super) struct RadioTable {
     range: Option<Spanned<Length>>,
     path_loss: Option<Spanned<PathLossTable>>,

@@ -106,7 +106,7 @@ impl WantSetting<'_> {
         match (&table.site, &table.at, &table.exit, &table.treat) {
             (Some(site), None, None, None) => {
                 if !self.sites.contains_key(site.get_ref()) {
-                    let reason = format!("there is no [[site]] called {}", site.get_ref());
+                    let reason = format!("there is no [[site]] called {:?}", site.get_ref());
                     return Err(FileError::at(self.source, Some(site.span()), &reason));
                 }
                 Ok(WantGoal::Site(site.get_ref().clone()))
@@ -125,7 +125,8 @@ impl WantSetting<'_> {
                 Ok(WantGoal::Treat(treat.get_ref().clone()))
             }
             _ => {
-                let reason = "guests want one of these: `site`, a name; `at`, a place; `exit`, a place; `treat`, a robot's name";
+                let reason = "each [[guests.wants]] has exactly one of these: `site`, a name; `at`, a place; `exit`, a place; `treat`, \
+                              a robot's name";
                 Err(FileError::at(self.source, Some(spanned.span()), reason))
             }
         }
