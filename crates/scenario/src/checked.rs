@@ -23,7 +23,7 @@ use super::sites::{SiteSpec, start_states};
 
 /// Seed if neither the file nor the command line gives one. It is fixed, so runs are reproducible by default.
 pub const DEFAULT_SEED: u64 = 1;
-/// Most guests of a scenario [I]: placing them takes seconds, and so does a tick.
+/// Most guests of a scenario \[I\]: placing them takes seconds, and so does a tick.
 pub const MAX_GUESTS: usize = 1_000_000;
 
 /// Checks the number of guests.
