@@ -140,9 +140,7 @@ impl Frame {
             (number, [place[0], place[1]].map(|mm| mm as f64 / 1000.0))
         })
     }
-}
 
-impl Frame {
     /// How the expectations of the scenario stand after the events of the tick, which may be the last one of the run.
     #[must_use]
     pub fn standings(&self, events: &[Event]) -> Vec<Standing> {

@@ -36,6 +36,23 @@ fn found(command: &mut Command) -> Value {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
+/// The report of a hunt for a planted defect, with faults of one kind.
+fn planted_hunt(lab: &Lab, scenario: &str, jobs: &str, kind: &str) -> Value {
+    let mut hunt = Command::new(programs().join("planted-hunt"));
+    hunt.arg(lab.write("planted.toml", scenario))
+        .args(["1", "6000", jobs]);
+    found(hunt.arg(lab.out()).arg(kind))
+}
+
+/// The first finding of a report, which takes two faults and not one.
+fn minimal_pair(report: &Value) -> &Value {
+    let finding = &report["findings"][0];
+    let faults = finding["case"]["faults"].as_array().unwrap();
+    assert_eq!(faults.len(), 2, "{finding}");
+    assert_eq!(finding["is_minimal"], true, "{finding}");
+    finding
+}
+
 /// Events of a kind in the record of a run.
 fn events_of(lab: &Lab, run: &str, kind: &str) -> Vec<Value> {
     let mut events = lab.events(run);
@@ -380,25 +397,15 @@ fn a_hunt_of_processes_finds_the_same() {
 #[test]
 fn two_rare_events_are_found_from_the_state_after_the_first() {
     let lab = Lab::new();
-    let scenario = lab.write("gambler.toml", GAMBLER);
-    let mut reports = Vec::new();
-    for jobs in ["1", "2"] {
-        let mut hunt = Command::new(programs().join("planted-hunt"));
-        hunt.arg(&scenario).args(["1", "6000", jobs]);
-        hunt.arg(lab.out()).arg("reseed");
-        reports.push(found(&mut hunt));
-    }
+    let reports = ["1", "2"].map(|jobs| planted_hunt(&lab, GAMBLER, jobs, "reseed"));
     assert_eq!(reports[0], reports[1]);
 
     let report = &reports[0];
-    let finding = &report["findings"][0];
-    let faults = finding["case"]["faults"].as_array().unwrap();
-    assert_eq!(faults.len(), 2, "{finding}");
-    for fault in faults {
+    let finding = minimal_pair(report);
+    for fault in finding["case"]["faults"].as_array().unwrap() {
         assert_eq!(fault["fault"], "reseed", "{finding}");
         assert_eq!(fault["of"], serde_json::json!(["robot.G"]), "{finding}");
     }
-    assert_eq!(finding["is_minimal"], true, "{finding}");
     assert!(report["goals"]["it is lucky once"].as_u64().unwrap() > 0);
     assert!(report["gone_on"].as_u64().unwrap() > 0);
 }
@@ -426,15 +433,7 @@ reach = { robot = "G", variable = "was_lucky", is = true }
 #[test]
 #[ignore = "thorough: with `-- --include-ignored`"]
 fn two_rare_losses_are_found_from_the_state_after_the_first() {
-    let lab = Lab::new();
-    let scenario = lab.write("teller.toml", TELLER);
-    let mut hunt = Command::new(programs().join("planted-hunt"));
-    hunt.arg(&scenario).args(["1", "6000", "2"]);
-    let report = found(hunt.arg(lab.out()).arg("lose"));
-    let finding = &report["findings"][0];
-    let faults = finding["case"]["faults"].as_array().unwrap();
-    assert_eq!(faults.len(), 2, "{finding}");
-    assert_eq!(finding["is_minimal"], true, "{finding}");
+    minimal_pair(&planted_hunt(&Lab::new(), TELLER, "2", "lose"));
 }
 
 /// Works, unless two certain commands are lost.

@@ -293,17 +293,15 @@ pub(super) fn rules(
     if let Some(requests) = &table.requests {
         let patience = requests.patience.as_ref();
         let patience_s = positive(source, patience, PATIENCE, "the patience of a guest")?.0;
+        let mut stop = 0;
+        if let Some(time) = &requests.stop {
+            let time = positive(source, Some(time), Time(0.0), "how long a guest stops")?;
+            stop = ticks(time.0, tick_s).max(1);
+        }
         rules.requests = Some(Requests {
             range_m: range_m(source, requests.range.as_ref())?,
             patience: ticks(patience_s, tick_s).max(1),
-            stop: match &requests.stop {
-                Some(_) => {
-                    let stop = requests.stop.as_ref();
-                    let stop_s = positive(source, stop, Time(1.0), "how long a guest stops")?.0;
-                    ticks(stop_s, tick_s).max(1)
-                }
-                None => 0,
-            },
+            stop,
             comes_closer: requests.come_closer.unwrap_or(false),
         });
     }
