@@ -244,28 +244,43 @@ fn a_robot_without_which_the_clock_went_on_is_let_go_on_by_hand() {
     }
 }
 
+/// The fault lasts an hour of wall clock if nobody ends it. It was ended between two ticks, while the clock waited for the robot, or
+/// not before the run was killed.
 #[test]
-fn a_robot_that_was_let_go_on_early_comes_back_when_a_killed_run_is_resumed() {
-    let lab = Lab::new();
-    let run = "by-hand-early";
-    let mut launch = paused(&lab, run, &["--set", "deadline=60 s"]);
-    lab.step(run, 5);
-    lab.ctl(run, &["crash", "Leguin"]);
-    lab.ctl(run, &["step", "5"]);
-    held_by_leguin(&lab, run);
-    lab.ctl(run, &["late", "continue", "--robot", "Leguin"]);
-    assert_eq!(lab.settled(run), 10);
-    lab.ctl(run, &["recover", "Leguin"]);
-    lab.step(run, 20);
-    send(launch.process("cars-sim"), Signal::SIGKILL);
-    assert!(!launch.wait().success());
-    nobody_is_left(run);
+fn a_killed_run_is_resumed_without_waiting_for_a_fault_by_hand() {
+    for ended in ["between", "waiting", "never"] {
+        let lab = Lab::new();
+        let run = format!("by-hand-resumed-{ended}");
+        let run = run.as_str();
+        let mut launch = paused(&lab, run, &["--set", "deadline=60 s"]);
+        lab.step(run, 5);
+        lab.ctl(run, &["crash", "Leguin"]);
+        lab.ctl(run, &["step", "5"]);
+        held_by_leguin(&lab, run);
+        if ended != "waiting" {
+            lab.ctl(run, &["late", "continue", "--robot", "Leguin"]);
+            assert_eq!(lab.settled(run), 10);
+        }
+        if ended != "never" {
+            lab.ctl(run, &["recover", "Leguin"]);
+        }
+        assert_eq!(lab.settled(run), 10);
+        lab.step(run, 20);
+        send(launch.process("cars-sim"), Signal::SIGKILL);
+        assert!(!launch.wait().success());
+        nobody_is_left(run);
 
-    let resume = ["launch", "--no-console", "--resume", run, "--speed", "max"];
-    lab.ok(&resume);
-    let missed = of_kind(&lab, run, "missed", "robot");
-    assert!(missed.iter().all(|(tick, _)| *tick <= 10), "{missed:?}");
-    verified(&lab, run);
+        let resume = ["launch", "--no-console", "--resume", run, "--speed", "max"];
+        lab.ok(&resume);
+        let log = std::fs::read_to_string(lab.out().join(run).join("logs/simulator.log")).unwrap();
+        assert!(log.contains("the clock is held"), "{log}");
+        assert!(!log.contains("in time"), "{log}");
+        let missed = of_kind(&lab, run, "missed", "robot");
+        let is_here = |tick: u64| !missed.iter().any(|(missed, _)| *missed == tick);
+        assert_eq!(is_here(11), ended != "never", "{ended}: {missed:?}");
+        assert_eq!(is_here(120), ended != "never", "{ended}: {missed:?}");
+        verified(&lab, run);
+    }
 }
 
 #[test]

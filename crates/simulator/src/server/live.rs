@@ -104,6 +104,16 @@ pub(super) struct RejoinWait {
     pub(super) asked: Option<Instant>,
 }
 
+impl RejoinWait {
+    pub(super) fn begin(robots: BTreeSet<RobotName>) -> Self {
+        Self {
+            robots,
+            begun: Instant::now(),
+            asked: None,
+        }
+    }
+}
+
 impl LiveEpoch {
     fn begin(
         scenario: Scenario,

@@ -7,6 +7,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use bus::BusError;
 use lockstep::TickOutcome;
 use protocol::RobotName;
 use protocol::messages::{CommandText, Report};
@@ -37,28 +38,37 @@ impl LiveRun {
         });
     }
 
-    /// Holds the clock until the robots are back that take part in the next tick as further incarnations; after the last tick
-    /// of the record, until all are back. Those whose processes the scenario keeps from running come back as it has it.
-    pub(super) fn hold_for_rejoins(&mut self) {
+    /// Holds the clock until the robots are back that take part in the next tick as further incarnations. Only once its faults have
+    /// been carried out: a robot that one has just killed, or brought back, then is not asked before, as a predecessor.
+    ///
+    /// # Errors
+    /// [`BusError`] if an order cannot be put.
+    pub(super) fn hold_for_rejoins(&mut self) -> Result<(), BusError> {
         let replay_log = self.epoch.record.replay_log();
-        let mut robots: BTreeSet<RobotName> = match replay_log {
-            Some(replay_log) => replay_log.joined().cloned().collect(),
-            None => self.barrier.roster().cloned().collect(),
-        };
+        let joined = replay_log.iter().flat_map(|replay_log| replay_log.joined());
+        let mut robots: BTreeSet<RobotName> = joined.cloned().collect();
         robots.retain(|robot| !self.barrier.is_stopped(robot));
-
-        if replay_log.is_some() {
+        for robot in &robots {
             // One that is here, and was killed and replaced between two ticks then, has not been asked yet.
-            for robot in &robots {
-                self.barrier.ask_to_rejoin(robot);
+            self.barrier.ask_to_rejoin(robot);
+            // A time of the launcher's was over before the robot did this tick, by whatever clock.
+            if let Some(kind) = self.orders.holding_for_a_time(robot) {
+                self.recover_now(robot, kind)?;
             }
         }
 
-        self.epoch.waits_for = WaitsFor::Rejoins(RejoinWait {
-            robots,
-            begun: Instant::now(),
-            asked: None,
+        self.epoch.waits_for = WaitsFor::Rejoins(RejoinWait::begin(robots));
+        Ok(())
+    }
+
+    /// Holds the clock after the last tick of the record until all robots are back whose processes no fault keeps from running.
+    pub(super) fn hold_for_all(&mut self) {
+        let mut robots: BTreeSet<RobotName> = self.barrier.roster().cloned().collect();
+        robots.retain(|robot| {
+            let is_killed = self.orders.holding_for_a_time(robot).is_some();
+            !is_killed && !self.barrier.is_stopped(robot)
         });
+        self.epoch.waits_for = WaitsFor::Rejoins(RejoinWait::begin(robots));
     }
 
     /// Checks whether the robots are back for which the clock is held. Returns how long to wait before looking again; `None` if

@@ -29,8 +29,11 @@ impl LiveRun {
                 if let Some(rest) = self.await_rejoins() {
                     return Ok(Next::Wait(Some(rest)));
                 }
-                self.epoch.waits_for = WaitsFor::Pace;
-                return Ok(Next::GoOn);
+                // After the last tick of the record, the next one is not due yet.
+                if !self.epoch.record.is_repeating() {
+                    self.epoch.waits_for = WaitsFor::Pace;
+                    return Ok(Next::GoOn);
+                }
             }
             WaitsFor::Pace => {
                 let tick_s = self.epoch.simulation.scenario().tick_s;
@@ -47,6 +50,10 @@ impl LiveRun {
                     self.epoch.waits_for = WaitsFor::Faults(pending_orders);
                     return Ok(Next::GoOn);
                 }
+                if self.epoch.record.is_repeating() {
+                    self.hold_for_rejoins()?;
+                    return Ok(Next::GoOn);
+                }
             }
             WaitsFor::Faults(pending_orders) => {
                 let is_before_tick_zero = pending_orders.order.tick == 0;
@@ -55,6 +62,10 @@ impl LiveRun {
                 }
                 if is_before_tick_zero {
                     self.gather();
+                    return Ok(Next::GoOn);
+                }
+                if self.epoch.record.is_repeating() {
+                    self.hold_for_rejoins()?;
                     return Ok(Next::GoOn);
                 }
             }
@@ -224,8 +235,8 @@ impl LiveRun {
             if epoch.record.compare(&record)? {
                 frontend.pace.ready();
                 tracing::info!("resumed after tick {}", record.tick);
+                self.hold_for_all();
             }
-            self.hold_for_rejoins();
         } else if record.tick == 0 {
             frontend.pace.ready();
         }
