@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use export::{ExportError, emotionml, shiviz, tables, trace, trajectories};
+use export::{ExportError, emotionml, ros, shiviz, tables, trace, trajectories};
 use lab::LabError;
 use lab::folder::{find, recorded_epoch, recorded_epochs, recording, run_name};
 use protocol::{Epoch, RobotName, Tick};
@@ -66,6 +66,9 @@ struct ExportFormat {
     /// Where guests and robots were, `id frame x/m y/m z/m` as PedPy and JuPedSim read it.
     #[arg(long)]
     trajectories: bool,
+    /// A bag of ROS 2, a file of MCAP, with clock, transforms, odometry, guests, emotions and commands.
+    #[arg(long)]
+    ros: bool,
 }
 
 /// Exports a run.
@@ -134,6 +137,10 @@ impl ExportArgs {
         }
         if self.format.trajectories {
             trajectories::write(recording(&files)?, out)?;
+            return Ok(Vec::new());
+        }
+        if self.format.ros {
+            ros::write(recording(&files)?, out)?;
             return Ok(Vec::new());
         }
         let run = run_name(folder);

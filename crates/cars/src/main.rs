@@ -58,7 +58,7 @@ Look:
   replay       Show a recorded run to consoles as if it were in progress
   emotions     Show the tree of a robot's emotions, or what it feels in a tick of a run
   log          Show the log of a run, also of one in progress
-  export       Write tables as CSV, a log for ShiViz, a trace, emotions as EmotionML
+  export       Write tables as CSV, a log for ShiViz, a trace, EmotionML, a bag of ROS 2
 
 Compare:
   check        Check files of every kind, and all that a run has left

@@ -1,10 +1,11 @@
 //! Runs as files for other programs: tables of events and states ([`tables`]), a log for ShiViz ([`shiviz`]), a trace of
-//! wall-clock time ([`trace`]), emotions ([`emotionml`]) and trajectories ([`trajectories`]). A record is read tick by tick, so the length of a run does not
-//! matter.
+//! wall-clock time ([`trace`]), emotions ([`emotionml`]), trajectories ([`trajectories`]) and a bag of ROS 2 ([`ros`]). A record is
+//! read tick by tick, so the length of a run does not matter.
 
 pub mod csv;
 pub mod draft;
 pub mod emotionml;
+pub mod ros;
 pub mod shiviz;
 pub mod tables;
 pub mod trace;

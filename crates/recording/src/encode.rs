@@ -6,8 +6,8 @@ use protocol::{Event, RobotName, Tick, schemas};
 use serde::Serialize;
 
 use crate::content::{Header, RecordedTick};
-use crate::file::{Channels, Chunk, MessageHead};
 use crate::json;
+use crate::mcap::{Channels, Chunk, MessageHead};
 use crate::protobuf::Protobuf;
 use crate::topic::{Topic, View};
 use crate::viewers::{self, ViewerSchema};

@@ -11,7 +11,7 @@ use protocol::{Event, Tick};
 
 use crate::content::{Header, RecordedTick, metadata};
 use crate::encode::Encoder;
-use crate::file::{Chunk, McapFile};
+use crate::mcap::{Chunk, McapFile};
 use crate::{METADATA, SCENARIO};
 
 /// A chunk ends with the tick in which it gets this large, bytes before compression. A reader that seeks reads whole chunks.
@@ -268,7 +268,7 @@ impl Batch {
 }
 
 /// Writes until there is nothing more to come.
-fn write(mut file: McapFile, encoder: &Encoder, queue: &WriteQueue) -> io::Result<()> {
+fn write(mut file: McapFile<File>, encoder: &Encoder, queue: &WriteQueue) -> io::Result<()> {
     // Dropped last, also after an error or a panic: callers that wait get to know.
     let _over = Over(queue);
     let mut batch = Batch::default();
@@ -324,7 +324,12 @@ impl Drop for Over<'_> {
 }
 
 /// Writes what does not change: metadata, the scenario, and all channels with the header in a chunk of their own.
-fn begin(path: &Path, header: &Header, scenario: &str, encoder: &Encoder) -> io::Result<McapFile> {
+fn begin(
+    path: &Path,
+    header: &Header,
+    scenario: &str,
+    encoder: &Encoder,
+) -> io::Result<McapFile<File>> {
     let mut file = McapFile::begin(File::create(path)?, "cars", encoder.channels().clone())?;
     file.add_metadata(METADATA, &metadata(header))?;
     file.attach(SCENARIO, "application/toml", scenario.as_bytes())?;

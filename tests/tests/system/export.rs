@@ -1,11 +1,12 @@
 //! Runs exported for other programs: tables, a log for ShiViz, a trace of wall-clock time.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Output};
 
 use nix::sys::signal::Signal;
 use recording::Recording;
-use serde_json::Value;
+use serde_json::{Value, json};
 use system_tests::processes::send;
 use system_tests::python::package;
 use system_tests::tools::{has_modules, has_python, lacks_tool};
@@ -19,6 +20,8 @@ const HOSTILE: &str = "exports of a hostile robot in Python";
 fn python(folder: &Path, packages: &[&str], args: &[&str]) -> Option<Output> {
     let modules = packages.join(", ");
     let install = format!("pip install {}", packages.join(" "));
+    // The package is not called as its module.
+    let install = install.replace("mcap_ros2", "mcap-ros2-support");
     if !has_modules("reading exports in Python", &modules, &install) {
         return None;
     }
@@ -642,4 +645,104 @@ fn pedpy_reads_trajectories_unchanged() {
         let is_equal = row.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9);
         assert!(is_equal, "{row:?} is not {expected:?}");
     }
+}
+
+/// mcap-ros2-support and rosbags read a bag; in it is what the recording has, in the bytes that ROS 2 has for it.
+#[test]
+fn readers_of_ros_2_read_a_bag_as_the_recording_has_it() {
+    let lab = Lab::new();
+    let hall = "configs/recorded_hall.toml";
+    lab.ok(&["run", hall, "--set", "duration=60 s", "--run", "bag"]);
+    let file = lab.out().join("bag.mcap");
+    let path = file.to_str().unwrap();
+    lab.ok(&["export", "bag", "--ros", "-o", path]);
+
+    let modules = ["mcap_ros2", "rosbags"];
+    let Some(output) = python(lab.out(), &modules, &[&script("ros.py"), path]) else {
+        return;
+    };
+    let read: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(read["profile"], "ros2");
+    // As ROS 2 has them (Kilted, in `share/*/msg/*.json`).
+    for (name, hash) in [
+        ("rosgraph_msgs/msg/Clock", "692f7a66"),
+        ("nav_msgs/msg/Odometry", "3cc97dc7"),
+        ("tf2_msgs/msg/TFMessage", "e369d0f0"),
+    ] {
+        let found = read["hashes"][name].as_str().unwrap();
+        assert!(
+            found.starts_with(&format!("RIHS01_{hash}")),
+            "{name}: {found}"
+        );
+    }
+
+    let topics = &read["topics"];
+    let recording = Recording::open(&lab.out().join("bag/run.mcap")).unwrap();
+    let ticks = recording.read(0, recording.len()).unwrap();
+    let mut last: Option<[f64; 2]> = None;
+    for (index, tick) in ticks.iter().enumerate() {
+        let time_s = index as f64 / 2.0;
+        assert_eq!(topics["/clock"][index], time_s);
+        let guests: Vec<[f64; 2]> = tick.frame.guests().map(|(_, at_m)| at_m).collect();
+        assert_eq!(topics["/guests"][index], json!(guests));
+
+        let butler = &tick.frame.robots[0];
+        let at_m = [butler.location.x, butler.location.y];
+        let transform = json!(["map", "Butler/base_link", at_m[0], at_m[1]]);
+        assert_eq!(topics["/tf"][index][0], transform);
+        let odometry: [f64; 8] =
+            serde_json::from_value(topics["/Butler/odom"][index].clone()).unwrap();
+        assert_eq!(odometry[..3], [time_s, at_m[0], at_m[1]]);
+        // The quaternion has the direction of motion, and the velocity is that of the body, seen from it.
+        let [z, w] = [odometry[3], odometry[4]];
+        let direction_rad = tick.reports[&butler.name].direction_rad;
+        let turned_rad = 2.0 * libm::atan2(z, w) - direction_rad;
+        assert!(libm::remainder(turned_rad, std::f64::consts::TAU).abs() < 1e-9);
+        if let Some(last) = last {
+            let moved_mps = [0, 1].map(|axis| (at_m[axis] - last[axis]) * 2.0);
+            let [ahead, left] = [odometry[5], odometry[6]];
+            let [cos, sin] = [w * w - z * z, 2.0 * w * z];
+            assert!((ahead * cos - left * sin - moved_mps[0]).abs() < 1e-9);
+            assert!((ahead * sin + left * cos - moved_mps[1]).abs() < 1e-9);
+        }
+        last = Some(at_m);
+    }
+
+    let texts =
+        |topic: &str| -> Vec<String> { serde_json::from_value(topics[topic].clone()).unwrap() };
+    let mut emotions = Vec::new();
+    let mut commands = Vec::new();
+    let mut sent = BTreeMap::new();
+    let mut events = 0;
+    for event in lab.events("bag") {
+        let text = |key: &str| event[key].as_str().unwrap_or_default().to_owned();
+        match text("event").as_str() {
+            "emotion" if event["robot"] == "Butler" => emotions.push(text("to")),
+            "command_sent" => {
+                sent.insert(event["seq"].as_u64(), text("command"));
+            }
+            "command_delivered" if event["to"] == "Leguin" => {
+                commands.push((event["seq"].as_u64(), sent[&event["seq"].as_u64()].clone()));
+            }
+            _ => {}
+        }
+        events += 1;
+    }
+    assert_eq!(texts("/Butler/emotion"), emotions);
+    assert_eq!(texts("/events").len(), events);
+    let received: Vec<Value> = texts("/Leguin/command")
+        .iter()
+        .map(|command| serde_json::from_str(command).unwrap())
+        .collect();
+    let received: Vec<(Option<u64>, String)> = received
+        .iter()
+        .map(|command| {
+            (
+                command["seq"].as_u64(),
+                command["command"].as_str().unwrap().to_owned(),
+            )
+        })
+        .collect();
+    assert!(!commands.is_empty());
+    assert_eq!(received, commands);
 }

@@ -1,4 +1,4 @@
-//! The records of MCAP, as they are written.
+//! A file of MCAP (<https://mcap.dev/spec>), as it is written: a recording, or an export for other readers of the format.
 //!
 //! The package `mcap` puts every field of a message through its compressor, on the thread that adds it. Here messages are encoded
 //! into the content of a chunk, which another thread compresses as a whole.
@@ -16,7 +16,7 @@ const COMPRESSION: &str = "zstd";
 
 /// The content of a chunk: records one after the other, not compressed.
 #[derive(Debug, Default)]
-pub(crate) struct Chunk {
+pub struct Chunk {
     content: Vec<u8>,
     messages: Vec<MessagePlace>,
 }
@@ -31,31 +31,41 @@ struct MessagePlace {
 
 /// What a message has beside its data.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct MessageHead {
-    pub(crate) channel: u16,
-    pub(crate) sequence: u32,
-    pub(crate) time_ns: u64,
+pub struct MessageHead {
+    /// Number of its channel.
+    pub channel: u16,
+    /// Its number on the channel; 0 where nothing counts them.
+    pub sequence: u32,
+    /// When it was logged and published, nanoseconds.
+    pub time_ns: u64,
 }
 
 impl Chunk {
     /// Bytes before compression.
-    pub(crate) fn len(&self) -> usize {
+    #[must_use]
+    pub fn len(&self) -> usize {
         self.content.len()
     }
 
+    /// Whether nothing was added.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.content.is_empty()
+    }
+
     /// Empties the chunk and keeps its memory.
-    pub(crate) fn clear(&mut self) {
+    pub fn clear(&mut self) {
         self.content.clear();
         self.messages.clear();
     }
 
     /// Adds records that are not messages.
-    pub(crate) fn add_records(&mut self, records: &[u8]) {
+    pub fn add_records(&mut self, records: &[u8]) {
         self.content.extend_from_slice(records);
     }
 
     /// Adds a message, which `encode` appends to the bytes that it is given.
-    pub(crate) fn add_message(&mut self, head: MessageHead, encode: impl FnOnce(&mut Vec<u8>)) {
+    pub fn add_message(&mut self, head: MessageHead, encode: impl FnOnce(&mut Vec<u8>)) {
         self.messages.push(MessagePlace {
             channel: head.channel,
             time_ns: head.time_ns,
@@ -81,7 +91,7 @@ impl Chunk {
 
 /// Schemas and channels, which a file has in its first chunk and once more in its index.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Channels {
+pub struct Channels {
     /// Schemas, by their names. The first one has number 1.
     schema_ids: BTreeMap<&'static str, u16>,
     schemas: Vec<u8>,
@@ -91,7 +101,7 @@ pub(crate) struct Channels {
 
 impl Channels {
     /// Adds a schema, or finds it by its name. Returns its number.
-    pub(crate) fn add_schema(&mut self, name: &'static str, encoding: &str, data: &[u8]) -> u16 {
+    pub fn add_schema(&mut self, name: &'static str, encoding: &str, data: &[u8]) -> u16 {
         if let Some(id) = self.schema_ids.get(name) {
             return *id;
         }
@@ -109,7 +119,7 @@ impl Channels {
     }
 
     /// Adds a channel. Returns its number.
-    pub(crate) fn add_channel(&mut self, topic: &str, schema: u16, encoding: &str) -> u16 {
+    pub fn add_channel(&mut self, topic: &str, schema: u16, encoding: &str) -> u16 {
         let id = self.channel_count;
         self.channel_count += 1;
         let mut record = RecordBytes::begin(&mut self.channels, op::CHANNEL);
@@ -122,8 +132,9 @@ impl Channels {
         id
     }
 
-    /// A chunk with all schemas and channels.
-    pub(crate) fn chunk(&self) -> Chunk {
+    /// A chunk with all schemas and channels, which is the first one of a file.
+    #[must_use]
+    pub fn chunk(&self) -> Chunk {
         let mut chunk = Chunk::default();
         chunk.add_records(&self.schemas);
         chunk.add_records(&self.channels);
@@ -132,8 +143,8 @@ impl Channels {
 }
 
 /// A file that is written.
-pub(crate) struct McapFile {
-    file: File,
+pub struct McapFile<W> {
+    out: W,
     compressor: zstd::bulk::Compressor<'static>,
     /// Bytes written so far, and their checksum.
     len: u64,
@@ -161,11 +172,14 @@ struct WrittenIndex {
     times_ns: Option<(u64, u64)>,
 }
 
-impl McapFile {
+impl<W: Write> McapFile<W> {
     /// Begins a file.
-    pub(crate) fn begin(file: File, profile: &str, channels: Channels) -> io::Result<Self> {
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn begin(out: W, profile: &str, channels: Channels) -> io::Result<Self> {
         let mut begun = Self {
-            file,
+            out,
             compressor: zstd::bulk::Compressor::new(COMPRESSION_LEVEL)?,
             len: 0,
             crc: crc32fast::Hasher::new(),
@@ -186,7 +200,10 @@ impl McapFile {
     }
 
     /// Writes a record of metadata.
-    pub(crate) fn add_metadata(
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn add_metadata(
         &mut self,
         name: &str,
         metadata: &BTreeMap<String, String>,
@@ -206,7 +223,10 @@ impl McapFile {
     }
 
     /// Attaches data.
-    pub(crate) fn attach(&mut self, name: &str, media_type: &str, data: &[u8]) -> io::Result<()> {
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn attach(&mut self, name: &str, media_type: &str, data: &[u8]) -> io::Result<()> {
         let mut record = RecordBytes::begin(&mut self.records, op::ATTACHMENT);
         record.u64(0);
         record.u64(0);
@@ -234,7 +254,10 @@ impl McapFile {
 
     /// Compresses a chunk and writes it, with the index of its messages, in one go: a crash leaves no half of one in the
     /// middle of the file.
-    pub(crate) fn add_chunk(&mut self, chunk: &Chunk) -> io::Result<()> {
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn add_chunk(&mut self, chunk: &Chunk) -> io::Result<()> {
         let (first_ns, last_ns) = chunk.times_ns();
         self.compressed.clear();
         let most = zstd::zstd_safe::compress_bound(chunk.content.len());
@@ -303,13 +326,11 @@ impl McapFile {
         offsets
     }
 
-    /// Waits until everything so far is on the disk.
-    pub(crate) fn sync(&self) -> io::Result<()> {
-        self.file.sync_data()
-    }
-
     /// Writes the index and ends the file.
-    pub(crate) fn finish(mut self) -> io::Result<()> {
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn finish(mut self) -> io::Result<()> {
         let mut record = RecordBytes::begin(&mut self.records, op::DATA_END);
         // Of all bytes before this record, which is written only now.
         record.u32(self.crc.clone().finalize());
@@ -351,17 +372,28 @@ impl McapFile {
         let crc = crc32fast::hash(&self.records);
         self.records.extend_from_slice(&crc.to_le_bytes());
         self.records.extend_from_slice(&MAGIC);
-        self.write()
+        self.write()?;
+        self.out.flush()
     }
 
     /// Writes the records that have been made.
     fn write(&mut self) -> io::Result<()> {
-        self.file.write_all(&self.records)?;
+        self.out.write_all(&self.records)?;
         // Counted only when it has been written.
         self.crc.update(&self.records);
         self.len += self.records.len() as u64;
         self.records.clear();
         Ok(())
+    }
+}
+
+impl McapFile<File> {
+    /// Waits until everything so far is on the disk.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn sync(&self) -> io::Result<()> {
+        self.out.sync_data()
     }
 }
 
