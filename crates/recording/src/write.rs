@@ -295,7 +295,7 @@ fn write(mut file: McapFile<File>, encoder: &Encoder, queue: &WriteQueue) -> io:
         queue.lock().spare.append(&mut batch.ticks);
 
         if task != WriterTask::Encode {
-            if chunk.len() > 0 {
+            if !chunk.is_empty() {
                 file.add_chunk(&chunk)?;
                 chunk.clear();
             }
