@@ -56,6 +56,7 @@ const FILES: &[(&str, &str)] = &texts![
     "configs/signals.toml",
     "configs/swarm.toml",
     "configs/three_robots.toml",
+    "configs/waiter.toml",
     "configs/walled_hall.toml",
     "launch/auction.toml",
     "launch/hors_doeuvres.toml",

@@ -8,8 +8,9 @@ use std::sync::Arc;
 use config::Override;
 use observe::Measured;
 use protocol::messages::{End, Verdict};
-use protocol::{Event, RunName, Tick};
+use protocol::{Event, RobotName, RunName, Tick};
 use record::{Entry, EpochFiles, Record, Summary};
+use robot::{Cars, OpenTick};
 use scenario::{ChanceKind, Scenario};
 use simulator::medium::ForcedVerdict;
 use simulator::{Simulation, TickRecord};
@@ -155,9 +156,11 @@ impl Trunk {
         check_faults(local.simulation.scenario(), local.simulation.tick())?;
         Ok(Branch {
             local,
+            open: None,
             verdicts: self.verdicts,
             summary: self.summary,
             make: self.make,
+            run: RunName::unknown(),
             is_ended: false,
         })
     }
@@ -185,12 +188,18 @@ fn read(files: &EpochFiles) -> Result<Vec<Entry>, LabError> {
 }
 
 /// A run that goes on in memory. Copies go on as it does, until they are re-seeded or changed.
+///
+/// A tick has two halves: [`Branch::begin_tick`], after which it is decided what robots perceive, and [`Branch::end_tick`], in which they
+/// act. [`Branch::step`] is both.
 pub struct Branch {
     local: Local,
+    /// The tick that has begun and not ended.
+    open: Option<OpenTick>,
     /// Judgments so far, by the names of the expectations.
     verdicts: BTreeMap<String, Verdict>,
     summary: Option<Summary>,
     make: RobotMaker,
+    run: RunName,
     is_ended: bool,
 }
 
@@ -200,36 +209,45 @@ impl Branch {
     /// # Errors
     /// If the scenario cannot be set up or played in this process.
     pub fn start(scenario: Scenario, make: RobotMaker) -> Result<Self, LabError> {
-        check_faults(&scenario, 0)?;
-        let robots = make_robots_with(&scenario, "the scenario".as_ref(), &*make)?;
-        let mut branch = Self {
-            local: Local::with_robots(scenario, 1, &RunName::unknown(), robots)?,
-            verdicts: BTreeMap::new(),
-            summary: None,
-            make,
-            is_ended: false,
-        };
-        let Local { simulation, robots } = &mut branch.local;
-        let record = simulation.init(robots)?;
-        note(
-            &mut branch.verdicts,
-            &mut branch.summary,
-            simulation,
-            &record,
-        );
+        let mut branch = Self::begin(scenario, &RunName::unknown(), make)?;
+        branch.end_tick()?;
         Ok(branch)
     }
 
-    /// A copy that goes on as this one does.
+    /// A run of a scenario in whose tick 0 no robot has acted.
+    ///
+    /// # Errors
+    /// If the scenario cannot be set up or played in this process.
+    pub fn begin(scenario: Scenario, run: &RunName, make: RobotMaker) -> Result<Self, LabError> {
+        check_faults(&scenario, 0)?;
+        let robots = make_robots_with(&scenario, "the scenario".as_ref(), &*make)?;
+        let mut local = Local::with_robots(scenario, 1, run, robots)?;
+        local.simulation.begin_init();
+        let open = local.robots.open(0, &local.simulation);
+        Ok(Self {
+            local,
+            open: Some(open),
+            verdicts: BTreeMap::new(),
+            summary: None,
+            make,
+            run: run.clone(),
+            is_ended: false,
+        })
+    }
+
+    /// A copy that goes on as this one does, between two ticks.
     ///
     /// # Errors
     /// If a robot cannot be copied.
     pub fn snapshot(&self) -> Result<Self, LabError> {
+        debug_assert!(self.open.is_none(), "robots are copied between two ticks");
         Ok(Self {
+            open: None,
             local: self.local.snapshot().map_err(|robot| cannot_copy(&robot))?,
             verdicts: self.verdicts.clone(),
             summary: self.summary.clone(),
             make: self.make.clone(),
+            run: self.run.clone(),
             is_ended: self.is_ended,
         })
     }
@@ -254,26 +272,60 @@ impl Branch {
         check_faults(simulation.scenario(), simulation.tick())
     }
 
+    /// Begins the next tick, unless one is open already. Returns whether there is one: the run may be over.
+    ///
+    /// # Errors
+    /// If a robot that comes back cannot be made.
+    pub fn begin_tick(&mut self) -> Result<bool, LabError> {
+        if self.open.is_some() {
+            return Ok(true);
+        }
+        if self.is_ended || self.local.simulation.is_over() {
+            return Ok(false);
+        }
+
+        self.local.carry_out_faults_with(&self.run, &*self.make)?;
+        let tick = self.local.simulation.begin_tick();
+        self.open = Some(self.local.robots.open(tick, &self.local.simulation));
+        Ok(true)
+    }
+
+    /// Shows what a robot perceives in the tick that has begun, before it acts. `None` if it does not run that tick, or none has begun.
+    pub fn perceive<T>(
+        &self,
+        robot: &RobotName,
+        see: impl FnOnce(&mut Cars<'_>) -> T,
+    ) -> Option<T> {
+        self.local.robots.perceive(self.open.as_ref()?, robot, see)
+    }
+
+    /// Has robots act in the tick that has begun, and ends it; if none has begun, ends the run. `None` after that.
+    ///
+    /// # Errors
+    /// If a robot ends the run.
+    pub fn end_tick(&mut self) -> Result<Option<TickRecord>, LabError> {
+        if self.is_ended {
+            return Ok(None);
+        }
+
+        let Local { simulation, robots } = &mut self.local;
+        let record = if let Some(open) = self.open.take() {
+            simulation.end_tick(robots.close(open)?)
+        } else {
+            self.is_ended = true;
+            simulation.end(End::Finished)
+        };
+        note(&mut self.verdicts, &mut self.summary, simulation, &record);
+        Ok(Some(record))
+    }
+
     /// Plays the next tick, or the end of the run. `None` after that.
     ///
     /// # Errors
     /// If a robot ends the run, or one that comes back cannot be made.
     pub fn step(&mut self) -> Result<Option<TickRecord>, LabError> {
-        if self.is_ended {
-            return Ok(None);
-        }
-
-        let record = if self.local.simulation.is_over() {
-            self.is_ended = true;
-            self.local.simulation.end(End::Finished)
-        } else {
-            self.local
-                .carry_out_faults_with(&RunName::unknown(), &*self.make)?;
-            self.local.simulation.step(&mut self.local.robots)?
-        };
-        let simulation = &self.local.simulation;
-        note(&mut self.verdicts, &mut self.summary, simulation, &record);
-        Ok(Some(record))
+        self.begin_tick()?;
+        self.end_tick()
     }
 
     /// Plays to the end of the run.
@@ -304,6 +356,11 @@ impl Branch {
     #[must_use]
     pub fn simulation(&self) -> &Simulation {
         &self.local.simulation
+    }
+
+    /// The simulation and its robots.
+    pub(crate) fn local(&self) -> &Local {
+        &self.local
     }
 
     /// Has the network decide something in the next tick, whatever it draws.

@@ -4,6 +4,7 @@
 
 pub mod branch;
 pub mod diff;
+pub mod environment;
 mod error;
 pub mod folder;
 pub mod fork;
@@ -15,6 +16,7 @@ mod reexecution;
 pub mod replayed;
 pub mod run;
 pub mod scratch;
+pub mod session;
 pub mod states;
 pub mod verify;
 

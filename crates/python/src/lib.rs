@@ -9,6 +9,7 @@ mod fork;
 mod host;
 mod hunt;
 mod interrupt;
+mod learning;
 mod make;
 mod payload;
 mod pictures;
@@ -28,6 +29,7 @@ fn _cars(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<cars::Cars>()?;
     module.add_class::<stream::Stream>()?;
+    module.add_class::<learning::Environments>()?;
 
     module.add_function(wrap_pyfunction!(stream::stream, module)?)?;
     module.add_function(wrap_pyfunction!(stream::published_angle, module)?)?;

@@ -52,7 +52,7 @@ pub use entry::{RobotArgs, main};
 pub use error::{BadParameters, ParametersCheck, RobotError, read_parameters};
 pub use figure7::{CarsRobotInterface, control_cycle};
 pub use host::{Host, HostError, HostOptions, Stopper};
-pub use local::LocalHost;
+pub use local::{LocalHost, OpenTick};
 pub use network::{PeerNetwork, Undelivered};
 pub use protocol::messages::{
     Clock, Command, CommandText, Correction, DriveLimits, End, Face, KnownSite, LayerAction,

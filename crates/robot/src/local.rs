@@ -15,6 +15,7 @@ use protocol::messages::{
 };
 use protocol::{Generation, RobotName, Tick};
 
+use crate::cars::Cars;
 use crate::cri::Robot;
 use crate::error::RobotError;
 use crate::network::{PeerNetwork, Undelivered};
@@ -33,6 +34,15 @@ pub struct LocalHost {
     /// Indices of the robots that are stopped and are not back.
     stopped: BTreeSet<usize>,
     timeouts: Timeouts,
+}
+
+/// A tick that robots are to run: what they perceive is decided, and none of them has acted.
+pub struct OpenTick {
+    tick: Tick,
+    /// The robots that run it, by index.
+    turns: Vec<(usize, Turn<TickUpdate>)>,
+    /// What it comes to, if no robot runs it.
+    outcome: Option<TickOutcome<Arc<Report>, CommandText>>,
 }
 
 /// The other robots of the process, as one of them queries them.
@@ -306,6 +316,67 @@ impl LocalHost {
         turns
     }
 
+    /// Opens a tick: the first half of [`Exchange::exchange`].
+    pub fn open(&mut self, tick: Tick, news: &dyn Bulletin<TickUpdate>) -> OpenTick {
+        self.barrier.open(tick, news.robots(), &mut self.outputs);
+        let outcome = self.take_outcome();
+        let turns = if outcome.is_none() {
+            self.grant(news)
+        } else {
+            // A run without robots, or all of them are stopped.
+            self.outputs.clear();
+            Vec::new()
+        };
+        OpenTick {
+            tick,
+            turns,
+            outcome,
+        }
+    }
+
+    /// Shows what a robot perceives in an open tick, before it acts: nothing that is done with it counts. `None` if the robot does not
+    /// run the tick.
+    pub fn perceive<T>(
+        &self,
+        open: &OpenTick,
+        name: &RobotName,
+        see: impl FnOnce(&mut Cars<'_>) -> T,
+    ) -> Option<T> {
+        let index = self.index(name)?;
+        let (_, turn) = open.turns.iter().find(|(runs, _)| *runs == index)?;
+        let mut others = self.others(turn);
+        Some(self.runners[index].perceive(turn, &mut others, see))
+    }
+
+    /// Has the robots run an open tick: the second half of [`Exchange::exchange`].
+    ///
+    /// # Errors
+    /// If a robot cannot go on.
+    pub fn close(
+        &mut self,
+        open: OpenTick,
+    ) -> Result<TickOutcome<Arc<Report>, CommandText>, RobotError> {
+        if let Some(outcome) = open.outcome {
+            return Ok(outcome);
+        }
+
+        for (index, turn) in &open.turns {
+            self.run(*index, turn)?;
+        }
+        self.take_outcome().ok_or_else(|| self.no_report(open.tick))
+    }
+
+    fn others(&self, turn: &Turn<TickUpdate>) -> Others<'_> {
+        Others {
+            names: &self.names,
+            participants: &self.participants,
+            query: StateQuery {
+                tick: Some(turn.tick),
+                epoch: Some(turn.epoch),
+            },
+        }
+    }
+
     /// Runs one tick of one robot, and hands what came of it to the barrier.
     fn run(&mut self, index: usize, turn: &Turn<TickUpdate>) -> Result<(), RobotError> {
         let mut others = Others {
@@ -350,18 +421,8 @@ impl Exchange<TickUpdate, Arc<Report>, CommandText> for LocalHost {
         tick: Tick,
         news: &dyn Bulletin<TickUpdate>,
     ) -> Result<TickOutcome<Arc<Report>, CommandText>, RobotError> {
-        self.barrier.open(tick, news.robots(), &mut self.outputs);
-        let complete_at_once = self.take_outcome();
-        if let Some(outcome) = complete_at_once {
-            // A run without robots, or all of them are stopped.
-            self.outputs.clear();
-            return Ok(outcome);
-        }
-
-        for (index, turn) in self.grant(news) {
-            self.run(index, &turn)?;
-        }
-        self.take_outcome().ok_or_else(|| self.no_report(tick))
+        let open = self.open(tick, news);
+        self.close(open)
     }
 }
 

@@ -188,9 +188,7 @@ impl Runner {
             self.proposal = self.welcome.location;
         }
         let is_reseeded = self.take_reseeds(turn.tick);
-        let told = news.correction.map(|correction| correction.location);
-        let told = told.or(news.pose.map(|pose| pose.location));
-        let location = told.unwrap_or(self.proposal);
+        let location = self.location(news);
         if turn.begin == Begin::TakeOver {
             // When its process asked to join, before or after the moves of this tick or of an earlier one, is wall clock.
             let welcome = Arc::make_mut(&mut self.welcome);
@@ -245,6 +243,43 @@ impl Runner {
             log.push(format!("warning: {warning}"));
         }
         Ok((location, action))
+    }
+
+    /// Where the robot stands in a tick.
+    fn location(&self, news: &TickUpdate) -> Point {
+        let told = news.correction.map(|correction| correction.location);
+        let told = told.or(news.pose.map(|pose| pose.location));
+        told.unwrap_or(self.proposal)
+    }
+
+    /// Shows what the robot perceives in a tick that it is to run. What is drawn, sent or logged then is dropped.
+    pub(crate) fn perceive<T>(
+        &self,
+        turn: &Turn<TickUpdate>,
+        network: &mut dyn PeerNetwork,
+        see: impl FnOnce(&mut Cars<'_>) -> T,
+    ) -> T {
+        let quiet = TickUpdate::default();
+        let news = turn.news.as_ref().unwrap_or(&quiet);
+        let location = match turn.begin {
+            Begin::Init => self.welcome.location,
+            Begin::TakeOver | Begin::GoOn => self.location(news),
+        };
+        see(&mut Cars {
+            welcome: &self.welcome,
+            tick: turn.tick,
+            location,
+            commands: &received(news),
+            news,
+            senses_bodies: self.robot.senses_bodies(),
+            senses_ranges: self.robot.senses_ranges(),
+            random: &mut self.random.clone(),
+            outbox: &mut Vec::new(),
+            log: &mut Vec::new(),
+            left_out: &mut LeftOut::default(),
+            gave_up: &mut None,
+            network,
+        })
     }
 
     /// Draws from the last of the streams that are due. Returns whether one is.

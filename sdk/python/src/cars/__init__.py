@@ -7,6 +7,8 @@ A robot is a class derived from :class:`Robot`, for a run in this process (``car
 by :func:`main`, as a program of its own.
 """
 
+from typing import Any
+
 from . import panel
 from ._cars import Cars, Stream, __version__, published_angle, stream
 from ._data import (
@@ -119,3 +121,14 @@ __all__ = [
     "take_part",
     "why",
 ]
+
+_OF_RL = ("parallel_env", "gym_env", "vector_env")
+
+
+def __getattr__(name: str) -> Any:
+    """Environments: what they need is loaded when they are used."""
+    if name in _OF_RL:
+        from . import rl  # noqa: PLC0415
+
+        return getattr(rl, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
