@@ -68,6 +68,9 @@ pub struct Design {
     pub rewards: Vec<(RobotName, String, f64)>,
 }
 
+/// Makes the folder of a record for a scenario.
+pub type RecordMaker<'a> = dyn Fn(&Scenario) -> Result<NewRun, LabError> + Sync + 'a;
+
 /// How a run stands after a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct StepEnd {
@@ -234,7 +237,7 @@ impl Environment {
     pub fn reset(
         &mut self,
         seed: u64,
-        record: Option<&dyn Fn(&Scenario) -> Result<NewRun, LabError>>,
+        record: Option<&RecordMaker>,
         observations: &mut [f32],
     ) -> Result<(), LabError> {
         config::seed::check(seed).map_err(LabError::refused)?;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use lab::LabError;
-use lab::environment::{Design, Environment, StepEnd};
+use lab::environment::{Design, Environment, RecordMaker, StepEnd};
 use launch::RunOptions;
 use protocol::RunName;
 use pyo3::prelude::*;
@@ -266,9 +266,6 @@ impl Environments {
 /// A body: what it is, its name if it is a robot, and its center, meters.
 type SceneBody = (&'static str, String, f64, f64);
 
-/// Makes the folder of a record.
-type RecordMaker<'a> = dyn Fn(&Scenario) -> Result<record::NewRun, LabError> + Sync + 'a;
-
 impl Environments {
     fn lock(&self) -> MutexGuard<'_, Vec<EnvironmentCopy>> {
         self.copies.lock().unwrap_or_else(PoisonError::into_inner)
@@ -347,7 +344,6 @@ impl EnvironmentCopy {
     fn reset(&mut self, seed: u64, record: Option<&RecordMaker>) -> Result<(), LabError> {
         self.end = 0;
         self.rewards.fill(0.0);
-        let record = record.map(|make| make as &dyn Fn(&Scenario) -> _);
         self.environment.reset(seed, record, &mut self.observations)
     }
 
