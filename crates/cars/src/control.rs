@@ -99,6 +99,18 @@ impl RunRef {
         Ok(noted.ok().map(|text| PathBuf::from(text.trim())))
     }
 
+    /// The same, as options of another program.
+    pub(crate) fn options(&self) -> Result<Vec<String>> {
+        let mut options = vec![
+            format!("--run={}", self.run()?),
+            format!("--connect={}", self.endpoint()?),
+        ];
+        if let Some(file) = self.config()? {
+            options.push(format!("--zenoh-config={}", file.display()));
+        }
+        Ok(options)
+    }
+
     fn open(&self) -> Result<(Bus, Keys)> {
         let role = Role::Client {
             connect: self.endpoint()?,

@@ -26,6 +26,7 @@ mod remarks;
 mod replay;
 mod replay_robot;
 mod report;
+mod ros;
 mod router;
 mod run;
 mod secure;
@@ -77,6 +78,9 @@ Robots of your own:
   exec         Run any program as a robot, over its standard input and output
   conform      Check a robot against the rules of the protocol
   init         Write the files that come with the programs, to edit them
+
+ROS 2:
+  ros          Show a run in progress to ROS 2, and serve its controls there
 
 Network:
   net          Faults of real links: cut, delay, bandwidth
@@ -158,6 +162,9 @@ enum Subcommands {
     Report(report::ReportArgs),
     /// Check a robot, written in any language, against the rules of the protocol.
     Conform(conform::ConformArgs),
+    /// Show a run in progress to ROS 2, and serve its controls there: `cars ros bridge`.
+    #[command(subcommand)]
+    Ros(ros::RosCommand),
     /// Faults of real links: cut, delay, bandwidth. The record is reproducible, the timing is not.
     #[command(subcommand)]
     Net(net::NetCommand),
@@ -219,6 +226,7 @@ fn dispatch(subcommand: Subcommands) -> Result<ExitCode> {
         Subcommands::Emotions(args) => emotions::emotions(&args),
         Subcommands::Report(args) => report::report(&args),
         Subcommands::Conform(args) => conform::conform(&args),
+        Subcommands::Ros(command) => ros::ros(&command),
         Subcommands::Net(command) => net::net(command),
         Subcommands::Router(args) => router::router(&args),
         Subcommands::Secure(args) => secure::secure(args),

@@ -1,7 +1,7 @@
 //! A run as a bag of ROS 2: a file of MCAP with the profile `ros2`, which `ros2 bag play`, rosbags, Foxglove and PlotJuggler read.
 //!
 //! Times are simulated. In every tick there are `/clock`, `/tf` (from `map` to `NAME/base_link`), `/NAME/odom` of every robot, and
-//! `/guests`; when they change, `/NAME/emotion`, `/NAME/behavior` and `/NAME/state_variables` (a JSON object); `/NAME/command` has each
+//! `/guests`; when they change, `/NAME/emotion`, `/NAME/behavior` and `/NAME/variables` (a JSON object); `/NAME/command` has each
 //! command that arrives (a JSON object), and `/events` each event as `events.jsonl` has it.
 
 mod cdr;
@@ -68,7 +68,7 @@ type Payloads = BTreeMap<(RobotName, Seq), Payload>;
 /// A command that was sent, as its target gets it.
 #[derive(Debug, Clone, Serialize)]
 struct CommandOnWay {
-    from: RobotName,
+    sender: RobotName,
     seq: Seq,
     performative: Performative,
     command: String,
@@ -107,7 +107,7 @@ impl Bag {
                 odometry: add_own("odom", MessageType::Odometry),
                 emotion: add_own("emotion", MessageType::Text),
                 behavior: add_own("behavior", MessageType::Text),
-                variables: add_own("state_variables", MessageType::Text),
+                variables: add_own("variables", MessageType::Text),
                 command: add_own("command", MessageType::Text),
                 last_pose: None,
                 last_variables: StateVariables::default(),
@@ -255,7 +255,7 @@ impl Bag {
         }
         let with_payload = (from.clone(), payload_of.unwrap_or(*seq));
         let command = CommandOnWay {
-            from: from.clone(),
+            sender: from.clone(),
             seq: *seq,
             performative: *performative,
             command: command.clone(),

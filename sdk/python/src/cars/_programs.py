@@ -32,7 +32,9 @@ def _digest(make: Any) -> str:
 def _parts(make: Any) -> list[Any]:
     """What makes up the program of a class, a function, or an object that is called."""
     if isinstance(make, functools.partial):
-        return [*_parts(make.func), repr(make.args), repr(sorted(make.keywords.items()))]
+        # A class that is an argument is part of the program, as that of a node is.
+        of_classes = [part for given in make.args if inspect.isclass(given) for part in _parts(given)]
+        return [*_parts(make.func), *of_classes, repr(make.args), repr(sorted(make.keywords.items()))]
     if inspect.isclass(make):
         parts: list[Any] = []
         for one in make.__mro__:

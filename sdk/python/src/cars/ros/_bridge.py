@@ -1,0 +1,204 @@
+"""A run in progress as others in ROS see it, and what controls it: an observer, which takes part in no tick."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import json
+import os
+import sys
+import threading
+from collections.abc import Sequence
+from typing import Any, Optional
+
+from ._load import RosError, load
+from ._motion import rotated
+from ._topics import ros_name
+
+SETTINGS = {
+    "mode": '"client"',
+    "scouting/multicast/enabled": "false",
+    "scouting/gossip/enabled": "false",
+    "transport/link/tx/lease": "2000",
+    "transport/link/tx/keep_alive": "4",
+    "connect/timeout_ms": "5000",
+}
+ANSWER_S = 10.0
+"""How long to wait for an answer of the simulator, which comes at once."""
+STEP_S = 3600.0
+"""How long to wait for that to a step, which comes when its ticks are complete."""
+SERVICES = {
+    "start": {"do": "start"},
+    "pause": {"do": "pause"},
+    "reset": {"do": "init"},
+    "stop": {"do": "stop"},
+    "get_state": {"do": "status"},
+}
+"""Services of std_srvs/Trigger, and the controls that they are."""
+
+
+class Bridge:
+    """Publishes each frame of a run, and serves its controls."""
+
+    def __init__(self, run: str, connect: str, zenoh_config: Optional[str]) -> None:
+        self._ros = load()
+        try:
+            self._zenoh: Any = importlib.import_module("zenoh")
+            self._trigger = importlib.import_module("std_srvs.srv").Trigger
+        except ImportError as error:
+            raise RosError(f"the bridge cannot be started ({error}): `pip install 'cars-simulator[ros]'`") from error
+        try:
+            # On no registry as a wheel; an installation of ROS has it.
+            self._tf: Any = importlib.import_module("tf2_msgs.msg").TFMessage
+        except ImportError:
+            self._tf = None
+
+        ros = self._ros
+        ros.rclpy.init(args=[])
+        self._node = ros.node.Node("cars", start_parameter_services=True)
+        self._node.declare_parameter("steps", 1)
+        self._run = run
+        self._publishers: dict[str, Any] = {}
+        self._names: dict[str, str] = {}
+        # One frame at a time is published, in their order.
+        self._lock = threading.Lock()
+        for name in SERVICES:
+            self._node.create_service(self._trigger, f"/cars/{name}", self._serve(name))
+        self._node.create_service(self._trigger, "/cars/step", self._step)
+
+        zenoh = self._zenoh
+        config = zenoh.Config.from_file(zenoh_config) if zenoh_config else zenoh.Config()
+        settings = {} if zenoh_config else SETTINGS
+        for key, value in {**settings, "mode": '"client"', "connect/endpoints": json.dumps([connect])}.items():
+            config.insert_json5(key, value)
+        try:
+            self._session = zenoh.open(config)
+        except zenoh.ZError as error:
+            raise RosError(f"there is no simulator at {connect} ({error}): is the run in progress?") from error
+        # Kept: it is undeclared when it is dropped.
+        self._world = self._session.declare_subscriber(f"cars/{run}/world", self._on_frame)
+
+    def spin(self) -> None:
+        """Serves until it is interrupted."""
+        print(f"bridging run {self._run}: /clock, odometry, guests; services in /cars", flush=True)
+        self._ros.rclpy.spin(self._node)
+
+    def close(self) -> None:
+        """Ends it."""
+        self._session.close()
+        self._ros.rclpy.try_shutdown()
+
+    def _publish(self, topic: str, message: Any) -> None:
+        publisher = self._publishers.get(topic)
+        if publisher is None:
+            publisher = self._publishers[topic] = self._node.create_publisher(type(message), topic, 100)
+        publisher.publish(message)
+
+    def _on_frame(self, sample: Any) -> None:
+        with self._lock:
+            if self._ros.rclpy.ok():
+                self._show(json.loads(sample.payload.to_bytes()))
+
+    def _show(self, frame: dict[str, Any]) -> None:
+        ros = self._ros
+        clock = ros.rosgraph.Clock()
+        clock.clock.sec, clock.clock.nanosec = divmod(round(frame["tick"] * frame["tick_s"] * 1e9), 10**9)
+        stamp = clock.clock
+        self._publish("/clock", clock)
+        transforms = [self._show_robot(robot, stamp) for robot in frame["robots"]]
+        if self._tf is not None:
+            self._publish("/tf", self._tf(transforms=transforms))
+
+        guests = ros.geometry.PoseArray()
+        guests.header.stamp, guests.header.frame_id = stamp, "map"
+        for x, y in frame["guests"]:
+            pose = ros.geometry.Pose()
+            pose.position.x, pose.position.y = float(x), float(y)
+            guests.poses.append(pose)
+        self._publish("/guests", guests)
+
+    def _show_robot(self, robot: dict[str, Any], stamp: Any) -> Any:
+        ros = self._ros
+        name = self._name(robot["name"])
+        heading_rad = robot.get("heading_rad")
+        if heading_rad is None:
+            heading_rad = robot["direction_rad"]
+        cos, sin = rotated(heading_rad / 2)
+        at = robot["location"]
+        odometry = ros.nav.Odometry()
+        odometry.header.stamp, odometry.header.frame_id = stamp, "map"
+        odometry.child_frame_id = f"{name}/base_link"
+        pose = odometry.pose.pose
+        pose.position.x, pose.position.y = float(at["x"]), float(at["y"])
+        pose.orientation.z, pose.orientation.w = sin, cos
+        odometry.twist.twist.linear.x = float(robot["speed_mps"])
+        self._publish(f"/{name}/odom", odometry)
+        self._publish(f"/{name}/emotion", ros.std.String(data=robot["emotion_state"]))
+        self._publish(f"/{name}/behavior", ros.std.String(data=robot["behavior_state"]))
+        transform = ros.geometry.TransformStamped()
+        transform.header = odometry.header
+        transform.child_frame_id = odometry.child_frame_id
+        transform.transform.translation.x, transform.transform.translation.y = pose.position.x, pose.position.y
+        transform.transform.rotation = pose.orientation
+        return transform
+
+    def _name(self, robot: str) -> str:
+        """Its name in ROS; no two are alike."""
+        if robot not in self._names:
+            plain = name = ros_name(robot)
+            number = 2
+            while name in self._names.values():
+                name, number = f"{plain}_{number}", number + 1
+            self._names[robot] = name
+        return self._names[robot]
+
+    def control(self, request: dict[str, Any], patience_s: float) -> dict[str, Any]:
+        """Asks the simulator, and returns its answer."""
+        replies = self._session.get(f"cars/{self._run}/control", payload=json.dumps(request), timeout=patience_s)
+        for reply in replies:
+            if reply.ok is not None:
+                answer: dict[str, Any] = json.loads(reply.ok.payload.to_bytes())
+                return answer
+            return {"answer": "refused", "explanation": reply.err.payload.to_string()}
+        return {"answer": "refused", "explanation": f"the simulator of run {self._run} did not answer within {patience_s:.0f} s"}
+
+    def _serve(self, name: str) -> Any:
+        def serve(_request: Any, response: Any) -> Any:
+            return _filled(response, self.control(SERVICES[name], ANSWER_S))
+
+        return serve
+
+    def _step(self, _request: Any, response: Any) -> Any:
+        steps = self._node.get_parameter("steps").value
+        if steps < 1:
+            response.message = f"the parameter steps of /cars is {steps}; it must be 1 or more"
+            return response
+        return _filled(response, self.control({"do": "step", "n": steps}, STEP_S))
+
+
+def _filled(response: Any, answer: dict[str, Any]) -> Any:
+    """The answer to a control as that of a Trigger: the status as JSON, or why it was refused."""
+    response.success = answer["answer"] == "done"
+    response.message = json.dumps(answer) if response.success else answer.get("explanation", "")
+    return response
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Runs the bridge, and returns its exit status."""
+    parser = argparse.ArgumentParser("cars ros bridge", description="Shows a run in progress to ROS 2, and serves its controls.")
+    parser.add_argument("--run", default=os.environ.get("CARS_RUN", "default"), help="name of the run")
+    parser.add_argument("--connect", default=os.environ.get("CARS_CONNECT", "tcp/127.0.0.1:7447"), help="where its simulator listens")
+    parser.add_argument("--zenoh-config", default=os.environ.get("CARS_ZENOH_CONFIG"), help="configuration file for a secured run")
+    options = parser.parse_args(arguments)
+    try:
+        bridge = Bridge(options.run, options.connect, options.zenoh_config)
+    except RosError as error:
+        print(f"cars.ros: {error}", file=sys.stderr)
+        return 2
+    try:
+        bridge.spin()
+    except (KeyboardInterrupt, bridge._ros.executors.ExternalShutdownException):
+        pass
+    finally:
+        bridge.close()
+    return 0
