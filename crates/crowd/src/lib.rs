@@ -8,6 +8,9 @@
 //! is a function of the state before it, to the last bit, for any number of threads. All is computed with + - * /, square
 //! roots and `libm`.
 //!
+//! Where numbers come from: \[D\] is documented in a source that was read, \[I\] was chosen here, or is cited from memory and was not
+//! checked.
+//!
 //! # Example
 //!
 //! ```

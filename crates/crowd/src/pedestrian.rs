@@ -27,8 +27,8 @@ pub struct Pedestrian {
 }
 
 impl Pedestrian {
-    /// A person who stands at a place: radius 0.18 m, desired speed 1.34 m/s \[D\] Weidmann 1993, the first itinerary, no reaction
-    /// time.
+    /// A person who stands at a place: radius 0.18 m, desired speed 1.34 m/s (Weidmann 1993, cited from memory \[I\]), the first itinerary,
+    /// no reaction time.
     #[must_use]
     pub const fn at(position: Vector) -> Self {
         Self {

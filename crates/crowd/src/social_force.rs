@@ -3,38 +3,40 @@
 use crate::model::{Surroundings, WalkingModel};
 use crate::vector::Vector;
 
-/// The social force model: people are driven to their desired velocity, and repelled by others and by walls. \[D\] Helbing, Molnár
-/// 1995, "Social force model for pedestrian dynamics"; with body forces and the parameters of \[D\] Helbing, Farkas, Vicsek 2000,
+/// The social force model: people are driven to their desired velocity, and repelled by others and by walls. \[I\] Helbing, Molnár
+/// 1995, "Social force model for pedestrian dynamics"; with body forces and the parameters of \[I\] Helbing, Farkas, Vicsek 2000,
 /// "Simulating dynamical features of escape panic", divided by the mass of 80 kg.
 ///
 /// dv/dt = (v0 e - v)/τ + sum (A exp((r - d)/B) w + k g(r - d)) n + κ g(r - d) Δv t, with the distance d, the sum r of both radii,
 /// g(x) = max(0, x), the normal n and the tangent t. w is the weight of what is seen at an angle φ to the way, λ + (1 - λ)(1 + cos φ)/2
-/// \[D\] Helbing et al. 2005.
+/// \[I\] Helbing et al. 2005.
+///
+/// All of this is cited from memory and was not checked in the sources \[I\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SocialForce {
-    /// τ, the time in which people accelerate, s. \[D\] 0.5.
+    /// τ, the time in which people accelerate, s. \[I\] 0.5.
     pub relaxation_s: f64,
-    /// A, strength of the social repulsion, m/s². \[D\] 2000 N / 80 kg = 25.
+    /// A, strength of the social repulsion, m/s². \[I\] 2000 N / 80 kg = 25.
     pub repulsion_mps2: f64,
-    /// B, range of the social repulsion, m. \[D\] 0.08.
+    /// B, range of the social repulsion, m. \[I\] 0.08.
     pub range_m: f64,
-    /// k, stiffness of bodies, 1/s². \[D\] 120,000 kg/s² / 80 kg = 1500.
+    /// k, stiffness of bodies, 1/s². \[I\] 120,000 kg/s² / 80 kg = 1500.
     pub stiffness_per_s2: f64,
-    /// κ, sliding friction of bodies, 1/(m s). \[D\] 240,000 kg/(m s) / 80 kg = 3000.
+    /// κ, sliding friction of bodies, 1/(m s). \[I\] 240,000 kg/(m s) / 80 kg = 3000.
     pub friction_per_m_s: f64,
-    /// λ, weight of what is behind. \[D\] 1 in 2000, that is none; 0.1 in 2005.
+    /// λ, weight of what is behind. \[I\] 1 in 2000, that is none; 0.1 in 2005.
     pub behind: f64,
-    /// Space that a person needs beyond their radius for each m/s that they walk, s. \[D\] Seyfried, Steffen, Lippert 2006, 0.53 s
+    /// Space that a person needs beyond their radius for each m/s that they walk, s. \[I\] Seyfried, Steffen, Lippert 2006, 0.53 s
     /// for d = 0.36 m + 0.53 s v; 0 in the sources above.
     pub stride_s: f64,
-    /// Largest speed over the desired one. \[D\] 1.3 in 1995.
+    /// Largest speed over the desired one. \[I\] 1.3 in 1995.
     pub fastest: f64,
-    /// Radius of bodies, m. \[D\] 0.25 to 0.35 in 2000.
+    /// Radius of bodies, m. \[I\] 0.25 to 0.35 in 2000.
     pub radius_m: f64,
 }
 
 impl SocialForce {
-    /// The parameters of Helbing, Farkas, Vicsek 2000, with the smallest radius that they give. \[D\]
+    /// The parameters of Helbing, Farkas, Vicsek 2000, with the smallest radius that they give. \[I\]
     #[must_use]
     pub const fn published() -> Self {
         Self {

@@ -10,7 +10,7 @@ pub enum SpeedData {
     Corridor,
     /// In one direction with open ends, 571 points; from the same place. \[D\]
     Open,
-    /// The line of Weidmann 1993, over measurements of 25 authors. \[D\]
+    /// The line of Weidmann 1993, over measurements of 25 authors; cited from memory \[I\].
     Weidmann,
 }
 
@@ -39,14 +39,15 @@ impl SpeedData {
     }
 }
 
-/// Weidmann's speed at a density, m/s: 1.34 (1 - exp(-1.913 (1/ρ - 1/5.4))), and 0 beyond 5.4 persons per m². \[D\]
+/// Weidmann's speed at a density, m/s: 1.34 (1 - exp(-1.913 (1/ρ - 1/5.4))), and 0 beyond 5.4 persons per m². Cited
+/// from memory \[I\].
 #[must_use]
 pub fn weidmann_mps(density_per_m2: f64) -> f64 {
     let free_m2 = 1.0 / density_per_m2 - 1.0 / 5.4;
     (1.34 * (1.0 - libm::exp(-1.913 * free_m2))).max(0.0)
 }
 
-/// Speeds in single file by persons per meter: (1/m, m/s). \[D\] Seyfried, Steffen, Klingsch, Boltes 2005.
+/// Speeds in single file by persons per meter: (1/m, m/s). Seyfried, Steffen, Klingsch, Boltes 2005, cited from memory \[I\].
 pub const SINGLE_FILE: [(f64, f64); 4] = [(0.75, 0.89), (1.25, 0.45), (1.75, 0.19), (2.25, 0.07)];
 
 /// Flow of 75 people through a gate of 0.5 m at the end of a corridor of 5.6 m, 1/s. \[D\] Adrian, Seyfried, Sieben 2020, run

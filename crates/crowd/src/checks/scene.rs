@@ -8,9 +8,9 @@ use crate::pedestrians::Pedestrians;
 use crate::premises::{Premises, WallLine};
 use crate::vector::Vector;
 
-/// Mean of desired speeds, m/s. \[D\] Weidmann 1993.
+/// Mean of desired speeds, m/s. Weidmann 1993, cited from memory \[I\].
 const DESIRED_MPS: f64 = 1.34;
-/// Their standard deviation, m/s. \[D\] Weidmann 1993.
+/// Their standard deviation, m/s. Weidmann 1993, cited from memory \[I\].
 const DESIRED_DEVIATION_MPS: f64 = 0.26;
 
 /// The chance of one run: who takes part, and where they stand.
