@@ -410,6 +410,15 @@ pub(crate) fn two_rooms<M: WalkingModel + Clone>(model: &M, chance: &mut RunChan
 /// 75 people through a gate of 0.5 m at the end of a corridor of 5.6 m. The flow, and that of the middle 60 % of
 /// them, 1/s.
 pub(crate) fn gate<M: WalkingModel + Clone>(model: &M, chance: &mut RunChance) -> Vec<f64> {
+    gate_with_way_behind(model, chance, 2.0)
+}
+
+/// The case of the gate, which people leave so far behind it, m.
+fn gate_with_way_behind<M: WalkingModel + Clone>(
+    model: &M,
+    chance: &mut RunChance,
+    behind_m: f64,
+) -> Vec<f64> {
     let premises = Premises {
         walls: [
             walls(&[(8.0, 2.55), (8.0, 0.0), (-1.0, 0.0), (-1.0, 5.6)]),
@@ -420,7 +429,7 @@ pub(crate) fn gate<M: WalkingModel + Clone>(model: &M, chance: &mut RunChance) -
     };
     let lines = [
         line((8.0, 2.55), (8.0, 3.05)),
-        line((10.0, 1.8), (10.0, 3.8)),
+        line((8.0 + behind_m, 1.8), (8.0 + behind_m, 3.8)),
     ];
     let area = (Vector::ZERO, Vector::new(6.0, 5.6));
     let times_s = flow_times(model, chance, &premises, &lines, area, 75);
@@ -468,4 +477,38 @@ fn flow_times<M: WalkingModel + Clone>(
 
 fn position<M: WalkingModel>(crowd: &Pedestrians<M>, id: u32) -> Vector {
     crowd.get(id).map_or(Vector::ZERO, |person| person.position)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::collision_free::CollisionFree;
+
+    /// The mean flow through the gate, 1/s, if people leave the case so far behind it, m.
+    fn mean_flow_per_s(behind_m: f64) -> f64 {
+        let runs = 10;
+        let mut sum_per_s = 0.0;
+        for run in 0..runs {
+            let mut chance = RunChance::new(2, run, 10);
+            sum_per_s += gate_with_way_behind(&CollisionFree::default(), &mut chance, behind_m)[0];
+        }
+        sum_per_s / runs as f64
+    }
+
+    /// Who walks away behind the gate makes room, so people who vanish there would let more of them through.
+    #[test]
+    fn the_flow_through_the_gate_does_not_depend_on_where_people_leave_the_case() {
+        let flow_per_s = mean_flow_per_s(2.0);
+        let with_long_way_per_s = mean_flow_per_s(8.0);
+        assert!(
+            (flow_per_s - with_long_way_per_s).abs() <= 0.05,
+            "{flow_per_s} {with_long_way_per_s}"
+        );
+
+        let with_short_way_per_s = mean_flow_per_s(0.5);
+        assert!(
+            with_short_way_per_s > flow_per_s + 0.2,
+            "{flow_per_s} {with_short_way_per_s}"
+        );
+    }
 }
