@@ -5,7 +5,7 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from lab import FITS, ROOT, download, eventually, until
+from lab import FITS, ROOT, Crowd, download, eventually, until
 
 pytestmark = pytest.mark.thorough
 
@@ -211,3 +211,19 @@ def test_guests_who_ask_in_vain_are_seen_on_the_plan_and_in_its_picture(launch, 
     download(page, "vector", picture)
     assert "annoyed guest" in picture.read_text()
     page.screenshot(path=screenshots / "guest-moods.png")
+
+
+@pytest.mark.parametrize("guests, step", [(20_000, 1), (20_001, 2), (1_000_000, 50)])
+def test_the_legend_says_which_share_of_very_many_guests_is_shown(launch, open_page, guests, step):
+    """A frame has at most 20,000 guests, so that it fits into a message."""
+    run = launch(kind=Crowd, robots=2, guests=guests)
+    page = open_page(run.address)
+    until(page, "window.carsConsole.frame() !== null")
+    assert page.evaluate("window.carsConsole.frame().guests.length") == -(-guests // step)
+
+    sample = page.get_by_test_id("guest-sample")
+    if step == 1:
+        expect(sample).to_be_hidden()
+    else:
+        expect(sample).to_be_visible()
+        expect(sample).to_have_text(f"(one in {step} is shown)")
