@@ -112,6 +112,26 @@ fn who_leaves_by_an_exit_comes_back_only_with_a_time_to_stay_away() {
     }
 }
 
+/// The bound of what guests who never rest add to a record.
+#[test]
+fn with_no_time_outside_each_guest_leaves_or_comes_back_at_most_once_a_tick() {
+    let restless = Want {
+        stay_s: Some(triangular(0.0, 0.0, 0.0)),
+        ..want(WantTarget::Exit(DOOR))
+    };
+    let mut world = world_of(&hall(3), &[restless], 2);
+    let mut passages = 0;
+    for _ in 0..300 {
+        world.advance(&[None]);
+        let mut guests: Vec<usize> = world.passages().iter().map(|one| one.guest).collect();
+        passages += guests.len();
+        guests.sort_unstable();
+        guests.dedup();
+        assert_eq!(guests.len(), world.passages().len());
+    }
+    assert!((300..=900).contains(&passages), "{passages}");
+}
+
 #[test]
 fn who_wants_what_a_robot_gives_waits_at_it_until_it_has_it() {
     let treat = Want {
