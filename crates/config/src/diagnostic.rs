@@ -7,6 +7,7 @@ use std::path::Path;
 
 use miette::{Diagnostic, LabeledSpan, NamedSource, Severity, SourceCode};
 use protocol::plain::{escape_line, escape_text};
+use protocol::wording::without_type_names;
 
 use crate::shipped;
 
@@ -238,7 +239,7 @@ impl Source {
     pub fn parse<T: serde::de::DeserializeOwned>(&self) -> Result<T, FileError> {
         toml::from_str(&self.text).map_err(|error: toml::de::Error| {
             let span = self.entry_of::<T>(&error).or(error.span());
-            FileError::at(self, span, error.message())
+            FileError::at(self, span, &without_type_names(error.message()))
         })
     }
 

@@ -21,6 +21,7 @@ pub mod random;
 pub mod recorded;
 pub mod schemas;
 pub mod time;
+pub mod wording;
 
 // The tests of the contract name it as other crates do.
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Why a robot cannot take part, or cannot go on.
 
 use protocol::messages::Parameters;
+use protocol::wording::without_type_names;
 use protocol::{RobotName, Tick};
 use serde::de::DeserializeOwned;
 
@@ -24,9 +25,10 @@ pub type ParametersCheck = fn(&Parameters) -> Result<(), String>;
 pub fn read_parameters<P: DeserializeOwned>(parameters: &Parameters) -> Result<P, String> {
     let map = parameters.clone().into_iter().collect();
     serde_path_to_error::deserialize(serde_json::Value::Object(map)).map_err(|error| {
+        let reason = without_type_names(&error.inner().to_string());
         match error.path().to_string() {
-            path if path == "." => error.inner().to_string(),
-            path => format!("{path}: {}", error.inner()),
+            path if path == "." => reason,
+            path => format!("{path}: {reason}"),
         }
     })
 }

@@ -394,6 +394,17 @@ fn errors_show_line_place_and_reason() {
         ),
         ("tick = 0.5\n", "1 │ tick = 0.5", "a time such as"),
         (
+            "[guests]\ncount = -1\n",
+            "2 │ count = -1",
+            "expected a whole number of 0 or more",
+        ),
+        ("guests = 5\n", "1 │ guests = 5", "expected a table"),
+        (
+            "seed = 99999999999999999999\n",
+            "1 │ seed",
+            "is too large or too small",
+        ),
+        (
             "duration = \"-1 s\"\n",
             "1 │ duration",
             "must be more than zero",
