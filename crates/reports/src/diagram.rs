@@ -108,7 +108,7 @@ pub(crate) fn read(
 
     if let Some(end) = held_up.end.filter(|end| *end <= last) {
         notes.push(format!(
-            "{} is complete up to before tick {end}: ticks that were held up from there on are not marked",
+            "{} ends before tick {end}: from there on it is not known which ticks were held up, and none is marked",
             files.recording.display()
         ));
     }

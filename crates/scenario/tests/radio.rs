@@ -76,7 +76,11 @@ fn what_makes_no_sense_is_refused_where_it_is() {
     let path = "path_loss = { exponent = 3 }\n";
     let rate = "bit_rate = \"1 kbit/s\"\n";
     for (text, line, reason) in [
-        (String::new(), 1, "a `range`, a `path_loss`, a `bit_rate`"),
+        (
+            String::new(),
+            1,
+            "a radio needs a limit: `range = \"20 m\"`",
+        ),
         (
             "range = \"5 m\"\nwalls_db = 3".to_owned(),
             3,

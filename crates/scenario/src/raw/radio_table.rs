@@ -116,7 +116,8 @@ impl RadioTable {
         let refuse =
             |span: std::ops::Range<usize>, why: &str| FileError::at(source, Some(span), why);
         if self.range.is_none() && self.path_loss.is_none() && self.bit_rate.is_none() {
-            let why = "a radio has a `range`, a `path_loss`, a `bit_rate`, or several of these";
+            let why = "a radio needs a limit: `range = \"20 m\"`, `path_loss = { exponent = 3.0 }`, \
+                       `bit_rate = \"250 kbit/s\"`, or several of these";
             return Err(refuse(span, why));
         }
         if self.path_loss.is_none()
