@@ -1,14 +1,16 @@
 //! The figure of `docs/crowd.md`: models of walking beside what was measured with people. With `CARS_UPDATE=1` the test writes it.
 
-use std::path::Path;
+#[path = "../../pictures/tests/shipped/mod.rs"]
+mod shipped;
 
 use crowd::checks::{
     CheckOptions, CheckedRow, DENSITIES_PER_M2, GATE_FLOW_PER_S, KnownModel, SINGLE_FILE, SpeedData,
 };
 use pictures::{
-    Chart, ChartPanel, Figure, IntervalRow, Intervals, PlottedEstimate, Trend, TrendLine,
-    TrendPoint,
+    Chart, ChartPanel, IntervalRow, Intervals, PlottedEstimate, Trend, TrendLine, TrendPoint,
 };
+
+use shipped::assert_figure_is_shipped;
 
 /// Colors of the model and of the three sets of data.
 const MODEL: usize = 0;
@@ -127,23 +129,5 @@ fn the_figure_of_the_crowd_is_up_to_date() {
         gate(),
     ];
     let caption = "Models of walking with intervals of 95 %, and what was measured with people.";
-    let printed = Figure::new(panels, caption, None)
-        .print("crowd", None)
-        .unwrap();
-    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs");
-    for (index, picture) in printed.pictures.iter().enumerate() {
-        let file = docs.join(match index {
-            0 => "crowd.svg".to_owned(),
-            index => format!("crowd-{}.svg", index + 1),
-        });
-        if std::env::var_os("CARS_UPDATE").is_some() {
-            std::fs::write(&file, &picture.svg).unwrap();
-        }
-        let shipped = std::fs::read_to_string(&file).unwrap_or_default();
-        assert!(
-            shipped == picture.svg,
-            "{} is out of date: CARS_UPDATE=1 writes it",
-            file.display()
-        );
-    }
+    assert_figure_is_shipped("crowd", panels, caption);
 }

@@ -5,11 +5,12 @@
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
 mod media;
+#[path = "../../pictures/tests/shipped/mod.rs"]
+mod shipped;
 
 use std::collections::BTreeSet;
-use std::path::Path;
 
-use pictures::{Chart, ChartPanel, Figure, PlottedEstimate, Trend, TrendLine, TrendPoint};
+use pictures::{Chart, ChartPanel, PlottedEstimate, Trend, TrendLine, TrendPoint};
 use protocol::RobotName;
 use protocol::messages::{CommandText, Point};
 use protocol::random::{stream, unit};
@@ -17,6 +18,7 @@ use radio::{SendQueue, Transmitter, outage};
 use simulator::medium::{Medium, SentCommand};
 
 use media::medium_of;
+use shipped::assert_figure_is_shipped;
 
 /// Quantile of the normal distribution for intervals of 99 %.
 const Z_99: f64 = 2.576;
@@ -294,23 +296,5 @@ fn the_figure_of_the_network_is_up_to_date() {
         ),
     ];
     let caption = "The simulated network, measured with intervals of 99 %, and its closed forms.";
-    let printed = Figure::new(panels, caption, None)
-        .print("network", None)
-        .unwrap();
-    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs");
-    for (index, picture) in printed.pictures.iter().enumerate() {
-        let file = docs.join(match index {
-            0 => "network.svg".to_owned(),
-            index => format!("network-{}.svg", index + 1),
-        });
-        if std::env::var_os("CARS_UPDATE").is_some() {
-            std::fs::write(&file, &picture.svg).unwrap();
-        }
-        let shipped = std::fs::read_to_string(&file).unwrap_or_default();
-        assert!(
-            shipped == picture.svg,
-            "{} is out of date: CARS_UPDATE=1 writes it",
-            file.display()
-        );
-    }
+    assert_figure_is_shipped("network", panels, caption);
 }
