@@ -1,12 +1,14 @@
 //! Figures that the book shows and a test draws. It is a part of the tests of each crate that measures what its figure shows.
 
+#![expect(clippy::unwrap_used, reason = "helpers of tests")]
+
 use std::path::Path;
 
 use pictures::{ChartPanel, Figure};
 
 /// Asserts that the pictures of a figure are those in `docs`: `NAME.svg`, and `NAME-2.svg` and so on if it is higher than a page. With
 /// `CARS_UPDATE=1` it writes them.
-pub fn assert_figure_is_shipped(name: &str, panels: Vec<ChartPanel>, caption: &str) {
+pub(crate) fn assert_figure_is_shipped(name: &str, panels: Vec<ChartPanel>, caption: &str) {
     let printed = Figure::new(panels, caption, None)
         .print(name, None)
         .unwrap();
