@@ -15,7 +15,7 @@ use serde::Deserialize;
 
 use crate::error::LabError;
 use crate::run::RobotMaker;
-use crate::session::{AgentKind, AgentStep, Session};
+use crate::stepped::{AgentKind, AgentStep, SteppedRun};
 
 /// Most numbers of a row of observations.
 pub const MAX_ROW: usize = 65_536;
@@ -87,7 +87,7 @@ pub struct Environment {
     names: BTreeSet<RobotName>,
     kind: AgentKind,
     others: RobotMaker,
-    session: Option<Session>,
+    session: Option<SteppedRun>,
     /// The measures that are rewarded, as they stood at the step before.
     measured: BTreeMap<String, f64>,
 }
@@ -241,11 +241,11 @@ impl Environment {
         observations: &mut [f32],
     ) -> Result<(), LabError> {
         config::seed::check(seed).map_err(LabError::refused)?;
-        let scenario = Session::scenario_of(self.scenario.clone(), &self.names);
+        let scenario = SteppedRun::scenario_of(self.scenario.clone(), &self.names);
         let scenario = scenario.with_seed(seed).map_err(LabError::from)?;
         self.session = None;
         let record = record.map(|make| make(&scenario)).transpose()?;
-        let session = Session::begin(
+        let session = SteppedRun::begin(
             scenario,
             &self.names,
             &self.kind,
@@ -314,7 +314,7 @@ impl Environment {
 
     /// The run, if one has begun.
     #[must_use]
-    pub fn session(&self) -> Option<&Session> {
+    pub fn session(&self) -> Option<&SteppedRun> {
         self.session.as_ref()
     }
 
@@ -324,7 +324,7 @@ impl Environment {
         self.names.contains(robot)
     }
 
-    fn add_rewards(&mut self, session: &Session, rewards: &mut [f32]) {
+    fn add_rewards(&mut self, session: &SteppedRun, rewards: &mut [f32]) {
         if self.design.rewards.is_empty() {
             return;
         }
@@ -343,7 +343,7 @@ impl Environment {
         self.measured = now;
     }
 
-    fn perceive(&self, session: &Session, observations: &mut [f32]) {
+    fn perceive(&self, session: &SteppedRun, observations: &mut [f32]) {
         let rows = observations.chunks_mut(self.row());
         for (agent, row) in self.design.agents.iter().zip(rows) {
             row.fill(0.0);

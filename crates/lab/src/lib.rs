@@ -16,8 +16,9 @@ mod reexecution;
 pub mod replayed;
 pub mod run;
 pub mod scratch;
-pub mod session;
+
 pub mod states;
+pub mod stepped;
 pub mod verify;
 
 pub use error::LabError;

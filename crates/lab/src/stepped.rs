@@ -47,21 +47,21 @@ pub struct AgentStep {
 type StepSlot = Arc<Mutex<Option<AgentStep>>>;
 
 /// A run that is played step by step.
-pub struct Session {
+pub struct SteppedRun {
     branch: Branch,
     agents: BTreeMap<RobotName, StepSlot>,
-    record: Option<SessionRecord>,
+    record: Option<SteppedRecord>,
     opened: Instant,
 }
 
 /// The record of the run, if there is one.
-struct SessionRecord {
+struct SteppedRecord {
     recorder: Recorder,
     /// Holds the lock of its folder.
     _run: NewRun,
 }
 
-impl Session {
+impl SteppedRun {
     /// Begins a run: it stands in tick 0, in which no robot has acted. `record` is the folder of its record, made for this scenario as
     /// [`Self::scenario_of`] gives it.
     ///
@@ -90,7 +90,7 @@ impl Session {
         let branch = Branch::begin(Self::scenario_of(scenario, agents), &run, make)?;
         let record = record.map(|new| {
             let recorder = Recorder::begin(&new.folder, &run, branch.simulation())?;
-            Ok::<_, LabError>(SessionRecord {
+            Ok::<_, LabError>(SteppedRecord {
                 recorder,
                 _run: new,
             })
@@ -150,7 +150,7 @@ impl Session {
         let Some(ended) = self.branch.end_tick()? else {
             return Ok(());
         };
-        let Some(SessionRecord { recorder, .. }) = &mut self.record else {
+        let Some(SteppedRecord { recorder, .. }) = &mut self.record else {
             return Ok(());
         };
 
