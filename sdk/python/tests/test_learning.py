@@ -280,6 +280,28 @@ def test_steps_that_cannot_be_played_are_refused_and_nothing_is_lost() -> None:
         vector.step(np.zeros((3, 2)))
 
 
+@pytest.mark.parametrize("threads", [1, 4])
+def test_no_copy_steps_if_one_has_an_action_that_is_no_number(threads: int) -> None:
+    refused, other = (rl.vector_env("waiter", ["Rosie"], num_envs=4, threads=threads, bodies=0) for _ in range(2))
+    refused.reset(seed=1)
+    other.reset(seed=1)
+    still = np.zeros((4, 2), np.float32)
+    wrong = still.copy()
+    wrong[1, 0] = np.nan
+    with pytest.raises(cars.BadArgument, match="copy 1 is not a finite number"):
+        refused.step(wrong)
+    assert np.array_equal(refused.step(still)[0], other.step(still)[0])
+
+
+def test_no_copy_repeats_a_run_after_a_reset_without_a_seed() -> None:
+    env = rl.vector_env("waiter", ["Rosie"], num_envs=2)
+    first, _ = env.reset(seed=1)
+    again, _ = env.reset()
+    single = rl.parallel_env("waiter", ["Rosie"])
+    assert np.array_equal(again[0], single.reset(seed=3)[0]["Rosie"])
+    assert not np.array_equal(again[0], first[1])
+
+
 def test_a_record_of_a_run_that_was_left_is_that_of_one_that_was_killed(lab: Lab) -> None:
     env = pair(record=lab.folder, name="left")
     env.reset(seed=1)

@@ -353,6 +353,8 @@ class CarsVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
             seeds = [_arguments.whole("seed", one, 0, _arguments.MAX_SEED) for one in seed]
         else:
             first = self._copies.seed(seed)
+            # The next reset without a seed begins after the seeds of all copies of this one.
+            self._copies.next_seed = (first + self.num_envs) % (_arguments.MAX_SEED + 1)
             seeds = [(first + copy) % (_arguments.MAX_SEED + 1) for copy in range(self.num_envs)]
         rows, _ = self._copies.native.reset(seeds, follows=True, out=None, name=None)
         return self._rows(rows), {}
@@ -362,6 +364,9 @@ class CarsVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
         given = np.ascontiguousarray(actions, np.float32)
         if given.shape != self.action_space.shape:
             raise BadArgument(f"actions have the shape {self.action_space.shape}, not {given.shape}")
+        # Checked for all copies before any of them steps: which ones had stepped would depend on the threads.
+        if not np.isfinite(given).all():
+            raise BadArgument(f"an action of copy {int(np.argwhere(~np.isfinite(given))[0][0])} is not a finite number")
         rows, rewards, ends = self._copies.native.step(given.tobytes())
         how = np.frombuffer(ends, np.uint8)
         return self._rows(rows), np.frombuffer(rewards, np.float32).reshape(self._per_agent), how == _TERMINATED, how == _TRUNCATED, {}
