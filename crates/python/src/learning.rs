@@ -167,7 +167,7 @@ impl Environments {
             let mut copies = self.lock();
             self.each(&mut copies, &|index, copy| {
                 copy.seed_step = step;
-                copy.next_seed = follows.then(|| seeds[index].wrapping_add(step));
+                copy.next_seed = follows.then(|| seed_after(seeds[index], step));
                 copy.reset(seeds[index], record)
             })?;
             Ok(numbers(&copies, |copy| &copy.observations))
@@ -308,6 +308,11 @@ impl Environments {
     }
 }
 
+/// The seed that is this much later; after the last one, 2^53 - 1, comes 0, as in `cars.rl`.
+fn seed_after(seed: u64, step: u64) -> u64 {
+    seed.wrapping_add(step) % (1 << 53)
+}
+
 fn not_begun() -> PyErr {
     reported(LabError::refused("no run has begun").with_help("call reset() first"))
 }
@@ -350,7 +355,7 @@ impl EnvironmentCopy {
     /// Plays a step, or begins the run that follows one that is over.
     fn step(&mut self, actions: &[f32]) -> Result<(), LabError> {
         if let (true, Some(seed)) = (self.end != 0, self.next_seed) {
-            self.next_seed = Some(seed.wrapping_add(self.seed_step));
+            self.next_seed = Some(seed_after(seed, self.seed_step));
             return self.reset(seed, None);
         }
 
