@@ -16,7 +16,6 @@ mod reexecution;
 pub mod replayed;
 pub mod run;
 pub mod scratch;
-
 pub mod states;
 pub mod stepped;
 pub mod verify;

@@ -36,7 +36,9 @@ fn the_package_passes_its_long_tests() {
 }
 
 fn test_the_package(choice: Choice) {
-    if !is_equipped("cars, zenoh, pytest, mypy, pandas, pyarrow, polars, numpy, gymnasium, pettingzoo") {
+    if !is_equipped(
+        "cars, zenoh, pytest, mypy, pandas, pyarrow, polars, numpy, gymnasium, pettingzoo",
+    ) {
         return;
     }
 
