@@ -115,6 +115,13 @@ def test_a_step_is_exactly_so_many_ticks(lab: Lab, other: Other) -> None:
     odometry = other.seen["/walker_1/odom"][-1]
     assert odometry.child_frame_id == "walker_1/base_link" and odometry.pose.pose.position.x > 2.0
     assert len(other.seen["/guests"][-1].poses) == 3
+    done, text = other.call("get_entities")
+    entities = json.loads(text)
+    assert done and entities["tick"] == before
+    assert [entity["name"] for entity in entities["entities"]] == ["walker_1", "guest_0", "guest_1", "guest_2"]
+    assert entities["entities"][0]["x"] == odometry.pose.pose.position.x
+    done, text = other.call("get_features")
+    assert done and "STEP_SIMULATION_MULTIPLE" in json.loads(text)["features"]
 
     done, status = other.call("reset")
     assert done and json.loads(status)["epoch"] == 2

@@ -248,13 +248,18 @@ fn a_robot_without_which_the_clock_went_on_is_let_go_on_by_hand() {
 /// not before the run was killed.
 #[test]
 fn a_killed_run_is_resumed_without_waiting_for_a_fault_by_hand() {
-    for ended in ["between", "waiting", "never"] {
+    let ends = ["between", "waiting", "never"];
+    for (kind, ended) in ends
+        .map(|ended| ("crash", ended))
+        .into_iter()
+        .chain(ends.map(|ended| ("hang", ended)))
+    {
         let lab = Lab::new();
-        let run = format!("by-hand-resumed-{ended}");
+        let run = format!("by-hand-resumed-{kind}-{ended}");
         let run = run.as_str();
         let mut launch = paused(&lab, run, &["--set", "deadline=60 s"]);
         lab.step(run, 5);
-        lab.ctl(run, &["crash", "Leguin"]);
+        lab.ctl(run, &[kind, "Leguin"]);
         lab.ctl(run, &["step", "5"]);
         held_by_leguin(&lab, run);
         if ended != "waiting" {

@@ -51,10 +51,17 @@ impl LiveRun {
         for robot in &robots {
             // One that is here, and was killed and replaced between two ticks then, has not been asked yet.
             self.barrier.ask_to_rejoin(robot);
-            // A time of the launcher's was over before the robot did this tick, by whatever clock.
-            if let Some(kind) = self.orders.holding_for_a_time(robot) {
-                self.recover_now(robot, kind)?;
-            }
+        }
+        // Whoever does this tick was not held any more, by whatever clock: that a person or a time of the launcher's ended a fault
+        // while the clock waited is no event.
+        let absent = replay_log.map(|replay_log| replay_log.attendance().absent);
+        let absent = absent.unwrap_or_default();
+        let held = self.barrier.roster().filter_map(|robot| {
+            let kind = self.orders.holding_for_a_time(robot)?;
+            (!absent.contains(robot)).then(|| (robot.clone(), kind))
+        });
+        for (robot, kind) in held.collect::<Vec<_>>() {
+            self.recover_now(&robot, kind)?;
         }
 
         self.epoch.waits_for = WaitsFor::Rejoins(RejoinWait::begin(robots));

@@ -35,6 +35,18 @@ SERVICES = {
     "get_state": {"do": "status"},
 }
 """Services of std_srvs/Trigger, and the controls that they are."""
+FEATURES = [
+    "ENTITY_STATE_GETTING",
+    "SIMULATION_RESET",
+    "SIMULATION_RESET_TIME",
+    "SIMULATION_RESET_STATE",
+    "SIMULATION_STATE_GETTING",
+    "SIMULATION_STATE_SETTING",
+    "SIMULATION_STATE_PAUSE",
+    "STEP_SIMULATION_SINGLE",
+    "STEP_SIMULATION_MULTIPLE",
+]
+"""What simulation_interfaces/SimulatorFeatures calls what is served here."""
 
 
 class Bridge:
@@ -60,11 +72,14 @@ class Bridge:
         self._run = run
         self._publishers: dict[str, Any] = {}
         self._names: dict[str, str] = {}
+        self._frame: dict[str, Any] = {}
         # One frame at a time is published, in their order.
         self._lock = threading.Lock()
         for name in SERVICES:
             self._node.create_service(self._trigger, f"/cars/{name}", self._serve(name))
         self._node.create_service(self._trigger, "/cars/step", self._step)
+        self._node.create_service(self._trigger, "/cars/get_features", self._features)
+        self._node.create_service(self._trigger, "/cars/get_entities", self._entities)
 
         zenoh = self._zenoh
         config = zenoh.Config.from_file(zenoh_config) if zenoh_config else zenoh.Config()
@@ -101,6 +116,7 @@ class Bridge:
 
     def _show(self, frame: dict[str, Any]) -> None:
         ros = self._ros
+        self._frame = frame
         clock = ros.rosgraph.Clock()
         clock.clock.sec, clock.clock.nanosec = divmod(round(frame["tick"] * frame["tick_s"] * 1e9), 10**9)
         stamp = clock.clock
@@ -120,10 +136,7 @@ class Bridge:
     def _show_robot(self, robot: dict[str, Any], stamp: Any) -> Any:
         ros = self._ros
         name = self._name(robot["name"])
-        heading_rad = robot.get("heading_rad")
-        if heading_rad is None:
-            heading_rad = robot["direction_rad"]
-        cos, sin = rotated(heading_rad / 2)
+        cos, sin = rotated(_heading_rad(robot) / 2)
         at = robot["location"]
         odometry = ros.nav.Odometry()
         odometry.header.stamp, odometry.header.frame_id = stamp, "map"
@@ -174,6 +187,34 @@ class Bridge:
             response.message = f"the parameter steps of /cars is {steps}; it must be 1 or more"
             return response
         return _filled(response, self.control({"do": "step", "n": steps}, STEP_S))
+
+
+    def _features(self, _request: Any, response: Any) -> Any:
+        response.success, response.message = True, json.dumps({"features": FEATURES})
+        return response
+
+    def _entities(self, _request: Any, response: Any) -> Any:
+        """Robots and guests as the last frame has them."""
+        with self._lock:
+            frame = self._frame
+            response.success = bool(frame)
+            if not frame:
+                response.message = "there is no frame of the run yet"
+                return response
+            entities = [
+                {"name": self._name(robot["name"]), "x": robot["location"]["x"], "y": robot["location"]["y"], "yaw": _heading_rad(robot)}
+                for robot in frame["robots"]
+            ]
+            numbers = frame.get("guest_numbers") or range(len(frame["guests"]))
+            entities += [{"name": f"guest_{number}", "x": x, "y": y, "yaw": 0.0} for number, (x, y) in zip(numbers, frame["guests"])]
+            response.message = json.dumps({"tick": frame["tick"], "frame_id": "map", "entities": entities})
+        return response
+
+
+def _heading_rad(robot: dict[str, Any]) -> float:
+    """Where a robot looks; one without wheels looks where it goes."""
+    heading_rad = robot.get("heading_rad")
+    return float(robot["direction_rad"] if heading_rad is None else heading_rad)
 
 
 def _filled(response: Any, answer: dict[str, Any]) -> Any:
