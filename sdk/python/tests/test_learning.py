@@ -6,6 +6,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import pickle
 import subprocess
 import sys
 import types
@@ -229,6 +230,19 @@ def test_a_partition_hides_peers_and_messages() -> None:
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
+        ({"agents": 3}, "agents must be"),
+        ({"peers": 3}, "peers must be"),
+        ({"hears": "refill"}, "hears must be"),
+        ({"emotions": [3]}, "emotions must be"),
+        ({"says": ("Butler", "wait")}, "says must be"),
+        ({"says": ["Butler"]}, "says must be"),
+        ({"ranges": 1}, "ranges must be"),
+        ({"serves": 3}, "serves must be"),
+        ({"site_variable": 3}, "site_variable must be"),
+        ({"reward": {3: 1}}, "reward must be"),
+        ({"reward": {"Butler": {3: 1}}}, "reward must be"),
+        ({"count": 3}, "no argument 'count'"),
+        ({"foo": 1}, "no argument 'foo'"),
         ({"agents": []}, "agents must be"),
         ({"agents": ["Zoe"]}, "no robot is called Zoe"),
         ({"agents": ["Butler", "Butler"]}, "each once"),
@@ -269,6 +283,21 @@ def test_steps_that_cannot_be_played_are_refused_and_nothing_is_lost() -> None:
     with pytest.raises(cars.RefusedError, match="Leguin is not a finite number"):
         env.step({**still, "Leguin": np.array([0, np.nan], np.float32)})
     assert env.measures() == before
+    wrong: Any
+    for wrong in (None, [], still | {"Leguin": 0.5}, still | {"Leguin": "a"}, still | {"Leguin": {"velocity": [0, 0]}}):
+        with pytest.raises(cars.BadArgument, match="Leguin"):
+            env.step(wrong)
+    talks = pair()
+    with pytest.raises(cars.BadArgument, match="no run has begun"):
+        _ = talks.run_seed
+    with pytest.raises(cars.Error, match="cannot be copied or pickled"):
+        pickle.dumps(talks)
+    talks.reset(seed=1)
+    for say in (3, -1, 1.5):
+        with pytest.raises(cars.BadArgument, match="from 0 to 2"):
+            talks.step(dict.fromkeys(talks.agents, {"velocity": [0, 0], "say": say}))
+    with pytest.raises(cars.BadArgument, match="an action of Butler"):
+        talks.step(dict.fromkeys(talks.agents, {"velocity": [0, 0]}))
     # What is out of bounds is taken for the bound, as a speed that is too high is for a motor.
     fast = {agent: np.full(2, 1e30, np.float32) for agent in env.agents}
     env.step(fast)

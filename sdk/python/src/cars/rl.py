@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 import subprocess
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Optional, Union
 
@@ -37,12 +37,17 @@ MAX_COPIES = 65_536
 """Most copies of a vectorized environment."""
 
 _TERMINATED, _TRUNCATED = 1, 2
+_DESIGN = ("bodies", "sites", "site_variable", "ranges", "peers", "hears", "emotions", "behaviors", "says", "speed_mps", "serves",
+           "max_cycles", "duration", "set", "robots")
 _PIXELS = 480
 _COLORS = {"obstacle": (90, 90, 90), "guest": (170, 170, 190), "robot": (60, 120, 216), "agent": (224, 96, 32)}
 
 
 class _Copies:
     """Copies of a scenario, with the rows of their agents."""
+
+    def __reduce__(self) -> Any:
+        raise Error("an environment cannot be copied or pickled: make one in each process, with the same arguments")
 
     def __init__(
         self,
@@ -68,24 +73,24 @@ class _Copies:
         set: Optional[Mapping[str, Any]] = None,  # noqa: A002
         robots: Optional[Mapping[str, Callable[[], Robot]]] = None,
     ) -> None:
-        if isinstance(agents, str) or not agents:
-            raise BadArgument(f"agents must be the names of one robot or more, not {agents!r}")
-        self.agents = list(agents)
+        self.agents = _names("agents", agents)
+        if not self.agents:
+            raise BadArgument("agents must be the names of one robot or more, not none")
         self.reward = reward if callable(reward) else None
         lasts = _arguments.time("duration", duration)
         design = {
             "agents": self.agents,
             "bodies": _arguments.whole("bodies", bodies, 0, 4096),
             "sites": _arguments.whole("sites", sites, 0, 4096),
-            "site_variable": site_variable,
-            "ranges": ranges,
-            "peers": list(peers),
-            "hears": list(hears),
-            "emotions": list(emotions),
-            "behaviors": list(behaviors),
-            "says": [list(one) for one in says],
+            "site_variable": _arguments.text("site_variable", site_variable),
+            "ranges": _arguments.flag("ranges", ranges),
+            "peers": _names("peers", peers),
+            "hears": _names("hears", hears),
+            "emotions": _names("emotions", emotions),
+            "behaviors": _names("behaviors", behaviors),
+            "says": _pairs(says),
             "speed_mps": _arguments.number("speed_mps", speed_mps, "a speed in m/s"),
-            "serves": serves,
+            "serves": _arguments.text("serves", serves),
             "max_steps": None if max_cycles is None else _arguments.whole("max_cycles", max_cycles, 1, 2**53),
             "rewards": [] if callable(reward) else _weights(reward, self.agents),
         }
@@ -122,13 +127,47 @@ class _Copies:
         self.next_seed = (seed + 1) % (_arguments.MAX_SEED + 1)
         return seed
 
-    def fill(self, row: Array, action: Any) -> None:
+    def fill(self, row: Array, agent: str, action: Any) -> None:
         """Writes what an agent does as numbers."""
-        if self.says and isinstance(action, Mapping):
-            row[:2] = action["velocity"]
-            row[2] = action["say"]
-        else:
-            row[:] = action
+        velocity = action
+        if self.says:
+            if not isinstance(action, Mapping) or set(action) != {"velocity", "say"}:
+                raise BadArgument(f'an action of {agent} is {{"velocity": [x, y], "say": n}}, not {action!r}')
+            velocity, say = action["velocity"], action["say"]
+            if say not in range(self.says + 1):
+                raise BadArgument(f"what {agent} says is a whole number from 0 to {self.says}, not {say!r}")
+            row[2] = say
+        if np.shape(velocity) != (2,):
+            raise BadArgument(f"a velocity of {agent} is two numbers, not {velocity!r}")
+        row[:2] = velocity
+
+
+def _names(name: str, value: Any) -> list[str]:
+    """Texts, of which one alone is none: it would be taken letter by letter."""
+    if isinstance(value, (str, bytes, Mapping)) or not isinstance(value, Iterable):
+        raise _arguments.wrong_type(name, 'a list of texts, such as ["Butler"]', value)
+    given = list(value)
+    if not all(isinstance(one, str) for one in given):
+        raise _arguments.wrong_type(name, 'a list of texts, such as ["Butler"]', value)
+    return given
+
+
+def _pairs(says: Any) -> list[list[str]]:
+    """Robots, and what is said to them."""
+    accepted = 'a list of pairs of robot and command, such as [("Butler", "wait")]'
+    if isinstance(says, (str, bytes, Mapping)) or not isinstance(says, Iterable):
+        raise _arguments.wrong_type("says", accepted, says)
+    pairs = [list(one) if isinstance(one, (tuple, list)) else [] for one in says]
+    if not all(len(pair) == 2 and all(isinstance(part, str) for part in pair) for pair in pairs):
+        raise _arguments.wrong_type("says", accepted, says)
+    return pairs
+
+
+def _check_design(design: Mapping[str, Any]) -> None:
+    """Refuses arguments that there are not, by their names."""
+    for name in design:
+        if name not in _DESIGN:
+            raise TypeError(f"there is no argument {name!r}; those of a design are {', '.join(_DESIGN)}")
 
 
 def _weights(reward: Reward, agents: Sequence[str]) -> list[tuple[str, str, float]]:
@@ -136,11 +175,14 @@ def _weights(reward: Reward, agents: Sequence[str]) -> list[tuple[str, str, floa
     if reward is None:
         return []
     named = {reward: 1.0} if isinstance(reward, str) else reward
+    accepted = "a measure, a mapping from measures to weights, one of these by agent, or a function"
     if not isinstance(named, Mapping):
-        raise _arguments.wrong_type("reward", "a measure, a mapping from measures to weights, one of these by agent, or a function", reward)
+        raise _arguments.wrong_type("reward", accepted, reward)
     by_agent: Mapping[str, Any] = named
     if not all(isinstance(weights, Mapping) for weights in named.values()):
         by_agent = dict.fromkeys(agents, named)
+    if not all(isinstance(name, str) for weights in (named, *by_agent.values()) for name in weights):
+        raise _arguments.wrong_type("reward", accepted, reward)
     return [
         (agent, measure.replace("{agent}", agent), _arguments.number(f"reward[{measure!r}]", weight, "a weight"))
         for agent, weights in by_agent.items()
@@ -198,6 +240,7 @@ class _Episodes:
         self.out = None if record is None else _arguments.path("record", record)
         self.name = name
         self.folder: Optional[Path] = None
+        self.seed: Optional[int] = None
         self.is_over = True
         self.actions = np.zeros((len(copies.agents), copies.native.action_len), np.float32)
 
@@ -242,6 +285,8 @@ class CarsParallelEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo has no t
     @property
     def run_seed(self) -> int:
         """The seed of the run."""
+        if self._episodes.seed is None:
+            raise BadArgument("no run has begun: call reset()")
         return self._episodes.seed
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
@@ -266,10 +311,10 @@ class CarsParallelEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo has no t
         agents = self.agents
         if not agents:
             return {}, {}, {}, {}, {}
-        if actions.keys() != self._action_spaces.keys():
-            raise BadArgument(f"actions are expected of {', '.join(agents)}, not of {', '.join(map(str, actions)) or 'nobody'}")
+        if not isinstance(actions, Mapping) or actions.keys() != self._action_spaces.keys():
+            raise BadArgument(f"actions are expected of {', '.join(agents)}, not {actions!r}")
         for row, agent in self._rows_of_actions:
-            self._copies.fill(row, actions[agent])
+            self._copies.fill(row, agent, actions[agent])
         rows, given, is_terminated, is_truncated = self._episodes.step()
         reward = self._copies.reward
         if is_terminated or is_truncated:
@@ -349,7 +394,7 @@ class CarsVectorEnv(VectorEnv[Array, Array, NDArray[Any]]):
 
     def reset(self, *, seed: Any = None, options: Optional[dict[str, Any]] = None) -> tuple[Array, dict[str, Any]]:
         """Begins a run of each copy. From a seed ``s`` on, the runs of copy ``i`` have the seeds ``s + i``, ``s + i + num_envs``, …"""
-        if isinstance(seed, Sequence):
+        if seed is not None and np.ndim(seed) == 1:
             seeds = [_arguments.whole("seed", one, 0, _arguments.MAX_SEED) for one in seed]
         else:
             first = self._copies.seed(seed)
@@ -399,6 +444,7 @@ def parallel_env(
         (commands that they understand), ``says`` (pairs of robot and command), ``speed_mps``, ``serves`` (a variable of sites of which
         they take one in each tick), ``max_cycles``, ``duration``, ``set``, and ``robots`` as for :func:`cars.run`.
     """
+    _check_design(design)
     copies = _Copies(scenario, agents, reward, **design)
     named = _arguments.text("name", name) or Path(scenario).stem
     if render_mode == "human" and record is None:
@@ -426,4 +472,5 @@ def vector_env(
     """
     if callable(reward):
         raise BadArgument("reward must be of measures here: a function is called for one environment only")
+    _check_design(design)
     return CarsVectorEnv(_Copies(scenario, agents, reward, count=num_envs, threads=threads, **design), num_envs)
