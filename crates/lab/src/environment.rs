@@ -143,7 +143,7 @@ impl Environment {
             serves: design.serves.clone(),
         };
         let environment = Self {
-            scenario,
+            scenario: SteppedRun::scenario_of(scenario, &names),
             design,
             names,
             kind,
@@ -241,7 +241,7 @@ impl Environment {
         observations: &mut [f32],
     ) -> Result<(), LabError> {
         config::seed::check(seed).map_err(LabError::refused)?;
-        let scenario = SteppedRun::scenario_of(self.scenario.clone(), &self.names);
+        let scenario = self.scenario.clone();
         let scenario = scenario.with_seed(seed).map_err(LabError::from)?;
         self.session = None;
         let record = record.map(|make| make(&scenario)).transpose()?;

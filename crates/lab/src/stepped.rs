@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use protocol::RobotName;
 use protocol::messages::{StateVariables, Variable};
-use record::{NewRun, Summary};
+use record::NewRun;
 use robot::{Action, BadParameters, Cars, Robot, SiteAction};
 use scenario::Scenario;
 use simulator::{Recorder, Simulation};
@@ -62,8 +62,8 @@ struct SteppedRecord {
 }
 
 impl SteppedRun {
-    /// Begins a run: it stands in tick 0, in which no robot has acted. `record` is the folder of its record, made for this scenario as
-    /// [`Self::scenario_of`] gives it.
+    /// Begins a run of a scenario as [`Self::scenario_of`] gives it: it stands in tick 0, in which no robot has acted. `record` is the
+    /// folder of its record, made for that scenario.
     ///
     /// # Errors
     /// If the scenario cannot be played in this process, or the record cannot be begun.
@@ -87,7 +87,7 @@ impl SteppedRun {
         let run = record.as_ref().map(|record| record.run.clone());
         let run = run.unwrap_or_else(protocol::RunName::unknown);
         let opened = Instant::now();
-        let branch = Branch::begin(Self::scenario_of(scenario, agents), &run, make)?;
+        let branch = Branch::begin(scenario, &run, make)?;
         let record = record.map(|new| {
             let recorder = Recorder::begin(&new.folder, &run, branch.simulation())?;
             Ok::<_, LabError>(SteppedRecord {
@@ -157,7 +157,7 @@ impl SteppedRun {
         observe(recorder, self.branch.local(), self.opened);
         recorder.write(self.branch.simulation(), &ended)?;
         if self.branch.is_ended() {
-            let _summary: Summary = recorder.finish(self.branch.simulation())?;
+            recorder.finish(self.branch.simulation())?;
             self.record = None;
         }
         Ok(())

@@ -50,10 +50,6 @@ impl LiveRun {
                     self.epoch.waits_for = WaitsFor::Faults(pending_orders);
                     return Ok(Next::GoOn);
                 }
-                if self.epoch.record.is_repeating() {
-                    self.hold_for_rejoins()?;
-                    return Ok(Next::GoOn);
-                }
             }
             WaitsFor::Faults(pending_orders) => {
                 let is_before_tick_zero = pending_orders.order.tick == 0;
@@ -64,11 +60,14 @@ impl LiveRun {
                     self.gather();
                     return Ok(Next::GoOn);
                 }
-                if self.epoch.record.is_repeating() {
-                    self.hold_for_rejoins()?;
-                    return Ok(Next::GoOn);
-                }
             }
+        }
+
+        // While a run is executed again, robots join again after the faults of the tick, whether it has any or not.
+        let has_held = matches!(self.epoch.waits_for, WaitsFor::Rejoins(_));
+        if self.epoch.record.is_repeating() && !has_held {
+            self.hold_for_rejoins()?;
+            return Ok(Next::GoOn);
         }
 
         // Nothing holds the clock any more. The operator's commands are sent between two ticks, so that

@@ -104,8 +104,6 @@ class _Copies:
             count=_arguments.whole("num_envs", count, 1, MAX_COPIES),
             threads=_arguments.whole("threads", threads, 1, 4096),
         )
-        self.observation_space = spaces.Box(-np.inf, np.inf, (self.native.row,), np.float32)
-        self.velocity_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
         self.says = len(says)
         self.next_seed: Optional[int] = None
 
