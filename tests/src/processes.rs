@@ -183,12 +183,19 @@ pub fn nobody_is_left(run: &str) {
     });
 }
 
-/// Variable with the name of the test that has started a process.
+/// Variable with the [`test`] that has started a process.
 const TEST: &str = "CARS_TEST";
+
+/// This process and the name of the test that its thread makes: the same test may run in two processes at the same time.
+/// A thread without a name belongs to a test that nobody can tell.
+fn test() -> Option<String> {
+    let thread = std::thread::current();
+    Some(format!("{}/{}", std::process::id(), thread.name()?))
+}
 
 /// Marks what a command starts as of this test: others may have runs of the same name at the same time.
 pub fn mark(command: &mut Command) -> &mut Command {
-    match std::thread::current().name() {
+    match test() {
         Some(test) => command.env(TEST, test),
         None => command,
     }
@@ -196,9 +203,7 @@ pub fn mark(command: &mut Command) -> &mut Command {
 
 /// Whether another test has started a process.
 fn is_of_other_test(pid: u32) -> bool {
-    // A thread without a name belongs to a test that nobody can tell.
-    let thread = std::thread::current();
-    let Some(test) = thread.name() else {
+    let Some(test) = test() else {
         return false;
     };
     contains(pid, "environ", &format!("\0{TEST}="))
