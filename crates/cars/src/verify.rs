@@ -223,6 +223,11 @@ fn describe(verification: &Verification, is_followed: bool) -> String {
                 None => "\nthe robots' reports were not recorded: events and digests were compared"
                     .to_owned(),
             };
+            if let Some(robot) = &verification.unreported {
+                text += &format!(
+                    "\nthe events go on: {robot} cannot be executed in this process, and its reports were recorded no further"
+                );
+            }
         }
     }
 

@@ -275,23 +275,25 @@ impl Reexecution {
         Ok(local)
     }
 
+    /// The first robot that is not executed and of whose report of this tick the record has nothing.
+    pub(crate) fn unreported(&self, recorded: &Entry) -> Option<&RobotName> {
+        let reports = recorded.reports.as_ref();
+        self.scripted.iter().find(|name| {
+            let report = reports.and_then(|reports| reports.get(*name));
+            report.is_none() && !recorded.has_missed(name)
+        })
+    }
+
     /// Checks that the record has what robots that are not executed have reported.
     fn check_script(&self, recorded: &Entry) -> Result<(), LabError> {
-        for name in &self.scripted {
-            let report = recorded
-                .reports
-                .as_ref()
-                .and_then(|reports| reports.get(name));
-            if report.is_none() && !recorded.has_missed(name) {
-                return Err(LabError::record(format!(
-                    "{name} cannot be executed in this process, and the record has no report of it for tick {}",
-                    recorded.tick
-                ))
-                .with_help(NOT_RECORDED));
-            }
+        match self.unreported(recorded) {
+            None => Ok(()),
+            Some(name) => Err(LabError::record(format!(
+                "{name} cannot be executed in this process, and the record has no report of it for tick {}",
+                recorded.tick
+            ))
+            .with_help(NOT_RECORDED)),
         }
-
-        Ok(())
     }
 }
 

@@ -30,6 +30,9 @@ pub struct Verification {
     pub digest: String,
     /// The last tick of which the record has the robots' reports, so that they were compared, too.
     pub reports_to: Option<Tick>,
+    /// The robot that ended the comparison before the last tick of the events: it cannot be executed, and the simulator was killed
+    /// before the recording had its next report.
+    pub unreported: Option<RobotName>,
     /// Robots that were not executed in some ticks, and the first of these.
     pub from_record: BTreeMap<RobotName, Tick>,
     /// The first difference: recorded, then executed again.
@@ -54,6 +57,7 @@ pub fn verify(files: &EpochFiles) -> Result<Verification, LabError> {
         has_end: false,
         digest: String::new(),
         reports_to: None,
+        unreported: None,
         from_record: BTreeMap::new(),
         difference: header_difference(&record, &again.local.simulation),
     };
@@ -69,7 +73,19 @@ pub fn verify(files: &EpochFiles) -> Result<Verification, LabError> {
         return Err(LabError::record(format!("{events} has no complete tick")));
     }
     while let Some(recorded) = next {
-        let executed = again.play(&recorded)?;
+        let executed = match again.play(&recorded) {
+            Ok(executed) => executed,
+            Err(error) => {
+                // The recording is written in chunks, so that of a killed run ends before the events.
+                let is_cut = record.recording().is_some_and(|file| !file.is_finished());
+                verification.unreported = again.unreported(&recorded).filter(|_| is_cut).cloned();
+                match verification.unreported {
+                    Some(_) if recorded.tick > 0 => break,
+                    Some(robot) => return Err(killed_too_soon(&robot)),
+                    None => return Err(error),
+                }
+            }
+        };
         let simulation = &again.local.simulation;
         for event in executed.record.events.iter() {
             simulation.count(&mut summary, executed.record.tick, event);
@@ -104,6 +120,14 @@ pub fn verify(files: &EpochFiles) -> Result<Verification, LabError> {
         }
     }
     Ok(verification)
+}
+
+/// Nothing of a run can be compared.
+fn killed_too_soon(robot: &RobotName) -> LabError {
+    LabError::record(format!(
+        "{robot} cannot be executed in this process, and nothing of it was recorded: the simulator was killed, or is in the first \
+         ticks of the run"
+    ))
 }
 
 /// The name of the run, which a copy of its folder need not have.

@@ -137,6 +137,48 @@ fn a_robot_of_another_language_is_taken_from_the_record() {
     assert!(!said.contains("Vonda could not"), "{said}");
 }
 
+/// Its recording is written in chunks, so that it ends before the events do.
+#[test]
+fn a_killed_run_of_a_robot_that_cannot_be_executed_is_compared_as_far_as_it_was_recorded() {
+    let lab = Lab::new();
+    let scenario = lab.write(
+        "alone.toml",
+        "duration = \"60 s\"\n[[robot]]\nname = \"Bruno\"\nat = [\"5 ft\", \"5 ft\"]\n",
+    );
+    let stroller = root().join("sdk/stdio/bash/stroller.sh");
+    let launch = lab.write(
+        "bruno.toml",
+        &format!(
+            "scenario = {scenario:?}\n[[process]]\nname = \"Bruno\"\ncommand = [\"cars\", \"exec\", \"--\", {stroller:?}]\n"
+        ),
+    );
+    let run = "bruno";
+    let mut launch = lab.paused(run, launch.to_str().unwrap(), &["--no-console"]);
+    let length = || Recording::open(&lab.file(run, "run.mcap")).map_or(0, |file| file.len());
+    let recorded = eventually("a chunk that ends before the last tick", || {
+        let tick = lab.step(run, 1);
+        let recorded = length();
+        (recorded > 0 && recorded <= tick).then_some(recorded)
+    });
+    kill_simulator(&mut launch, run);
+    assert_eq!(length(), recorded);
+
+    let said = verify(&lab, run);
+    let same = format!("the same, {} ticks and no end", recorded - 1);
+    assert!(said.contains(&same), "{said}");
+    assert!(said.contains("the events go on: Bruno"), "{said}");
+
+    // Killed before there is a chunk.
+    let path = lab.file(run, "run.mcap");
+    let recording = Recording::open(&path).unwrap();
+    let scenario = recording.scenario().unwrap();
+    // It is finished when the writer is dropped.
+    let mut writer = Writer::create(&path, recording.header(), &scenario).unwrap();
+    writer.sync().unwrap();
+    let (_, said) = lab.fails(&["verify", run]);
+    assert!(said.contains("the simulator was killed"), "{said}");
+}
+
 /// Starts the hall and waits until it has reached a tick.
 fn start_hall(lab: &Lab, run: &str, tick: u64, args: &[&str]) -> Running {
     let mut all = vec!["launch", HALL, "--no-console", "--duration", "60 s"];
