@@ -586,6 +586,12 @@ impl Event {
 
                 says(robot, LogKind::Membership, text)
             }
+            // A robot without emotions or behaviors begins with an empty name: nothing to read.
+            Self::Emotion { from: None, to, .. } | Self::Behavior { from: None, to, .. }
+                if to.is_empty() =>
+            {
+                None
+            }
             Self::Emotion { robot, from, to } => says(
                 robot,
                 LogKind::Emotion,
@@ -769,8 +775,9 @@ fn shorten(mut text: String) -> String {
 }
 
 fn change(what: &str, from: Option<&String>, to: &str) -> String {
+    let named = |name: &str| if name.is_empty() { "none" } else { name }.to_owned();
     match from {
-        Some(from) => format!("{what} {from} -> {to}"),
+        Some(from) => format!("{what} {} -> {}", named(from), named(to)),
         None => format!("{what} {to}"),
     }
 }

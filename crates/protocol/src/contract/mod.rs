@@ -438,6 +438,23 @@ fn a_list_is_no_message() {
     assert_eq!(error.reason, "a list; a message is a JSON object");
 }
 
+/// A robot without emotions says nothing of them; one that loses or finds them does.
+#[test]
+fn lines_of_the_log_name_states_without_a_name() {
+    let text = |from: Option<&str>, to: &str| {
+        let event = protocol::Event::Behavior {
+            robot: protocol::RobotName::new("A").unwrap(),
+            from: from.map(str::to_owned),
+            to: to.to_owned(),
+        };
+        event.log_record(1, 1, 0.5).map(|record| record.text)
+    };
+    assert_eq!(text(None, ""), None);
+    assert_eq!(text(None, "REST").unwrap(), "behavior REST");
+    assert_eq!(text(Some("REST"), "").unwrap(), "behavior REST -> none");
+    assert_eq!(text(Some(""), "REST").unwrap(), "behavior none -> REST");
+}
+
 /// Two texts within the limits are in one line: what an event tells can be put on the bus.
 #[test]
 fn the_lines_of_the_log_fit_into_messages() {
