@@ -1,7 +1,7 @@
 //! The simulated network between robots: it decides which commands arrive and when, and which robots can query each other.
 //!
-//! Each decision draws from a stream named after it (seed, tick, sender, target, number), so no message and no further robot
-//! changes the fate of another message.
+//! Each decision draws from a stream named after it (seed, tick, sender, target, number), so no further robot and no message of
+//! another one changes the fate of a message. The fading of radios is that of the tick and the two robots alone.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::iter::{repeat_with, zip};
@@ -185,6 +185,8 @@ pub struct Medium {
     counts: BTreeMap<Counted, u64>,
     /// What is decided in the next tick whatever is drawn.
     forced: Vec<ForcedVerdict>,
+    /// How many commands between two robots have been judged in the tick, where there is a radio.
+    judged: BTreeMap<Pair, u64>,
 }
 
 /// Where messages pass in a tick.
@@ -264,6 +266,7 @@ impl Medium {
             cut: BTreeMap::new(),
             counts: BTreeMap::new(),
             forced: Vec::new(),
+            judged: BTreeMap::new(),
         };
 
         medium.count_for(&network);
@@ -349,6 +352,7 @@ impl Medium {
         self.deliver(tick, &mut decision);
         self.decide_queries(tick, &around, &mut decision);
         self.forced.clear();
+        self.judged.clear();
         decision
     }
 
@@ -521,6 +525,9 @@ impl Medium {
         around: &RadioScene<'_>,
         events: &mut Vec<Event>,
     ) {
+        // First of all, so that the number does not depend on what becomes of the commands before it.
+        let pair = (command.from.clone(), command.to.clone());
+        let number = self.number_judged(&pair);
         let forced = self.forced_verdict(&command);
         let is_lost = named.is_lost && forced.is_none();
         if is_lost || forced == Some(NetworkVerdict::IsLost(command.seq)) {
@@ -545,10 +552,9 @@ impl Medium {
             Some(delay_s) => delay_s.sample(&mut chance),
             None => 0.0,
         };
-        let pair = (from.clone(), to.clone());
         let by_rule = self.loss(MessageKind::Commands, &channel, &pair, loss, around);
         let lost = by_rule.or_else(|| {
-            let name = format!("radio/{}/{from}/{to}/{seq}", tick - 1);
+            let name = format!("radio/{}/{from}/{to}/{number}", tick - 1);
             self.radio_loss(&pair, &name, around)
         });
         if let Some(because) = lost {
@@ -580,6 +586,17 @@ impl Medium {
         }
         let arrivals = self.arrivals.entry(until).or_default();
         arrivals.push((command, copies));
+    }
+
+    /// The number of a command among those between the same robots that are judged in this tick, from 1: with it fading is drawn, so
+    /// that no message to another robot or in another tick changes it.
+    fn number_judged(&mut self, pair: &Pair) -> u64 {
+        if self.network.radio.is_none() {
+            return 0;
+        }
+        let judged = self.judged.entry(pair.clone()).or_default();
+        *judged += 1;
+        *judged
     }
 
     /// What is forced of a command.
