@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import _thread
 import functools
 import importlib.util
 import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 from typing import Any
@@ -26,8 +28,13 @@ import rclpy
 import rclpy.context
 import rclpy.executors
 import ros_nodes
-from geometry_msgs.msg import Twist
+from geometry_msgs.msg import Twist, TwistStamped
+from nav_msgs.msg import Odometry
+from rclpy.clock import Clock, ClockType
+from rclpy.duration import Duration
 from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from rover import Rover
 from std_msgs.msg import Int32, String
 
@@ -190,10 +197,40 @@ def test_what_nodes_do_wrong_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
     class Threads(base):  # type: ignore[valid-type, misc]
         def on_timer(self) -> None:
-            import threading
+            # It would have ended when the callback returns.
+            thread = threading.Thread(target=bool, name="mine")
+            thread.start()
+            thread.join()
 
-            self.thread = threading.Thread(target=time.sleep, args=(0.2,), name="mine")
-            self.thread.start()
+    class RawThreads(base):  # type: ignore[valid-type, misc]
+        def on_timer(self) -> None:
+            _thread.start_new_thread(bool, ())
+
+    class SteadyTimer(base):  # type: ignore[valid-type, misc]
+        def on_timer(self) -> None:
+            self.create_timer(0.001, bool, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    class Sleeps(base):  # type: ignore[valid-type, misc]
+        def on_timer(self) -> None:
+            self.get_clock().sleep_for(Duration(seconds=0.1))
+
+    class SleepsAtARate(base):  # type: ignore[valid-type, misc]
+        def on_timer(self) -> None:
+            self.create_rate(10.0).sleep()
+
+    class WallClock(base):  # type: ignore[valid-type, misc]
+        def on_timer(self) -> None:
+            self.set_parameters([Parameter("use_sim_time", value=False)])
+
+    class TwoTypes(Node):  # type: ignore[misc]
+        def __init__(self) -> None:
+            super().__init__("two")
+            self.create_publisher(Twist, "cmd_vel", 10)
+            self.create_publisher(TwistStamped, "cmd_vel", 10)
+
+    class Exits(base):  # type: ignore[valid-type, misc]
+        def __init__(self) -> None:
+            raise SystemExit(3)
 
     class Endless(base):  # type: ignore[valid-type, misc]
         def __init__(self) -> None:
@@ -222,7 +259,14 @@ def test_what_nodes_do_wrong_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyP
             self.send.publish(String(data="refill"))
 
     for kind, error, what in [
-        (Threads, RosError, r"started a thread \(mine\).*Use a timer"),
+        (Threads, RosError, r"starts a thread \(mine\).*Use a timer"),
+        (RawThreads, RosError, r"starts a thread \(without a name\).*Use a timer"),
+        (SteadyTimer, RosError, "a timer of the clock STEADY_TIME, which goes on by itself"),
+        (Sleeps, RosError, "the node sleeps in a callback"),
+        (SleepsAtARate, RosError, "the node sleeps at a rate in a callback"),
+        (WallClock, RosError, "the node of Rosie has set use_sim_time to false"),
+        (TwoTypes, RosError, "publishes TwistStamped on /Rosie/cmd_vel; what is read there is Twist: remap"),
+        (Exits, RosError, "the node ended with exit status 3"),
         (Raises, LookupError, "lost my way"),
         (Endless, RosError, "500 callbacks in a tick, and was not idle"),
         (WrongType, RosError, "publishes Int32 on /Rosie/cmd_vel; what is read there is Twist or TwistStamped"),
@@ -242,6 +286,7 @@ def test_what_nodes_do_wrong_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyP
         ("ros_nodes:main", "a function such as main.. spins its node by itself"),
         ("ros_nodes:Wall", "has no 'Wall'; its classes are WallAvoider, GoToGoal, Chatty"),
         ("ros_nodes:String", "not derived from rclpy.node.Node"),
+        ("ros_nodes:Answers", "cannot be made without arguments .*'is_stamped'.*: derive a class"),
         ("no_such_package.node:Node", "there is no module 'no_such_package': start where it lies"),
     ]:
         with pytest.raises(RosError, match=what):
@@ -263,6 +308,60 @@ def test_a_node_may_end_itself(lab: Lab, tmp_path: Path) -> None:
 
     runs = [one(tmp_path, kind, GOER) for kind in (Ends, ShutsDown)]
     assert runs[1].summary["digest"] is not None and len({run.summary["digest"] for run in runs}) == 1
+
+    class EndsAtOnce(Node):  # type: ignore[misc]
+        def __init__(self) -> None:
+            raise SystemExit
+
+    class ShutsDownAtOnce(Node):  # type: ignore[misc]
+        def __init__(self) -> None:
+            super().__init__("at_once")
+            rclpy.shutdown()
+
+    runs = [one(tmp_path, kind, GOER) for kind in (EndsAtOnce, ShutsDownAtOnce)]
+    assert ends(runs[0]) == (6.0, 2.0) and runs[0].summary["digest"] == runs[1].summary["digest"]
+
+
+def test_what_a_node_publishes_first_is_read(tmp_path: Path) -> None:
+    """In its constructor, latched or not, with a publisher made a moment ago, and with another node of its own."""
+    forward = Twist()
+    forward.linear.x = 0.2
+
+    class InConstructor(Node):  # type: ignore[misc]
+        def __init__(self, qos: Any = 10) -> None:
+            super().__init__("first")
+            self.create_publisher(Twist, "cmd_vel", qos).publish(forward)
+
+    class Latched(InConstructor):
+        def __init__(self) -> None:
+            super().__init__(QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL))
+
+    class ByAnother(Node):  # type: ignore[misc]
+        def __init__(self) -> None:
+            super().__init__("one")
+            self.other = Node("other")
+            self.other.create_publisher(Twist, "cmd_vel", 10).publish(forward)
+
+    for kind in (InConstructor, Latched, ByAnother):
+        x, y = ends(one(tmp_path, kind, GOER))
+        assert (round(x, 6), y) == (7.0, 2.0), kind
+
+    class Lazy(Node):  # type: ignore[misc]
+        def __init__(self) -> None:
+            super().__init__("lazy")
+            self.create_subscription(Odometry, "odom", self.on_odom, 10)
+            self.replaced = self.create_publisher(String, "elsewhere", 10)
+
+        def on_odom(self, odom: Odometry) -> None:
+            if self.replaced is not None:
+                self.destroy_publisher(self.replaced)
+                self.replaced = None
+                self.emotion = self.create_publisher(String, "emotion", 10)
+                self.create_publisher(Twist, "cmd_vel", 10).publish(forward)
+            self.emotion.publish(String(data="GLAD"))
+
+    run = one(tmp_path, Lazy, GOER)
+    assert round(ends(run)[0], 6) == 7.0 and set(run.states.emotion) == {"GLAD"}
 
 
 def test_a_node_crashes_comes_back_and_is_forked(lab: Lab, tmp_path: Path) -> None:

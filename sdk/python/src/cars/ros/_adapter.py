@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any, Optional
 
 from .._data import Point, StateVariables
 from .._robot import Action, Robot
+from ._calls import watch
 from ._load import RosError, load
 from ._motion import Twist, moved, read_twist
-from ._spin import spin_until_idle
+from ._spin import goes_on_after, spin_until_idle
 from ._topics import Topics, ros_name
 from ._world import RosWorld
 
@@ -30,6 +31,7 @@ class RosRobot(Robot):
         """Takes the class of the node, which is made in :meth:`init`. For arguments see :func:`cars.ros.node`."""
         self._kind: Any = kind
         self._ros = load()
+        watch(self._ros)
         self._ros_args = tuple(ros_args)
         self._timeout_s = cmd_vel_timeout_s
         self._world: Optional[RosWorld] = None
@@ -52,12 +54,19 @@ class RosRobot(Robot):
         self._world = world
         self._begin(cars)
         with world.entered():
-            self._topics = Topics(self._ros, world.context, name)
-            self._node = self._kind()
-            self._topics.follow(self._node)
+            topics = self._topics = Topics(self._ros, world.context, name)
+            world.follow = topics.follow
+            goes_on = goes_on_after(self._make)
+            if not goes_on or not world.context.ok():
+                # It says so in the first tick.
+                self._node = None
+                return
             self._executor = self._ros.executors.SingleThreadedExecutor(context=world.context)
             self._executor.add_node(self._node)
-        self._topics.check_connected(self._node)
+        topics.check_connected(self._node)
+
+    def _make(self) -> None:
+        self._node = self._kind()
 
     def _begin(self, cars: Cars) -> None:
         """Back to the initial state, but for the node."""
@@ -87,11 +96,15 @@ class RosRobot(Robot):
         if cars.pose is not None:
             self._heading_rad = cars.pose.heading_rad
         if not self._is_over:
+            goes_on = False
             with world.entered():
-                topics.publish(cars, self._node, self._heading_rad, self._velocity(cars))
-                goes_on = spin_until_idle(self._ros, self._executor, lambda: self._read(cars, is_idle=False))
+                if self._node is not None:
+                    topics.publish(cars, self._node, self._heading_rad, self._velocity(cars))
+                    goes_on = spin_until_idle(self._ros, self._executor, lambda: self._read(cars, is_idle=False))
                 if world.context.ok():
                     self._read(cars, is_idle=True)
+            if goes_on and not self._node.get_clock().ros_time_is_active:
+                raise RosError(f"the node of {cars.name} has set use_sim_time to false: its clock is not that of the run")
             if not goes_on:
                 cars.log("its node has ended; it stays where it is")
                 self._is_over = True
@@ -132,7 +145,6 @@ class RosRobot(Robot):
         """Takes what the node has published since the last time."""
         topics = self._topics
         assert topics is not None, "read in a tick only"
-        topics.follow(self._node)
         for kind, message in topics.taken(is_idle=is_idle):
             self._take(cars, kind, message)
 

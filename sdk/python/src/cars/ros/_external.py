@@ -53,9 +53,9 @@ class ExternalRobot(RosRobot):
         kinds = {"cmd_vel": twist, **dict.fromkeys(("emotion", "behavior", "variables", "send"), ros.std.String)}
         self._node = SimpleNamespace(
             subscriptions=[SimpleNamespace(topic_name=f"/{name}/{topic}") for topic in sent],
-            publishers=[SimpleNamespace(topic_name=f"/{name}/{topic}", msg_type=kind) for topic, kind in kinds.items()],
         )
-        topics.follow(self._node)
+        for topic, kind in kinds.items():
+            topics.follow(f"/{name}/{topic}", kind)
         self._topics = topics
         self._reader = ros.executors.SingleThreadedExecutor(context=self._context)
         self._reader.add_node(topics.node)

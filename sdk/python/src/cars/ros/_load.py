@@ -16,10 +16,12 @@ RMW = "rmw_fastrtps_cpp"
 ``publish`` returns."""
 MODULES = {
     "rclpy": "rclpy",
+    "clock": "rclpy.clock",
     "context": "rclpy.context",
     "executors": "rclpy.executors",
     "node": "rclpy.node",
     "qos": "rclpy.qos",
+    "timer": "rclpy.timer",
     "utilities": "rclpy.utilities",
     "geometry": "geometry_msgs.msg",
     "nav": "nav_msgs.msg",
@@ -75,6 +77,10 @@ def node_class(of: Union[str, type]) -> type:
         )
     if not issubclass(found, ros.node.Node):
         raise RosError(f"{of!r} is a class that is not derived from rclpy.node.Node")
+    try:
+        inspect.signature(found).bind()
+    except TypeError as error:
+        raise RosError(f"{of!r} cannot be made without arguments ({error}): derive a class whose constructor gives them") from error
     return found
 
 

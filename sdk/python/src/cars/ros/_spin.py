@@ -34,7 +34,7 @@ def spin_until_idle(ros: Any, executor: Any, after_each: Callable[[], None]) -> 
         except (executors.ShutdownException, executors.ExternalShutdownException):
             return False
 
-        if not _run(task):
+        if not goes_on_after(lambda task=task: _execute(task)):  # type: ignore[misc]
             return False
         # A node that calls rclpy.shutdown() has destroyed its topics and ours.
         if not executor.context.ok():
@@ -52,14 +52,22 @@ def spin_until_idle(ros: Any, executor: Any, after_each: Callable[[], None]) -> 
     )
 
 
-def _run(task: Any) -> bool:
-    """Runs a callback; raises what it raised. Returns whether the node goes on: ``raise SystemExit`` is how many nodes end."""
+def goes_on_after(call: Callable[[], object]) -> bool:
+    """Calls what is the node's own; raises what it raises. Returns whether the node goes on: ``raise SystemExit`` is how many nodes end.
+
+    :raises RosError: if it has ended with an exit status other than 0.
+    """
     try:
-        task()
-        if task.done():
-            task.result()
+        call()
     except SystemExit as ended:
         if ended.code in (None, 0):
             return False
         raise RosError(f"the node ended with exit status {ended.code}") from ended
     return True
+
+
+def _execute(task: Any) -> None:
+    """Runs a callback; raises what it raised."""
+    task()
+    if task.done():
+        task.result()

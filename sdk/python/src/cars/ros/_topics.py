@@ -80,33 +80,26 @@ class Topics:
         }
         self._counting = {topic for topic, (_, how) in self._readable.items() if how is many}
         self._subscriptions: dict[str, Any] = {}
-        self._publisher_count = 0
 
-    def follow(self, node: Any) -> None:
-        """Subscribes to what the node publishes, with its types: one participant has one type for a topic.
+    def follow(self, topic: str, kind: type) -> Callable[[], None]:
+        """Subscribes to what a node is about to publish, with its type: one participant has one type for a topic. Other topics are not
+        read. Returns what waits, when the publisher is made, until both are connected.
 
-        :raises RosError: if a type is another one than those that are read.
+        :raises RosError: if the type is another one than those that are read.
         """
-        publishers = list(node.publishers)
-        if len(publishers) == self._publisher_count:
-            return
-        self._publisher_count = len(publishers)
-        for publisher in publishers:
-            topic, kind = publisher.topic_name, publisher.msg_type
-            if topic in self._subscriptions or topic not in self._readable:
-                continue
-            kinds, qos = self._readable[topic]
-            if kind not in kinds:
-                names = " or ".join(one.__name__ for one in kinds)
-                raise RosError(f"the node publishes {kind.__name__} on {topic}; what is read there is {names}: remap the topic")
+        if topic not in self._readable:
+            return lambda: None
+        kinds, qos = self._readable[topic]
+        subscription = self._subscriptions.get(topic)
+        read = kinds if subscription is None else (subscription.msg_type,)
+        if kind not in read:
+            names = " or ".join(one.__name__ for one in read)
+            raise RosError(f"the node publishes {kind.__name__} on {topic}; what is read there is {names}: remap the topic")
+        if subscription is None:
             receive = functools.partial(self._receive, topic.rpartition("/")[2])
-            self._subscriptions[topic] = self.node.create_subscription(kind, topic, receive, qos)
-            if self._is_external:
-                continue
-            _wait(
-                lambda topic=topic: self._subscriptions[topic].get_publisher_count() > 0,  # type: ignore[misc]
-                f"the node's publisher of {topic} cannot be connected",
-            )
+            subscription = self._subscriptions[topic] = self.node.create_subscription(kind, topic, receive, qos)
+        before = subscription.get_publisher_count()
+        return lambda: _wait(lambda: subscription.get_publisher_count() > before, f"the node's publisher of {topic} cannot be connected")
 
     def _receive(self, topic: str, message: Any) -> None:
         """Called for external nodes only: otherwise the adapter's node is in no executor, and what it has is taken."""

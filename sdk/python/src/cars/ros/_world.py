@@ -6,9 +6,9 @@ import os
 import random
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Optional
 
 from ._load import RosError
 
@@ -23,12 +23,29 @@ _ENTERED = threading.RLock()
 _free_domains = list(range(MAX_ROBOTS, 0, -1))
 
 
+class _Inside(threading.local):
+    """What this thread is in."""
+
+    world: Optional[RosWorld] = None
+    """That of the robot whose node it executes."""
+
+
+_inside = _Inside()
+
+
+def world_inside() -> Optional[RosWorld]:
+    """The world of the robot whose node this thread executes; ``None`` if it executes none."""
+    return _inside.world
+
+
 class RosWorld:
     """A context that hears nobody, and generators of random numbers that nobody else draws from."""
 
     def __init__(self, ros: Any, ros_args: Sequence[str], seed: int) -> None:
         self._ros = ros
         self._numbers: Any = None
+        self.follow: Callable[[str, type], Callable[[], None]] = lambda topic, kind: lambda: None
+        """Called with topic and type of each publisher before it is made; what it returns is called after that."""
         self.context = ros.context.Context()
         with _ENTERED:
             if not _free_domains:
@@ -65,7 +82,7 @@ class RosWorld:
         utilities = self._ros.utilities
         with _ENTERED:
             context, outside = utilities.g_default_context, _numbers()
-            threads = set(threading.enumerate())
+            before, _inside.world = _inside.world, self
             utilities.g_default_context = self.context
             _set_numbers(self._numbers)
             try:
@@ -73,25 +90,13 @@ class RosWorld:
             finally:
                 self._numbers = _numbers()
                 _set_numbers(outside)
-                utilities.g_default_context = context
-            _check_threads(threads)
+                utilities.g_default_context, _inside.world = context, before
 
     def close(self) -> None:
         """Ends the context; what was made in it is gone."""
         with _ENTERED:
             self.context.try_shutdown()
             _free_domains.append(self._domain)
-
-
-def _check_threads(before: set[threading.Thread]) -> None:
-    """A thread that a node has started publishes when it likes: no tick could be known to be complete."""
-    for thread in threading.enumerate():
-        # Threads of Rust that called Python in the meantime are dummies.
-        if thread not in before and not isinstance(thread, threading._DummyThread):
-            raise RosError(
-                f"the node started a thread ({thread.name}): what it does then is not the same in each run. Use a timer, "
-                "or run the node as a process of its own"
-            )
 
 
 def _numbers() -> Any:
