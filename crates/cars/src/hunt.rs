@@ -10,13 +10,13 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use config::units::Time;
 use config::{Changes, Override};
-use experiments::hunt::{
-    CommandFate, Coverage, FaultClass, Feature, Finding, HuntBudget, HuntOptions, HuntProgress,
-    HuntReport, HuntRobots, Link, Subject, hunt as go,
-};
 use experiments::shell;
 use experiments::why::WhyBudget;
 use experiments::{ByClass, Robots};
+use hunts::{
+    CommandFate, Coverage, FaultClass, Feature, Finding, HuntBudget, HuntOptions, HuntProgress,
+    HuntReport, HuntRobots, Link, Subject, hunt as go,
+};
 use indicatif::{ProgressBar, ProgressStyle};
 use protocol::random::MAX_SEED;
 use terminal::OutputError;

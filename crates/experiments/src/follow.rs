@@ -7,19 +7,19 @@ use observe::Observation;
 use record::Summary;
 
 /// Follows a run tick by tick.
-pub(super) trait Follow {
+pub trait Follow {
     /// Takes a tick, or the end of the run, into account.
     fn observe(&mut self, observation: &Observation<'_>);
 }
 
 /// A run that has ended.
-pub(super) struct EndedRun {
+pub struct EndedRun {
     /// Digest of the run.
-    pub(super) digest: String,
+    pub digest: String,
     /// Its summary.
-    pub(super) summary: serde_json::Value,
+    pub summary: serde_json::Value,
     /// The verdicts about expectations, by name.
-    pub(super) verdicts: BTreeMap<String, String>,
+    pub verdicts: BTreeMap<String, String>,
 }
 
 impl EndedRun {

@@ -171,7 +171,10 @@ impl Launches {
 
     /// Plays a scenario to its end and shows its record to a follower. Without a launch file the robots are the programs of the
     /// project. Where the run has failed, the follower has seen what was recorded of it.
-    pub(super) fn follow(
+    ///
+    /// # Errors
+    /// If no launch can be started, the run does not come to its end, or its record cannot be read.
+    pub fn follow(
         &self,
         mut scenario: Scenario,
         launch: Option<&LaunchText>,

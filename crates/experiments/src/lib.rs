@@ -1,9 +1,7 @@
 //! Work with many runs. An experiment is one scenario in several arms under several conditions over many seeds: a file
 //! ([`Experiment::load`]), of which some ship with the project. It is planned ([`Plan`]) into units, which are played on one
 //! machine or on many ([`engine`], [`submit`]) and kept in a folder ([`Store`]), whose results are read from there
-//! ([`Results`]). A hunt ([`mod@hunt`]) draws faults until an expectation fails, and
-//! [`mod@why`] finds what decided a run. Commands that can be typed are written by
-//! [`shell`].
+//! ([`Results`]); [`mod@why`] finds what decided a run. Commands that can be typed are written by [`shell`].
 
 mod case;
 mod condition;
@@ -12,11 +10,10 @@ pub mod engine;
 mod estimate;
 mod file;
 mod follow;
-pub mod hunt;
 mod launches;
 mod outcome;
 mod own;
-mod parallel;
+pub mod parallel;
 mod plan;
 mod presentation;
 mod processes;
@@ -38,6 +35,7 @@ pub use contrast::{ArmDifference, Contrast, SHOWN_P, least_p_holm};
 pub use engine::is_of_experiment;
 pub use estimate::{ArmMeasure, Estimated, Excluded};
 pub use file::{Arm, Experiment, MAX_UNITS, is_experiment_file};
+pub use follow::{EndedRun, Follow};
 pub use launches::{LaunchUse, Launcher, Launches, TICK_PATIENCE};
 pub use outcome::{FailedUnit, Measured, UnitOutcome};
 pub use own::{ByClass, Maker, OwnRobots, RobotSource, RunRobots};

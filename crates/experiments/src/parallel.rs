@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread::Builder;
 
 /// The result of `play` for each item, in their order. Items that are not begun when `stop` is set have none.
-pub(super) fn all<T: Sync, R: Send>(
+pub fn all<T: Sync, R: Send>(
     items: &[T],
     jobs: usize,
     stop: &AtomicBool,
@@ -46,7 +46,7 @@ pub(super) fn all<T: Sync, R: Send>(
 
 /// The first item, in their order, for which `play` has a result, and the result. Of the items after it at most as many are
 /// played as run at the same time.
-pub(super) fn first<T: Sync, R: Send>(
+pub fn first<T: Sync, R: Send>(
     items: &[T],
     jobs: usize,
     stop: &AtomicBool,

@@ -8,8 +8,8 @@ use std::time::Duration;
 
 use config::Changes;
 use config::units::Time;
-use experiments::hunt::{FaultClass, HuntBudget, HuntOptions, HuntRobots, Subject, hunt as go};
 use experiments::{Launches, Robots};
+use hunts::{FaultClass, HuntBudget, HuntOptions, HuntRobots, Subject, hunt as go};
 use pyo3::prelude::*;
 use scenario::Scenario;
 

@@ -10,9 +10,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use experiments::ByClass;
-use experiments::hunt::{
-    FaultClass, HuntBudget, HuntOptions, HuntProgress, HuntRobots, Subject, hunt,
-};
+use hunts::{FaultClass, HuntBudget, HuntOptions, HuntProgress, HuntRobots, Subject, hunt};
 use scenario::Changes;
 
 fn main() -> Result<ExitCode, Box<dyn std::error::Error>> {

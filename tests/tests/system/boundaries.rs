@@ -129,6 +129,20 @@ const ALLOWED: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "hunts",
+        &[
+            "experiments",
+            "lab",
+            "scenario",
+            "simulator",
+            "config",
+            "export",
+            "observe",
+            "protocol",
+            "timeline",
+        ],
+    ),
+    (
         "reports",
         &[
             "experiments",
@@ -150,6 +164,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "crowd",
             "launch",
             "reports",
+            "hunts",
             "experiments",
             "lab",
             "scenario",
@@ -170,6 +185,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         "python-module",
         &[
             "reports",
+            "hunts",
             "experiments",
             "lab",
             "launch",
@@ -214,6 +230,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "robots",
             "conform",
             "experiments",
+            "hunts",
             "lab",
             "lockstep",
             "bus",

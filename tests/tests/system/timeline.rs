@@ -4,7 +4,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use experiments::hunt::{FaultCase, Subject, Trial};
+use hunts::{FaultCase, Subject, Trial};
 use nix::sys::signal::Signal;
 use roxmltree::{Document, ParsingOptions};
 use serde_json::Value;

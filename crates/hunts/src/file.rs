@@ -5,6 +5,8 @@ use std::io::ErrorKind;
 use std::path::{Component, Path, PathBuf};
 
 use config::{FileError, shipped};
+use experiments::shell;
+use export::draft::{self, unwritable};
 use lab::LabError;
 use protocol::name::MAX_NAME_LEN;
 use protocol::plain::escape_line;
@@ -14,8 +16,6 @@ use toml::Value;
 use super::case::FaultCase;
 use super::fault::PlannedFault;
 use super::trial::{RUNS, Subject, TrialResult};
-use crate::shell;
-use export::draft::{self, unwritable};
 
 /// What the file of a finding tells beside its case.
 #[derive(Debug, Clone, Copy)]

@@ -7,44 +7,28 @@
 //! The result depends on the scenario, the seed and the number of plans only: plans are drawn in batches of a fixed size, each
 //! from a stream of its own, and are guided by what the batches before have reached.
 
-mod case;
-mod cause;
-mod corpus;
-mod coverage;
-mod draw;
-mod fault;
-mod file;
-mod sent;
-mod shrink;
-mod trial;
-
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use config::FileError;
+use experiments::parallel;
 use lab::LabError;
 use protocol::Tick;
 use protocol::random::{Stream, stream, unit};
 use protocol::time::time_s;
 use serde::Serialize;
 
-pub use case::FaultCase;
-pub use cause::{FailureSignature, Sign};
-pub use coverage::{CommandFate, Coverage, Feature};
-pub use draw::Ground;
-pub use fault::{Effect, FaultClass, Messages, PlannedFault, TickSpan};
-
-pub use sent::{Link, Onset, SentMessage};
-pub use shrink::{Bounds, ScenarioParts, Shrunk, shrink};
-pub use trial::{FailedExpectation, HuntRobots, RUNS, Subject, Trial, TrialResult};
-
-use corpus::Corpus;
-use file::Heading;
-use trial::{PlayedPlan, TrialPlan};
-
-use crate::parallel;
+use super::case::FaultCase;
+use super::cause::FailureSignature;
+use super::corpus::Corpus;
+use super::coverage::Coverage;
+use super::draw::Ground;
+use super::fault::{FaultClass, PlannedFault};
+use super::file::{self, Heading};
+use super::shrink::{Bounds, ScenarioParts, shrink};
+use super::trial::{PlayedPlan, RUNS, Subject, Trial, TrialPlan, TrialResult};
 
 /// Number of plans that are drawn at a time. What they reach guides the plans after them.
 const BATCH: u64 = 16;

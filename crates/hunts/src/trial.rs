@@ -7,6 +7,9 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use config::{Changes, Source};
+use experiments::{ByClass, Follow, LaunchText, Launches, RobotSource, RunRobots};
+use lab::LabError;
+use lab::run::{Local, check_faults, make_robots_with};
 use observe::Observation;
 use protocol::messages::{End, Verdict};
 use protocol::{Event, RobotName, RunName, Tick};
@@ -17,12 +20,6 @@ use timeline::{CommandSpan, Span, Timeline};
 use super::case::FaultCase;
 use super::coverage::{CommandFate, Feature};
 use super::sent::{Link, SentMessage};
-use crate::follow::Follow;
-use crate::launches::Launches;
-use crate::own::{ByClass, RobotSource, RunRobots};
-use crate::plan::LaunchText;
-use lab::LabError;
-use lab::run::{Local, check_faults, make_robots_with};
 
 /// What is expected of every run beside the expectations of its scenario.
 pub const RUNS: &str = "the run goes to its end";
@@ -581,10 +578,10 @@ fn link(from: &RobotName, to: &RobotName) -> Link {
 mod tests {
     use protocol::random::stream;
 
-    use super::super::draw::Ground;
-    use super::super::fault::FaultClass;
-    use super::super::sent::Onset;
     use super::*;
+    use crate::draw::Ground;
+    use crate::fault::FaultClass;
+    use crate::sent::Onset;
 
     fn hall() -> Subject {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs/hors_doeuvres.toml");

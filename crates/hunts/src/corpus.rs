@@ -125,8 +125,8 @@ fn begun(plan: &TrialPlan, tick: Tick, result: &TrialResult) -> Vec<PlannedFault
 mod tests {
     use protocol::RobotName;
 
-    use super::super::case::FaultCase;
     use super::*;
+    use crate::case::FaultCase;
 
     fn change(to: &str) -> Feature {
         Feature::Behavior {
@@ -169,7 +169,7 @@ mod tests {
         assert_eq!(ticks, [5], "X and Y are one state, Z is the last tick");
         assert!(!corpus.is_new(&change("X")) && corpus.is_new(&change("W")));
         assert!(!corpus.is_new(&Feature::Fault {
-            kind: super::super::fault::FaultClass::Lose
+            kind: crate::fault::FaultClass::Lose
         }));
     }
 
@@ -228,7 +228,7 @@ mod tests {
         let message = |number: usize| Feature::Message {
             link: link.clone(),
             text: format!("at {number}"),
-            fate: super::super::coverage::CommandFate::Delivered,
+            fate: crate::coverage::CommandFate::Delivered,
         };
         let (plan, mut played) = played(0, &[]);
         let ticks = (0..100).map(|number| (message(number), 1 + number as Tick / 2));

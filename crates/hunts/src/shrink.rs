@@ -8,13 +8,13 @@
 use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use experiments::parallel::first;
 use protocol::{RobotName, Tick};
 
 use super::case::FaultCase;
 use super::fault::{Effect, Messages, PlannedFault, TickSpan, robot_chance};
 use super::sent::SentMessage;
 use super::trial::{Trial, TrialResult};
-use crate::parallel::first;
 
 /// Least time of a fault, ticks.
 const MIN_TICKS: Tick = 2;
@@ -525,11 +525,11 @@ mod tests {
 
     use proptest::prelude::*;
 
-    use super::super::fault::AbsenceReason;
+    use crate::fault::AbsenceReason;
 
-    use super::super::sent::Link;
-    use super::super::trial::FailedExpectation;
     use super::*;
+    use crate::sent::Link;
+    use crate::trial::FailedExpectation;
     use lab::LabError;
 
     const NAME: &str = "all is well";
