@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
+use environment::{Event, Simulation};
 use lab::run::Local;
 use protocol::messages::{Point, StateVariables};
 use protocol::{RobotName, RunName};
 use robot::LocalHost;
 use scenario::Changes;
 use scenario::Scenario;
-use simulator::{Event, Simulation};
 
 use crate::root;
 

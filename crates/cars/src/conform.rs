@@ -164,7 +164,7 @@ fn take_scenario(setting: &mut CheckSetting, file: &Path) -> Result<()> {
             parameters: spec.parameters.clone(),
             drive: spec
                 .wheels
-                .map(|wheels| simulator::drive_limits(&wheels, scenario.max_speed_mps)),
+                .map(|wheels| environment::drive_limits(&wheels, scenario.max_speed_mps)),
             heading_rad: spec.wheels.map_or(0.0, |wheels| wheels.heading_rad),
             ..RosterRobot::default()
         };

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use config::{Changes, Source};
+use environment::Simulation;
 use experiments::{ByClass, Follow, LaunchText, Launches, RobotSource, RunRobots};
 use lab::LabError;
 use lab::run::{Local, check_faults, make_robots_with};
@@ -14,7 +15,6 @@ use observe::Observation;
 use protocol::messages::{End, Verdict};
 use protocol::{Event, RobotName, RunName, Tick};
 use scenario::Scenario;
-use simulator::Simulation;
 use timeline::{CommandSpan, Span, Timeline};
 
 use super::case::FaultCase;

@@ -6,14 +6,14 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use config::Override;
+use environment::medium::ForcedVerdict;
+use environment::{Simulation, TickRecord};
 use observe::Measured;
 use protocol::messages::{End, Verdict};
 use protocol::{Event, RobotName, RunName, Tick};
 use record::{Entry, EpochFiles, Record, Summary};
 use robot::{Cars, OpenTick};
 use scenario::{ChanceKind, Scenario};
-use simulator::medium::ForcedVerdict;
-use simulator::{Simulation, TickRecord};
 
 use crate::error::LabError;
 use crate::reexecution::{Reexecution, cannot_copy, cannot_go_on};

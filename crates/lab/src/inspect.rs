@@ -4,6 +4,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use config::Changes;
+use environment::Simulation;
+use environment::recorded;
 use protocol::Event;
 use protocol::event::log_line;
 use protocol::messages::LogRecord;
@@ -15,8 +17,6 @@ use record::seal::Checked;
 use record::{EpochFiles, RunFolder, Summary};
 use recording::Recording;
 use scenario::Scenario;
-use simulator::Simulation;
-use simulator::recorder;
 
 use crate::error::LabError;
 use crate::folder::{not_a_summary, recorded_epochs};
@@ -108,7 +108,7 @@ fn inspect_recording(
     check_scenario(files, &recording)?;
     let header = recording.header();
     let simulation = Simulation::new(scenario, files.epoch).map_err(LabError::refused)?;
-    if let Some(difference) = between_headers(header, &recorder::header(&header.run, &simulation)) {
+    if let Some(difference) = between_headers(header, &recorded::header(&header.run, &simulation)) {
         let place = files.recording.display();
         return Err(LabError::record(format!(
             "{place} is not of its scenario: {difference}"

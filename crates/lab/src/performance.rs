@@ -1,9 +1,9 @@
 //! States and commands of the robots of a scenario, from a run in this process.
 
+use environment::{Simulation, TickRecord};
 use protocol::messages::PublicState;
 use protocol::{Event, RobotName, RunName, Tick};
 use scenario::Scenario;
-use simulator::{Simulation, TickRecord};
 use std::collections::BTreeMap;
 
 use crate::error::LabError;

@@ -7,6 +7,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use environment::TickRecord;
 use lockstep::{Bulletin, Exchange, TickOutcome};
 use protocol::messages::{CommandText, FaultKind, Report, TickUpdate};
 use protocol::{Epoch, Event, RobotName, RunName, Tick};
@@ -15,7 +16,6 @@ use record::difference::{Difference, between};
 use recording::Frame;
 use robot::{Action, BadParameters, Cars, LocalHost, Robot, RobotError};
 use scenario::Scenario;
-use simulator::TickRecord;
 
 use crate::error::LabError;
 use crate::folder::NOT_RECORDED;
@@ -165,7 +165,7 @@ impl Reexecution {
         let record = record?;
         let frame = recorded.frame.is_some();
         Ok(Executed {
-            frame: frame.then(|| simulator::recorder::frame(simulation, &record)),
+            frame: frame.then(|| environment::recorded::frame(simulation, &record)),
             record,
             reports: recorded.reports.is_some().then_some(reports),
         })

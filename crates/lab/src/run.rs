@@ -5,13 +5,14 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use environment::{Simulation, TickRecord};
 use protocol::messages::{End, FaultKind, OnLate};
 use protocol::{Epoch, RobotName, RunName, Tick};
 use record::{RunFolder, Summary};
 use robot::{BadParameters, LocalHost, Robot, RobotError, Welcome};
 use scenario::FaultEnd;
 use scenario::Scenario;
-use simulator::{Recorder, Simulation, TickRecord};
+use simulator::Recorder;
 
 use crate::error::LabError;
 

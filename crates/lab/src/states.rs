@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use environment::layers::Layers;
 use observe::RobotState;
 use protocol::messages::{Point, Report};
 use protocol::{RobotName, Tick};
 use recording::PlacedRobot;
 use scenario::Scenario;
-use simulator::layers::Layers;
 
 /// What robots reported last, where they stand, and the layers.
 pub struct LastStates {

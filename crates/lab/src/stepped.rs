@@ -6,12 +6,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
+use environment::Simulation;
 use protocol::RobotName;
 use protocol::messages::{StateVariables, Variable};
 use record::NewRun;
 use robot::{Action, BadParameters, Cars, Robot, SiteAction};
 use scenario::Scenario;
-use simulator::{Recorder, Simulation};
+use simulator::Recorder;
 
 use crate::branch::Branch;
 use crate::error::LabError;

@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use config::Changes;
+use environment::Simulation;
+use environment::recorded;
 use protocol::{RobotName, RunName, Tick};
 use record::Record;
 use record::difference::{Difference, between, between_headers, between_summaries, in_recording};
@@ -12,8 +14,6 @@ use record::{EpochFiles, Summary, seal};
 use recording::Recording;
 use scenario::Scenario;
 use serde_json::Value;
-use simulator::Simulation;
-use simulator::recorder;
 
 use crate::error::LabError;
 use crate::folder::not_a_summary;
@@ -212,7 +212,7 @@ fn read_summary(files: &EpochFiles) -> Result<Option<(PathBuf, Value)>, LabError
 /// The first field of the recording's header that is not that of the scenario.
 fn header_difference(record: &Record, simulation: &Simulation) -> Option<Difference> {
     let header = record.recording()?.header();
-    between_headers(header, &recorder::header(&header.run, simulation))
+    between_headers(header, &recorded::header(&header.run, simulation))
 }
 
 /// Checks that the scenario beside the record is the one that the recording contains.

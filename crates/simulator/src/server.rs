@@ -1,5 +1,5 @@
 //! The simulator as a process: it translates between the bus, the lock-step ([`lockstep::Barrier`]) and the
-//! [`Simulation`](crate::Simulation).
+//! [`Simulation`](environment::Simulation).
 //!
 //! A [`Server`] has one [`bus::Inbox`]. Everything that can happen is an event, and one thread at a time works on them: the
 //! one on which an event arrives, or the server's own. Control is answered in the same way, also while the clock is held, because

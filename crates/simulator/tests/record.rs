@@ -7,6 +7,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use environment::Simulation;
 use lockstep::{Bulletin, Exchange, TickOutcome};
 use protocol::messages::{CommandText, End, Report, TickUpdate};
 use protocol::{RunName, Tick};
@@ -15,7 +16,7 @@ use record::RunLock;
 use record::names::{EVENTS, RECORDING};
 use scenario::Scenario;
 use scenario::diagnostic::Source;
-use simulator::{Recorder, Simulation};
+use simulator::Recorder;
 
 /// Robots that miss every tick.
 struct Absent;

@@ -3,10 +3,10 @@
 
 use std::collections::BTreeSet;
 
+use environment::Event;
 use protocol::{Epoch, RobotName, Tick};
 use record::Entry;
 use scenario::Scenario;
-use simulator::Event;
 
 /// The record of an epoch.
 pub(crate) struct Again<'a> {

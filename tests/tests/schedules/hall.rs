@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use environment::Simulation;
 use protocol::messages::StateVariables;
 use protocol::random::unit;
 use protocol::{Epoch, RobotName, RunName, Tick};
@@ -10,7 +11,6 @@ use robot::{Action, BadParameters, Cars, LocalHost, Payload, Robot, Variable};
 use scenario::Changes;
 use scenario::Scenario;
 use scenario::diagnostic::Source;
-use simulator::Simulation;
 
 /// Ticks of every epoch.
 pub(crate) const TICKS: Tick = 40;
@@ -209,7 +209,7 @@ fn digest_of(scenario: &Scenario) -> String {
     for _ in 0..TICKS {
         let record = simulation.step(&mut robots).expect("only tick 0 can fail");
         for event in record.events.iter() {
-            delivered += u32::from(matches!(event, simulator::Event::CommandDelivered { .. }));
+            delivered += u32::from(matches!(event, environment::Event::CommandDelivered { .. }));
         }
     }
     assert!(

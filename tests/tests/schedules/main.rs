@@ -1,4 +1,4 @@
-//! Deterministic simulation of the lock-step: the real [`lockstep::Barrier`] with the real [`simulator::Simulation`], and real
+//! Deterministic simulation of the lock-step: the real [`lockstep::Barrier`] with the real [`environment::Simulation`], and real
 //! [`lockstep::Participant`]s with real robots, over a simulated star with simulated time. What happens to links, processes
 //! and the operator is drawn from a seed, in one thread, so that a seed that fails fails every time.
 //!

@@ -3,12 +3,12 @@
 
 use std::collections::BTreeMap;
 
+use environment::TickRecord;
 use lab::run::Local;
 use protocol::messages::FaultKind;
 use protocol::{RobotName, RunName, Tick};
 use record::Entry;
 use scenario::{Fault, FaultEnd, OnLate, Scenario};
-use simulator::TickRecord;
 
 use crate::again::Again;
 use crate::hall::{TICKS, halls};
@@ -139,7 +139,7 @@ fn entry(local: &Local, record: &TickRecord) -> Entry {
 fn digest_of(recorded: &[Entry]) -> String {
     let events = recorded.iter().flat_map(|entry| &entry.events);
     let mut digests = events.filter_map(|event| match event {
-        simulator::Event::Tick { digest, .. } => Some(digest.clone()),
+        environment::Event::Tick { digest, .. } => Some(digest.clone()),
         _ => None,
     });
     digests.next_back().expect("a tick is complete")

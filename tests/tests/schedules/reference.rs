@@ -4,12 +4,12 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use environment::{Simulation, TickRecord};
 use lockstep::{Begin, IncarnationNotice, Membership, Sent, TickOutcome, Turn};
 use protocol::messages::{CommandText, PublicState, Report};
 use protocol::{Generation, RobotName, RunName, Tick};
 use robot::{PeerNetwork, Runner, TickResult, Undelivered};
 use scenario::Scenario;
-use simulator::{Simulation, TickRecord};
 
 use crate::hall::make;
 

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::time::Duration;
 
+use environment::{Event as Recorded, Simulation, TickRecord};
 use lockstep::{Barrier, BarrierOutput, LatePolicy, Membership, Sent, Stamp, Timer, Timing};
 use protocol::messages::{
     Clock, Command, CommandText, End, JoinAnswer, JoinRequest, MAX_ENTRIES, OnLate, PublicState,
@@ -12,7 +13,6 @@ use protocol::messages::{
 };
 use protocol::{Epoch, Generation, RobotName, RunName, Tick, encode};
 use record::Entry;
-use simulator::{Event as Recorded, Simulation, TickRecord};
 
 use crate::again::Again;
 use crate::plan::{Family, Flaw, MS, Micros, Plan, Point, S};

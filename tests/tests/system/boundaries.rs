@@ -60,17 +60,30 @@ const ALLOWED: &[(&str, &[&str])] = &[
         ],
     ),
     (
-        "simulator",
+        "environment",
         &[
             "record",
             "scenario",
             "radio",
             "world",
-            "bus",
             "config",
             "lockstep",
             "observe",
             "pictures",
+            "protocol",
+            "recording",
+        ],
+    ),
+    (
+        "simulator",
+        &[
+            "environment",
+            "record",
+            "scenario",
+            "world",
+            "bus",
+            "config",
+            "lockstep",
             "protocol",
             "recording",
             "terminal",
@@ -99,6 +112,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         &[
             "scenario",
             "record",
+            "environment",
             "simulator",
             "robot",
             "robots",
@@ -116,7 +130,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "lab",
             "scenario",
             "record",
-            "simulator",
+            "environment",
             "robot",
             "robots",
             "config",
@@ -134,7 +148,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "experiments",
             "lab",
             "scenario",
-            "simulator",
+            "environment",
             "config",
             "export",
             "observe",
@@ -169,6 +183,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "lab",
             "scenario",
             "record",
+            "environment",
             "simulator",
             "export",
             "robot",
@@ -225,6 +240,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
         &[
             "scenario",
             "record",
+            "environment",
             "simulator",
             "robot",
             "robots",
@@ -322,13 +338,22 @@ fn contain(symbols: &[&str], name: &str) -> bool {
 fn each_program_contains_its_own_crates_and_no_others() {
     let robot = (
         &["robots", "affect", "robot", "lockstep", "bus"][..],
-        &["world", "simulator", "scenario", "record", "lab", "launch"][..],
+        &[
+            "world",
+            "environment",
+            "simulator",
+            "scenario",
+            "record",
+            "lab",
+            "launch",
+        ][..],
     );
     let unemotional = (
         &["robots", "robot", "lockstep", "bus"][..],
         &[
             "affect",
             "world",
+            "environment",
             "simulator",
             "scenario",
             "record",
@@ -338,10 +363,25 @@ fn each_program_contains_its_own_crates_and_no_others() {
     );
     let console = (
         &["pictures", "bus"][..],
-        &["world", "simulator", "robots", "affect", "lab", "launch"][..],
+        &[
+            "world",
+            "environment",
+            "simulator",
+            "robots",
+            "affect",
+            "lab",
+            "launch",
+        ][..],
     );
     let simulator = (
-        &["world", "simulator", "scenario", "record", "bus"][..],
+        &[
+            "world",
+            "environment",
+            "simulator",
+            "scenario",
+            "record",
+            "bus",
+        ][..],
         &["affect", "robots", "robot", "lab", "launch"][..],
     );
     for (program, (own, others)) in [
@@ -407,7 +447,16 @@ fn one_file_names_the_middleware() {
 #[test]
 fn the_pure_crates_know_no_clock_no_network_and_no_files() {
     for (name, dependencies) in dependencies() {
-        if ["world", "radio", "crowd", "affect", "lockstep", "pictures"].contains(&name.as_str()) {
+        let pure = [
+            "world",
+            "radio",
+            "crowd",
+            "affect",
+            "environment",
+            "lockstep",
+            "pictures",
+        ];
+        if pure.contains(&name.as_str()) {
             for impure in ["tokio", "tracing", "zenoh", "clap", "nix"] {
                 assert!(
                     !dependencies.contains(impure),

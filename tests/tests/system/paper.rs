@@ -6,10 +6,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use environment::{Event, Simulation};
 use protocol::RunName;
 use protocol::messages::Point;
 use robot::LocalHost;
-use simulator::{Event, Simulation};
 use system_tests::hall::{Hall, scenario};
 use system_tests::{Lab, programs, root};
 

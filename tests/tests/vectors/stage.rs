@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
+use environment::Simulation;
 use lockstep::{
     Admission, Barrier, BarrierOutput, Ignored, IncarnationNotice, Leave, ParticipantOutput, Sent,
     Stamp, StateQuery, TickAnswer, Timing, Turn,
@@ -19,7 +20,6 @@ use protocol::{Epoch, Message, RobotName, RunName, Tick, decode, encode};
 use robot::Robot;
 use scenario::Changes;
 use scenario::Scenario;
-use simulator::Simulation;
 use system_tests::root;
 
 use crate::process::{Machine, MachineAction, Others, Process};

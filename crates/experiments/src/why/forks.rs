@@ -9,6 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
+use environment::medium::{ForcedVerdict, NetworkVerdict};
 use export::draft;
 use lab::LabError;
 use lab::branch::{Branch, Trunk};
@@ -19,7 +20,6 @@ use record::names::WHY;
 use record::{EpochFiles, RunFolder};
 use scenario::{ChanceKind, Scenario};
 use serde::{Deserialize, Serialize};
-use simulator::medium::{ForcedVerdict, NetworkVerdict};
 use xxhash_rust::xxh3::xxh3_128;
 
 use super::answer::{FailedForks, WhyAnswer};

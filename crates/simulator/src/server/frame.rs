@@ -2,10 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use environment::Simulation;
 use protocol::RobotName;
 use protocol::messages::{DisplayUnit, Presence, RobotFrame, Status, WorldFrame};
-
-use crate::simulation::Simulation;
 
 /// In every tick the clock waits a short time for each robot.
 const LATE_S: f64 = 0.5;

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bus::{Bus, BusError, Declared, Publisher, Query};
+use environment::Simulation;
 use lockstep::{Barrier, BarrierOutput, Sent, Timing};
 use protocol::keys::Keys;
 use protocol::messages::{
@@ -28,7 +29,6 @@ use super::source::{Next, TickSource};
 use super::timers::Timers;
 use super::viewers::Viewers;
 use super::watchdog::{Activity, Watchdog};
-use crate::simulation::Simulation;
 
 /// Most ticks that wait for no robot and are granted in one go: the thread that does it may be the one that receives.
 const MAX_TICKS_AT_ONCE: Tick = 16;

@@ -2,6 +2,7 @@
 
 use std::time::Instant;
 
+use environment::{Simulation, TickRecord};
 use protocol::RunName;
 use protocol::event::WaitedFor;
 use protocol::messages::{End, LogRecord};
@@ -11,7 +12,6 @@ use record::{RecordError, RunFolder};
 use super::event::{ServerError, StopReason};
 use super::replay_log::ReplayLog;
 use crate::recorder::{Observed, Recorder};
-use crate::simulation::{Simulation, TickRecord};
 
 /// The record of an epoch.
 pub(super) enum EpochRecord {

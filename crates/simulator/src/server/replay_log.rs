@@ -4,11 +4,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
+use environment::TickRecord;
 use lockstep::{Attendance, Sent};
 use protocol::messages::CommandText;
 use protocol::{Epoch, RobotName, Tick};
 
-use crate::simulation::TickRecord;
 use record::EpochFiles;
 use record::difference::{Difference, between};
 use record::{Entry, Record, RecordError};

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use bus::BusError;
+use environment::static_world;
 use lockstep::{BarrierOutput, IncarnationNotice, TickOutcome};
 use protocol::keys::STATE;
 use protocol::messages::{Clock, CommandText, End, Reason, Report};
@@ -18,7 +19,6 @@ use super::live::{LiveRun, WaitsFor};
 use super::observers::TickVisibility;
 use super::source::{Next, TickSource};
 use super::watchdog::Activity;
-use crate::static_world::static_world;
 
 impl LiveRun {
     /// Opens the next tick if it is due, or finds out how long to wait at most before looking again.

@@ -8,7 +8,8 @@ use world::{Shape, Wall};
 const STEPS_PER_M: f64 = 10_000.0;
 
 /// Walls, shapes of bodies, and where robots look.
-pub(crate) fn static_world(scenario: &Scenario) -> StaticWorld {
+#[must_use]
+pub fn static_world(scenario: &Scenario) -> StaticWorld {
     let mut of_scenario = StaticWorld {
         walls: lines(&scenario.walls),
         sensing: sensing_limits(&scenario.sensing),

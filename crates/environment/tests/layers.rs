@@ -9,6 +9,8 @@ use std::path::Path;
 
 use actors::Actors;
 use base64::Engine;
+use environment::layers::Layers;
+use environment::{Event, Simulation, recorded};
 use proptest::prelude::*;
 use protocol::messages::{
     LayerAction, LayerFrame, LayerRefusal, LayerResult, MAX_SENSED_CELLS, Point, Report,
@@ -16,8 +18,6 @@ use protocol::messages::{
 use protocol::{RobotName, RunName};
 use scenario::Scenario;
 use scenario::diagnostic::Source;
-use simulator::layers::Layers;
-use simulator::{Event, Simulation, recorder};
 
 /// A layer of 6 by 4 cells of 1 m, with a spike of 16 in column 2 and row 1, and one that no robot reaches.
 const FILE: &str = r#"
@@ -393,7 +393,7 @@ fn frames_have_the_whole_layer_in_256_levels() {
 fn a_recorded_tick_has_the_layers_after_it() {
     let take = LayerAction::add("dust", Point::new(2.5, 1.5), 0.0, -5.0);
     let mut simulation = Simulation::new(scenario(FILE), 1).unwrap();
-    let header = recorder::header(&RunName::new("r").unwrap(), &simulation);
+    let header = recorded::header(&RunName::new("r").unwrap(), &simulation);
     assert_eq!(header.layers, simulation.layers().frames());
 
     let mut actors = Actors::of(&simulation, act_on_layers);
@@ -401,7 +401,7 @@ fn a_recorded_tick_has_the_layers_after_it() {
     simulation.init(&mut actors).unwrap();
     for tick in 1..4 {
         let record = simulation.step(&mut actors).unwrap();
-        let frame = recorder::frame(&simulation, &record);
+        let frame = recorded::frame(&simulation, &record);
         // Those that are as at the start need no place in the recording.
         assert_eq!(frame.layers.len(), usize::from(tick >= 2));
         assert_eq!(header.layers_of(&frame), simulation.layers().frames());

@@ -10,6 +10,8 @@ use std::convert::Infallible;
 use std::path::Path;
 use std::sync::Arc;
 
+use environment::Simulation;
+use environment::medium::{Medium, SentCommand};
 use lockstep::{Bulletin, Exchange, IncarnationNotice, Sent, TickOutcome};
 use protocol::messages::{CommandText, Point, Report, TickUpdate};
 use protocol::random::{stream, unit};
@@ -17,8 +19,6 @@ use protocol::{RobotName, Tick};
 use radio::{outage, regularized_gamma};
 use scenario::Scenario;
 use scenario::diagnostic::Source;
-use simulator::Simulation;
-use simulator::medium::{Medium, SentCommand};
 
 /// Quantile of the normal distribution for bounds of 99 %.
 const Z_99: f64 = 2.576;

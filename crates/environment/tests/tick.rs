@@ -9,6 +9,7 @@ use std::convert::Infallible;
 use std::path::Path;
 use std::sync::Arc;
 
+use environment::{Event, Simulation, TickRecord};
 use lockstep::{Bulletin, Exchange, IncarnationNotice, Sent, TickOutcome};
 use protocol::event::{Blocker, Cause, log_line};
 use protocol::messages::{
@@ -17,7 +18,6 @@ use protocol::messages::{
 use protocol::{RobotName, RunName, Tick};
 use scenario::Scenario;
 use scenario::diagnostic::Source;
-use simulator::{Event, Simulation, TickRecord};
 
 /// News of a tick, by robot.
 type AllNews = BTreeMap<RobotName, TickUpdate>;

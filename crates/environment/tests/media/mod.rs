@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
+use environment::medium::Medium;
 use scenario::Scenario;
 use scenario::diagnostic::Source;
-use simulator::medium::Medium;
 
 /// The network of a scenario file with this text.
 pub(crate) fn medium_of(text: &str) -> Medium {

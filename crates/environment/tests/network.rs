@@ -9,13 +9,13 @@ use std::collections::BTreeMap;
 use std::iter::zip;
 use std::path::Path;
 
+use environment::medium::{Medium, NetworkDecisions};
 use protocol::event::Cause;
 use protocol::messages::Point;
 use protocol::random::{stream, unit};
 use protocol::{Event, RobotName};
 use scenario::Scenario;
 use scenario::diagnostic::{FileError, Source};
-use simulator::medium::{Medium, NetworkDecisions};
 
 use commands::{command, name};
 use media::medium_of;

@@ -11,12 +11,12 @@ use std::path::Path;
 use std::sync::Arc;
 
 use config::Source;
+use environment::{Event, Simulation, TickRecord};
 use lockstep::{Bulletin, Exchange, IncarnationNotice, TickOutcome};
 use protocol::event::Blocker;
 use protocol::messages::{CommandText, Point, Pose, Report, TickUpdate, Velocity};
 use protocol::{RobotName, Tick};
 use scenario::Scenario;
-use simulator::{Event, Simulation, TickRecord};
 
 /// Robots A and B that propose what a closure says, and the news of A. `None` is a tick without a report.
 struct Robots<F> {
@@ -140,7 +140,7 @@ fn a_robot_is_told_its_pose_in_every_tick_and_moves_within_its_limits() {
     let headings_rad: Vec<f64> = poses.iter().map(|pose| pose.heading_rad).collect();
     let eighths_of_a_turn = [0.0, 1.0, 2.0, 3.0].map(|n| (n * FRAC_PI_4 * 1e6).round() / 1e6);
     assert_eq!(headings_rad, eighths_of_a_turn);
-    let frame = simulator::recorder::frame(&simulation, &records[3]);
+    let frame = environment::recorded::frame(&simulation, &records[3]);
     let headings = frame.robots.iter().map(|robot| robot.heading_rad);
     assert_eq!(headings.collect::<Vec<_>>(), [Some(2.356_194), None]);
 }

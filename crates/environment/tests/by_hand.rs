@@ -9,6 +9,7 @@ use std::convert::Infallible;
 use std::path::Path;
 use std::sync::Arc;
 
+use environment::{Event, Simulation, TickRecord};
 use lockstep::{Bulletin, Exchange, Sent, TickOutcome};
 use protocol::event::Cause;
 use protocol::messages::{
@@ -17,7 +18,6 @@ use protocol::messages::{
 use protocol::{RobotName, Tick};
 use scenario::Scenario;
 use scenario::diagnostic::Source;
-use simulator::{Event, Simulation, TickRecord};
 
 const ROBOTS: &str = "[[robot]]\nname = \"A\"\nat = [\"2 m\", \"2 m\"]\n[[robot]]\nname = \"B\"\nat = [\"4 m\", \"2 m\"]\n\
                       [[robot]]\nname = \"C\"\nat = [\"6 m\", \"2 m\"]\n";

@@ -7,11 +7,11 @@ mod media;
 
 use std::collections::BTreeMap;
 
+use environment::medium::{ForcedVerdict, Medium, NetworkDecisions, NetworkVerdict, SentCommand};
 use protocol::event::Cause;
 use protocol::messages::{CommandText, Payload, Point};
 use protocol::{Event, RobotName};
 use radio::outage;
-use simulator::medium::{ForcedVerdict, Medium, NetworkDecisions, NetworkVerdict, SentCommand};
 use world::Crossed;
 
 use commands::{command, name};

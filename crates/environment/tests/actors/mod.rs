@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::convert::Infallible;
 use std::sync::Arc;
 
+use environment::Simulation;
 use lockstep::{Bulletin, Exchange, IncarnationNotice, TickOutcome};
 use protocol::RobotName;
 use protocol::messages::{CommandText, Point, Report, TickUpdate};
-use simulator::Simulation;
 
 use crate::common;
 

@@ -7,13 +7,13 @@ use std::path::Path;
 use std::sync::Arc;
 
 use config::shipped;
+use environment::Simulation;
 use lockstep::{Bulletin, Exchange, TickOutcome};
 use proptest::prelude::*;
 use protocol::Tick;
 use protocol::messages::{CommandText, Report, TickUpdate};
 use scenario::Scenario;
 use scenario::diagnostic::{FileError, Source};
-use simulator::Simulation;
 
 /// Numbers that quantities are written with.
 const NUMBERS: [&str; 16] = [

@@ -1,8 +1,8 @@
 //! Commands as robots put them.
 
+use environment::medium::SentCommand;
 use protocol::RobotName;
 use protocol::messages::CommandText;
-use simulator::medium::SentCommand;
 
 pub(crate) fn name(name: &str) -> RobotName {
     RobotName::new(name).unwrap()

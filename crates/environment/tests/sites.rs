@@ -9,6 +9,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use actors::Actors;
+use environment::sites::{SiteOrders, Sites};
+use environment::{Event, Simulation};
 use lockstep::IncarnationNotice;
 use proptest::prelude::*;
 use protocol::messages::{
@@ -18,8 +20,6 @@ use protocol::messages::{
 use protocol::{RobotName, RunName};
 use scenario::Scenario;
 use scenario::diagnostic::Source;
-use simulator::sites::{SiteOrders, Sites};
-use simulator::{Event, Simulation};
 
 /// Two robots within 1 m of a task at 2 m, 2 m, one that is not, and a site far away.
 const FILE: &str = r#"

@@ -1,6 +1,6 @@
 //! The figure of `docs/network.md`: the simulated network against its closed forms. With `CARS_UPDATE=1` the test writes it.
 //!
-//! The assertions over more draws are in `crates/radio/tests` and `crates/simulator/tests`; this one shows them.
+//! The assertions over more draws are in `crates/radio/tests` and `crates/environment/tests`; this one shows them.
 
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
@@ -10,12 +10,12 @@ mod shipped;
 
 use std::collections::BTreeSet;
 
+use environment::medium::{Medium, SentCommand};
 use pictures::{Chart, ChartPanel, PlottedEstimate, Trend, TrendLine, TrendPoint};
 use protocol::RobotName;
 use protocol::messages::{CommandText, Point};
 use protocol::random::{stream, unit};
 use radio::{SendQueue, Transmitter, outage};
-use simulator::medium::{Medium, SentCommand};
 
 use media::medium_of;
 use shipped::assert_figure_is_shipped;

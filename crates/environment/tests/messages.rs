@@ -9,6 +9,7 @@ use std::convert::Infallible;
 use std::path::Path;
 use std::sync::Arc;
 
+use environment::{Event, Simulation, TickRecord};
 use lockstep::{Bulletin, Exchange, IncarnationNotice, Sent, TickOutcome};
 use protocol::event::Cause;
 use protocol::messages::{CommandText, MAX_PAYLOAD_BYTES, Payload, Report, Target, TickUpdate};
@@ -17,7 +18,6 @@ use record::Entry;
 use scenario::Scenario;
 use scenario::diagnostic::Source;
 use serde_json::{Value, json};
-use simulator::{Event, Simulation, TickRecord};
 
 type Commands = Vec<Sent<CommandText>>;
 

@@ -8,10 +8,10 @@ mod common;
 use std::path::Path;
 
 use actors::Actors;
+use environment::Simulation;
 use protocol::messages::{Point, SensedKind, TickUpdate};
 use scenario::Scenario;
 use scenario::diagnostic::{FileError, Source};
-use simulator::Simulation;
 
 /// A at 2 m, 2 m looks around; B is 2 m to its right, behind an obstacle; C is 2 m above it; a site is at C.
 const FILE: &str = r#"
