@@ -68,7 +68,7 @@ fn describe(path: &Path) -> Result<String> {
         FileKind::Experiment => describe_experiment(path),
         FileKind::Launch => describe_launch(path),
         FileKind::Links => {
-            let faults = launch::net::FaultPlan::check(path)?;
+            let faults = netem::FaultPlan::check(path)?;
             Ok(count(faults, "fault of a link", "faults of links"))
         }
         FileKind::Parameters => describe_parameters(path),

@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::{Args, Subcommand, ValueEnum};
-use launch::net::{self, FaultPlan, Flow, LinkOrder, LinkShape, Proxy, address};
+use netem::{FaultPlan, Flow, LinkOrder, LinkShape, Proxy, address};
 use protocol::RobotName;
 use terminal::OutputError;
 
@@ -162,18 +162,18 @@ fn play(args: PlayArgs) -> Result<ExitCode> {
     siblings::build()?;
 
     let via = match args.via {
-        LinkKind::Proxy => net::Via::Proxy,
-        LinkKind::Namespaces => net::Via::Namespaces,
-        LinkKind::Compose => net::Via::Compose,
+        LinkKind::Proxy => netem::Via::Proxy,
+        LinkKind::Namespaces => netem::Via::Namespaces,
+        LinkKind::Compose => netem::Via::Compose,
     };
-    let play = net::Play {
+    let play = netem::Play {
         file: args.file,
         plan: args.plan,
         via,
         options: args.execution.options(),
         launch_args: args.launch_args,
     };
-    let code = net::play(&play, terminal::note)?;
+    let code = netem::play(&play, terminal::note)?;
 
     Ok(ExitCode::from(code))
 }

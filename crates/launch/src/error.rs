@@ -75,21 +75,24 @@ impl LaunchError {
         }
     }
 
-    pub(crate) fn refused(reason: impl Into<String>) -> Self {
+    /// What cannot be done, and why.
+    pub fn refused(reason: impl Into<String>) -> Self {
         Self::Refused {
             reason: reason.into(),
             help: None,
         }
     }
 
-    pub(crate) fn refused_with_help(reason: impl Into<String>, help: &'static str) -> Self {
+    /// What cannot be done, why, and what can be done instead.
+    pub fn refused_with_help(reason: impl Into<String>, help: &'static str) -> Self {
         Self::Refused {
             reason: reason.into(),
             help: Some(help),
         }
     }
 
-    pub(crate) fn path(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
+    /// Turns the system's reason into that of an action, a verb, on a file or folder.
+    pub fn path(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();
         move |source| Self::Path {
             action,
@@ -98,7 +101,8 @@ impl LaunchError {
         }
     }
 
-    pub(crate) fn system<E>(what: &'static str) -> impl FnOnce(E) -> Self
+    /// Turns the system's reason into that of something that every launch needs.
+    pub fn system<E>(what: &'static str) -> impl FnOnce(E) -> Self
     where
         E: Into<Box<dyn Error + Send + Sync>>,
     {

@@ -1,11 +1,11 @@
-//! Work with processes: launch files and their supervision ([`Launch`]), any program as a robot ([`exec`]), faults of real
-//! links ([`net`]), and certificates for runs that other machines can reach ([`Certificates`]).
+//! Work with processes: launch files and their supervision ([`Launch`]), any program as a robot ([`exec`]), and certificates
+//! for runs that other machines can reach ([`Certificates`]).
 
 mod bar;
 pub mod child;
 mod compose;
 mod ending;
-mod endpoint;
+pub mod endpoint;
 mod error;
 pub mod exec;
 mod failure;
@@ -16,7 +16,6 @@ mod leftovers;
 mod lines;
 mod link;
 mod log;
-pub mod net;
 mod observe;
 mod options;
 mod plan;

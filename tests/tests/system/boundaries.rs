@@ -108,6 +108,12 @@ const ALLOWED: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "netem",
+        &[
+            "launch", "scenario", "record", "bus", "config", "protocol", "terminal",
+        ],
+    ),
+    (
         "lab",
         &[
             "scenario",
@@ -177,6 +183,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "affect",
             "crowd",
             "launch",
+            "netem",
             "reports",
             "hunts",
             "experiments",
@@ -346,6 +353,7 @@ fn each_program_contains_its_own_crates_and_no_others() {
             "record",
             "lab",
             "launch",
+            "netem",
         ][..],
     );
     let unemotional = (
@@ -359,6 +367,7 @@ fn each_program_contains_its_own_crates_and_no_others() {
             "record",
             "lab",
             "launch",
+            "netem",
         ][..],
     );
     let console = (
@@ -371,6 +380,7 @@ fn each_program_contains_its_own_crates_and_no_others() {
             "affect",
             "lab",
             "launch",
+            "netem",
         ][..],
     );
     let simulator = (
@@ -382,7 +392,7 @@ fn each_program_contains_its_own_crates_and_no_others() {
             "record",
             "bus",
         ][..],
-        &["affect", "robots", "robot", "lab", "launch"][..],
+        &["affect", "robots", "robot", "lab", "launch", "netem"][..],
     );
     for (program, (own, others)) in [
         ("cars-sim", simulator),

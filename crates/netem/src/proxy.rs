@@ -10,14 +10,14 @@ use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, Instant};
 
 use bus::endpoint::TLS;
+use launch::LaunchError;
+use launch::endpoint::NO_PORT;
 use protocol::RobotName;
 use protocol::random::{stream, unit};
 
 use super::gate::{Gate, LinkSchedule};
 use super::plan::FaultPlan;
 use super::shape::{Flow, LinkShape};
-use crate::endpoint::NO_PORT;
-use crate::error::LaunchError;
 
 /// Most connections at the same time; further ones are closed. A robot needs one, and makes one a second during a cut.
 const MAX_CONNECTIONS: usize = 256;

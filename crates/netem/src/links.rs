@@ -4,12 +4,10 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use launch::{LaunchError, ProcessLink, RunOptions};
 use protocol::RunName;
 
 use super::shape::LinkShape;
-use crate::error::LaunchError;
-use crate::link::ProcessLink;
-use crate::options::RunOptions;
 
 /// A launch to be started over links.
 pub(super) struct Start<'a> {

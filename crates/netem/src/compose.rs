@@ -5,12 +5,12 @@ use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
+use launch::LaunchError;
+use launch::child::{self, AtExit};
 use tempfile::NamedTempFile;
 
 use super::links::{Links, Start, own_path};
 use super::shape::{Flow, LinkShape};
-use crate::child::{self, AtExit};
-use crate::error::LaunchError;
 
 /// The network of the compose file that connects the processes.
 const NETWORK: &str = "cars";

@@ -13,15 +13,13 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+use launch::child::{self, AtExit};
+use launch::{LaunchError, Process, ProcessLink};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 
 use super::links::{Links, Start, own_path};
 use super::shape::{Flow, LinkShape};
-use crate::child::{self, AtExit};
-use crate::error::LaunchError;
-use crate::file::Process;
-use crate::link::ProcessLink;
 
 /// Prefix of the names of all namespaces; the id of this process follows.
 const PREFIX: &str = "cars-";

@@ -1,6 +1,8 @@
 //! Launches over links of its own and plays a plan of faults on them.
 
 use bus::endpoint::is_tls;
+use launch::child::{self, AtExit};
+use launch::{LaunchError, LaunchFile, ProcessLink, RunOptions, endpoint};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use protocol::RobotName;
@@ -23,12 +25,6 @@ use super::namespaces::{self, Namespaces};
 use super::plan::FaultPlan;
 use super::proxy::{self, Proxy};
 use super::shape::LinkShape;
-use crate::child::{self, AtExit};
-use crate::endpoint;
-use crate::error::LaunchError;
-use crate::file::LaunchFile;
-use crate::link::ProcessLink;
-use crate::options::RunOptions;
 use config::Speed;
 use scenario::Scenario;
 
