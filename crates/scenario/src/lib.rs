@@ -5,7 +5,6 @@ pub mod change;
 mod checked;
 pub mod fault;
 pub mod files;
-mod floor_plan;
 pub mod guests;
 mod lateness;
 mod layers;
@@ -18,7 +17,6 @@ pub mod roster;
 mod sensing;
 mod setup;
 mod sites;
-mod tracks;
 
 use std::path::Path;
 

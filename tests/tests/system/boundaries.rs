@@ -35,9 +35,11 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("terminal", &["protocol"]),
     ("robot", &["bus", "lockstep", "protocol", "terminal"]),
     ("robots", &["robot", "affect", "lockstep", "protocol"]),
+    ("import", &["world", "config", "recording"]),
     (
         "scenario",
         &[
+            "import",
             "world",
             "radio",
             "config",

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use config::units::{Angle, Length, Speed, Time};
 use config::{FileError, Source, shipped};
+use import::tracks::{self, MAX_RATE_HZ, TrackFormat, TrackPlacement, TrackSet, is_rate};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 use world::{CrowdModel, Field, Point};
@@ -21,7 +22,6 @@ use crate::checked::check_guests;
 use crate::files::RECORDING;
 use crate::guests::{Faces, GuestMotion, GuestRules, ModeledGuests, RecordedGuests, Requests};
 use crate::network::ticks;
-use crate::tracks::{self, MAX_RATE_HZ, TrackFormat, TrackPlacement, TrackSet, is_rate};
 
 /// Speed of strolling guests [I]. The paper names the distributions but no numbers.
 const SPEED: Range<Speed> = Range {

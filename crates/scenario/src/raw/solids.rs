@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 
 use config::units::Length;
 use config::{FileError, Source};
+use import::floor_plan::{self, Placement};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 use world::{BODY_MIN_M, SIDE_MAX_M, Shape, WALLS_MAX, Wall};
 
 use super::super::checked::{Obstacle, to_wire, to_world};
-use super::super::floor_plan::{self, Placement};
 use super::place::{Lengths, Spacing, StartPlace, lengths, point};
 use super::unplaced::unplaced;
 

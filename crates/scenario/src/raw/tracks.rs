@@ -4,12 +4,12 @@ use std::ops::Range as Span;
 
 use config::units::Time;
 use config::{FileError, Source};
+use import::tracks::{self, TrackSet};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
 use super::unplaced::unplaced;
 use crate::guests::RecordedGuests;
-use crate::tracks::{self, TrackSet};
 
 /// The table.
 #[derive(Debug, Deserialize, Serialize)]

@@ -14,14 +14,12 @@ use serde::{Deserialize, Serialize};
 use world::{Point, Track, TrackPoint};
 use xxhash_rust::xxh3::xxh3_128;
 
-use crate::files::RECORDING;
-
 /// Most people of a record.
 const MAX_PEOPLE: usize = 20_000;
 /// Most observations of a record.
 const MAX_OBSERVATIONS: usize = 1_000_000;
 /// Most frames in a second: times are whole milliseconds.
-pub(crate) const MAX_RATE_HZ: f64 = 1000.0;
+pub const MAX_RATE_HZ: f64 = 1000.0;
 /// Longest record, milliseconds: a hundred days.
 const MAX_LENGTH_MS: u64 = 8_640_000_000;
 /// Farthest from the origin, millimeters: the longest side of a field.
@@ -30,7 +28,7 @@ const MAX_MM: f64 = 1e9;
 /// How the observations of a file are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub(crate) enum TrackFormat {
+pub enum TrackFormat {
     /// `frame id x y` (UCY).
     Ucy,
     /// Eight columns: frame, id, x, height, y, and velocities (ETH).
@@ -41,25 +39,26 @@ pub(crate) enum TrackFormat {
 
 /// How a record lies in a hall.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct TrackPlacement {
+pub struct TrackPlacement {
     /// Format of the file; without it, what its first lines look like.
-    pub(crate) format: Option<TrackFormat>,
+    pub format: Option<TrackFormat>,
     /// Length of a unit of the file, meters; without it, what the file says itself.
-    pub(crate) unit_m: Option<f64>,
+    pub unit_m: Option<f64>,
     /// Turn about the origin, counter-clockwise, rad, before the offset.
-    pub(crate) rotate_rad: f64,
+    pub rotate_rad: f64,
     /// Where the origin of the file is, meters.
-    pub(crate) offset: Point,
+    pub offset: Point,
     /// Frames per second; without it, what the file says itself.
-    pub(crate) rate_hz: Option<f64>,
+    pub rate_hz: Option<f64>,
 }
 
 /// Where people were.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct TrackSet {
-    pub(crate) tracks: Vec<Track>,
+pub struct TrackSet {
+    /// One for each person.
+    pub tracks: Vec<Track>,
     /// From the first frame to the one after the last.
-    pub(crate) length_ms: NonZeroU64,
+    pub length_ms: NonZeroU64,
 }
 
 /// Places in whole millimeters by whole milliseconds, of one person.
@@ -69,7 +68,7 @@ type Observations = BTreeMap<u64, [i64; 2]>;
 ///
 /// # Errors
 /// [`FileError`] with line and caret.
-pub(crate) fn read(source: &Source, placement: &TrackPlacement) -> Result<TrackSet, FileError> {
+pub fn read(source: &Source, placement: &TrackPlacement) -> Result<TrackSet, FileError> {
     let refuse = |refused: RefusedText| refused.in_file(source);
     let head = TrackHead::of(&source.text, placement).map_err(refuse)?;
 
@@ -154,8 +153,8 @@ fn track_set(people: Vec<Observations>, length_ms: u64) -> Result<TrackSet, Stri
 ///
 /// # Errors
 /// In words, if the run has no recording, or none that can be read.
-pub(crate) fn read_run(folder: &Path, placement: &TrackPlacement) -> Result<TrackSet, String> {
-    let path = folder.join(RECORDING);
+pub fn read_run(folder: &Path, placement: &TrackPlacement) -> Result<TrackSet, String> {
+    let path = folder.join(recording::FILE);
     let recording = Recording::open(&path).map_err(|error| error.to_string())?;
     let tick_s = recording.header().tick_s;
     let time_ms = |tick: u64| (tick as f64 * tick_s * 1000.0).round() as u64;
@@ -365,7 +364,8 @@ fn stated_rate_hz(comment: &str, text: &str) -> Result<f64, RefusedText> {
 }
 
 /// Whether there can be so many frames in a second.
-pub(crate) fn is_rate(rate_hz: f64) -> bool {
+#[must_use]
+pub fn is_rate(rate_hz: f64) -> bool {
     rate_hz > 0.0 && rate_hz <= MAX_RATE_HZ
 }
 
@@ -402,7 +402,8 @@ fn whole(column: &str, text: &str) -> Result<u64, RefusedText> {
 }
 
 /// The text that a record has of a track: time in ms and place in mm of the first waypoint, then the differences of the others.
-pub(crate) fn to_text(track: &Track) -> String {
+#[must_use]
+pub fn to_text(track: &Track) -> String {
     let mut text = String::new();
     let mut before = [0; 3];
     for waypoint in track.points() {
@@ -458,7 +459,7 @@ fn of_text(text: &str) -> Result<Observations, String> {
 ///
 /// # Errors
 /// The number of the text that cannot be used, if it is one, and why.
-pub(crate) fn of_texts<'a>(
+pub fn of_texts<'a>(
     texts: impl Iterator<Item = &'a str>,
     length_ms: u64,
 ) -> Result<TrackSet, (Option<usize>, String)> {
@@ -480,7 +481,8 @@ pub(crate) fn of_texts<'a>(
 }
 
 /// Digest of tracks: XXH3-128 of their texts, and of the length of the record.
-pub(crate) fn digest(texts: &[&str], length_ms: u64) -> String {
+#[must_use]
+pub fn digest(texts: &[&str], length_ms: u64) -> String {
     let content = format!("{length_ms}\n{}", texts.join("\n"));
     format!("{:032x}", xxh3_128(content.as_bytes()))
 }

@@ -10,7 +10,7 @@ use roxmltree::{Document, Node, ParsingOptions};
 use world::{BODY_MIN_M, Point, Shape, WALLS_MAX, Wall};
 
 /// Longest drawing, bytes.
-pub(crate) const MAX_BYTES: usize = 4 << 20;
+pub const MAX_BYTES: usize = 4 << 20;
 /// Most nodes of a drawing: elements, texts, comments.
 const MAX_NODES: u32 = 200_000;
 /// Deepest nesting of groups.
@@ -18,24 +18,27 @@ const MAX_DEPTH: usize = 64;
 
 /// What a drawing has on it, in meters of the hall.
 #[derive(Debug, Default, PartialEq)]
-pub(crate) struct FloorPlan {
+pub struct FloorPlan {
     /// Filled rectangles, and circles.
-    pub(crate) obstacles: Vec<(Point, Shape)>,
+    pub obstacles: Vec<(Point, Shape)>,
     /// Lines, and the outlines of everything else.
-    pub(crate) walls: Vec<Wall>,
+    pub walls: Vec<Wall>,
 }
 
 /// How a drawing lies in a hall.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Placement {
+pub struct Placement {
     /// Length of a unit of the drawing, meters; without it, what the drawing says itself.
-    pub(crate) scale_m: Option<f64>,
+    pub scale_m: Option<f64>,
     /// Where its lower left corner is, meters.
-    pub(crate) at: Point,
+    pub at: Point,
 }
 
 /// Reads a drawing.
-pub(crate) fn read(source: &Source, placement: Placement) -> Result<FloorPlan, FileError> {
+///
+/// # Errors
+/// [`FileError`] with line and caret.
+pub fn read(source: &Source, placement: Placement) -> Result<FloorPlan, FileError> {
     if source.text.len() > MAX_BYTES {
         let reason = format!("a floor plan of more than {MAX_BYTES} bytes");
         return Err(FileError::at(source, None, &reason));
