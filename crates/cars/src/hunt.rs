@@ -7,11 +7,11 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use causes::WhyBudget;
 use clap::Args;
 use config::units::Time;
 use config::{Changes, Override};
 use experiments::shell;
-use experiments::why::WhyBudget;
 use experiments::{ByClass, Robots};
 use hunts::{
     CommandFate, Coverage, FaultClass, Feature, Finding, HuntBudget, HuntOptions, HuntProgress,

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use causes::{WhyAnswer, WhyBudget, WhyOptions, why as find_out};
 use clap::Args;
-use experiments::why::{WhyAnswer, WhyBudget, WhyOptions, why as find_out};
 use indicatif::{ProgressBar, ProgressStyle};
 use lab::LabError;
 use lab::folder::{find, recorded_epoch, run_name};

@@ -1,7 +1,7 @@
 //! Work with many runs. An experiment is one scenario in several arms under several conditions over many seeds: a file
 //! ([`Experiment::load`]), of which some ship with the project. It is planned ([`Plan`]) into units, which are played on one
 //! machine or on many ([`engine`], [`submit`]) and kept in a folder ([`Store`]), whose results are read from there
-//! ([`Results`]); [`mod@why`] finds what decided a run. Commands that can be typed are written by [`shell`].
+//! ([`Results`]). Commands that can be typed are written by [`shell`].
 
 mod case;
 mod condition;
@@ -26,7 +26,6 @@ mod store;
 pub mod submit;
 mod unheard;
 mod unit;
-pub mod why;
 
 pub use observe::Measure;
 

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use causes::{WhyOptions, why as find_out};
 use config::Changes;
-use experiments::why::{WhyOptions, why as find_out};
 use lab::folder::{recorded_epoch, run_name};
 use pyo3::prelude::*;
 use record::RunFolder;

@@ -1,4 +1,4 @@
-//! What decided a run: the probability of its outcome after each tick, from forks that are re-seeded there, and the events at which
+//! The causes of what happened in a run, for `cars why`: the probability of its outcome after each tick, from forks that are re-seeded there, and the events at which
 //! that probability jumps. A jump is confirmed by forks in which exactly that event does not happen.
 
 mod answer;

@@ -10,6 +10,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use environment::medium::{ForcedVerdict, NetworkVerdict};
+use experiments::{ProgramVersion, parallel};
 use export::draft;
 use lab::LabError;
 use lab::branch::{Branch, Trunk};
@@ -28,8 +29,6 @@ use super::candidates;
 use super::plan::{Counterfactual, ForkOutcome, ForkPlan};
 use super::question::AskedRun;
 use super::search::{Forks, SearchedRun, search};
-use crate::parallel;
-use crate::plan::ProgramVersion;
 
 /// Most copies of the run at ticks of it that are kept.
 const MAX_RUNGS: usize = 64;

@@ -13,8 +13,8 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use causes::{WhyAnswer, WhyOptions, why};
 use config::Source;
-use experiments::why::{WhyAnswer, WhyOptions, why};
 use lab::LabError;
 use lab::folder::recorded_epoch;
 use lab::run::{RobotMaker, execute_with};
