@@ -766,6 +766,84 @@ fn cycles_of_imports_are_found() {
     assert_eq!(found, ["crate", "crate::c"]);
 }
 
+/// Most lines of code of a crate: one that is larger is several things.
+const MAX_CODE_LINES: usize = 8000;
+/// Fewest lines of code of a crate: one that is smaller is a module.
+const MIN_CODE_LINES: usize = 300;
+
+/// Number of lines of a file without the module of tests at its end.
+fn code_lines(text: &str) -> usize {
+    let mut lines = 0;
+    let mut is_for_tests = false;
+    for line in text.lines() {
+        let begins_tests = is_for_tests && line.starts_with("mod ") && line.ends_with('{');
+        if begins_tests {
+            return lines - 1;
+        }
+        is_for_tests = line == "#[cfg(test)]";
+        lines += 1;
+    }
+    lines
+}
+
+/// Number of lines of a crate's code, without its tests.
+fn crate_lines(folder: &Path) -> usize {
+    let source = folder.join("src");
+    let mut files = Vec::new();
+    sources(&source, &mut files);
+
+    let is_of_tests = |file: &PathBuf| {
+        let within = file.strip_prefix(&source).unwrap();
+        within
+            .iter()
+            .any(|name| name == "tests" || name == "tests.rs")
+    };
+    files.retain(|file| !is_of_tests(file));
+    files
+        .iter()
+        .map(|file| code_lines(&std::fs::read_to_string(file).unwrap()))
+        .sum()
+}
+
+#[test]
+fn crates_are_neither_too_large_nor_too_small() {
+    let mut wrong = Vec::new();
+    let mut crates = 0;
+    for folder in std::fs::read_dir(system_tests::root().join("crates")).unwrap() {
+        let folder = folder.unwrap().path();
+        let name = folder.file_name().unwrap().to_str().unwrap();
+        // It has dependencies only.
+        if name == "workspace-hack" {
+            continue;
+        }
+        let lines = crate_lines(&folder);
+        if !(MIN_CODE_LINES..=MAX_CODE_LINES).contains(&lines) {
+            wrong.push(format!("{name} has {lines} lines of code"));
+        }
+        crates += 1;
+    }
+
+    let why = format!("a crate has {MIN_CODE_LINES} to {MAX_CODE_LINES} lines without its tests");
+    assert!(wrong.is_empty(), "{why}: {}", wrong.join(", "));
+    assert!(crates > 20, "{crates}");
+}
+
+#[test]
+fn lines_of_tests_are_not_counted() {
+    let code = "//! A.\n\n#[cfg(test)]\nmod model;\n\nfn a() {}\n";
+    assert_eq!(code_lines(code), 6);
+    let tested = format!("{code}\n#[cfg(test)]\nmod tests {{\n    fn b() {{}}\n}}\n");
+    assert_eq!(code_lines(&tested), 7);
+
+    let folder = tempfile::tempdir().unwrap();
+    let source = folder.path().join("src");
+    std::fs::create_dir_all(source.join("a/tests")).unwrap();
+    for file in ["lib.rs", "a/b.rs", "a/tests.rs", "a/tests/c.rs"] {
+        std::fs::write(source.join(file), &tested).unwrap();
+    }
+    assert_eq!(crate_lines(folder.path()), 14);
+}
+
 /// A build elsewhere, of a robot of one's own or by `cargo install`, does not read `.cargo/config.toml`: what the product needs
 /// is not there.
 #[test]
