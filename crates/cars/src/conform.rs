@@ -49,7 +49,8 @@ pub(crate) struct ConformArgs {
 
 fn parse_rule(name: &str) -> Result<ProtocolRule, String> {
     ProtocolRule::named(name).ok_or_else(|| {
-        let names = conform::RULES.map(|rule| rule.name).join(", ");
+        let names: Vec<&str> = conform::rules().map(|rule| rule.name).collect();
+        let names = names.join(", ");
         format!("there is no such rule; the rules are {names}")
     })
 }

@@ -5,8 +5,9 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::Args;
+use conform::StdioLine;
 use launch::child::{AtExit, become_program};
-use launch::exec::{ProgramEnd, exec as run_program};
+use launch::exec::{FaultListener, ProgramEnd, ProgramFault, ProgramNotices, exec as run_program};
 use robot::RobotArgs;
 
 use crate::errors::{Result, refusal};
@@ -25,6 +26,10 @@ pub(crate) struct ExecArgs {
         value_parser = seconds
     )]
     flush_notice: Duration,
+    /// Print what the program does against the rules of docs/protocol.md that `cars exec` sees and others cannot, on standard
+    /// output, one JSON object a line. `cars conform` asks for it.
+    #[arg(long, env = conform::STDIO_VARIABLE)]
+    report_faults: bool,
     /// The program and its arguments.
     #[arg(last = true, required = true, value_name = "PROGRAM")]
     command: Vec<OsString>,
@@ -54,9 +59,12 @@ pub(crate) fn exec(args: &ExecArgs) -> Result<ExitCode> {
         ));
     };
 
-    let notice = conform::unflushed(&args.command);
-    let options = args.robot.options();
-    match run_program(name, options, &args.command, &notice, args.flush_notice)? {
+    let notices = ProgramNotices {
+        silence: conform::unflushed(&args.command),
+        after: args.flush_notice,
+        on_fault: args.report_faults.then(report_faults).transpose()?,
+    };
+    match run_program(name, args.robot.options(), &args.command, notices)? {
         ProgramEnd::WithRun => Ok(ExitCode::SUCCESS),
         ProgramEnd::BySignal(code) => Ok(ExitCode::from(code)),
         ProgramEnd::Failed(reason) => {
@@ -64,6 +72,23 @@ pub(crate) fn exec(args: &ExecArgs) -> Result<ExitCode> {
             Ok(ExitCode::FAILURE)
         }
     }
+}
+
+/// Prints which rules are observed, and then the faults of the program.
+fn report_faults() -> Result<FaultListener> {
+    terminal::data(StdioLine::observed().line())?;
+    Ok(Box::new(|fault| {
+        let (rule, came) = match fault {
+            ProgramFault::UnknownFields(came) => (conform::STDIO_FIELDS, came),
+            ProgramFault::LogLimits(came) => (conform::STDIO_LOG, came),
+            ProgramFault::End(came) => (conform::STDIO_END, came),
+        };
+        if let Err(error) = terminal::data(StdioLine::fault(rule, came).line()) {
+            terminal::note(format_args!(
+                "a fault cannot be reported ({error}): {rule}: {came}"
+            ));
+        }
+    }))
 }
 
 fn seconds(text: &str) -> Result<Duration, String> {

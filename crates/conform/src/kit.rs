@@ -13,6 +13,7 @@ use protocol::{PROTOCOL_VERSION, RobotName, RunName};
 
 use crate::process;
 use crate::setting::{CheckSetting, RosterRobot};
+use crate::stdio::StdioReports;
 use crate::transcript::Transcript;
 
 /// Why nothing could be checked.
@@ -35,6 +36,8 @@ pub(crate) struct Kit {
     pub(crate) command: Command,
     pub(crate) setting: CheckSetting,
     runs: AtomicUsize,
+    /// What `cars exec` has reported of the robot's processes.
+    pub(crate) stdio: StdioReports,
     learned: OnceLock<Learned>,
     /// The usual ticks, without any disturbance.
     pub(crate) usual: OnceLock<Transcript>,
@@ -68,6 +71,7 @@ impl Kit {
             command: own,
             setting: setting.clone(),
             runs: AtomicUsize::new(0),
+            stdio: StdioReports::default(),
             learned: OnceLock::new(),
             usual: OnceLock::new(),
             is_deterministic: OnceLock::new(),

@@ -31,6 +31,7 @@ mod rules;
 mod script;
 mod seen;
 mod setting;
+mod stdio;
 mod transcript;
 mod wire;
 
@@ -38,5 +39,8 @@ pub use checks::check;
 pub use flushing::unflushed;
 pub use kit::CannotRun;
 pub use report::{AnswerTimes, CheckReport, RuleFailure, RuleOutcome, RuleVerdict};
-pub use rules::{PAGE, ProtocolRule, RULES};
+pub use rules::{
+    PAGE, ProtocolRule, RULES, STDIO_END, STDIO_FIELDS, STDIO_LOG, STDIO_RULES, rules,
+};
 pub use setting::{CheckSetting, PlayedLayer, RosterRobot};
+pub use stdio::{STDIO_VARIABLE, StdioLine};

@@ -13,6 +13,8 @@ use crate::load::ProcessGroup;
 
 /// What is shown of a program's output, bytes from its end.
 const TAIL_BYTES: u64 = 1500;
+/// What is read of the beginning of a program's standard output, bytes: more than `cars exec` ever reports.
+const HEAD_BYTES: u64 = 1 << 16;
 
 /// The same command again.
 pub(crate) fn copy(command: &Command) -> Command {
@@ -93,6 +95,11 @@ impl RobotProcess {
         self.group.starved()
     }
 
+    /// The beginning of what it wrote to its standard output.
+    pub(crate) fn output(&self) -> String {
+        String::from_utf8_lossy(&first_bytes(&self.output).unwrap_or_default()).into_owned()
+    }
+
     /// How much it wrote to its standard error, bytes.
     pub(crate) fn error_bytes(&self) -> u64 {
         self.errors.metadata().map_or(0, |metadata| metadata.len())
@@ -126,6 +133,15 @@ fn tail(file: &File) -> String {
     String::from_utf8_lossy(&last_bytes(file).unwrap_or_default())
         .trim()
         .to_owned()
+}
+
+/// Reads in place, at most [`HEAD_BYTES`].
+fn first_bytes(file: &File) -> std::io::Result<Vec<u8>> {
+    let length = file.metadata()?.len().min(HEAD_BYTES);
+    let mut bytes = vec![0; usize::try_from(length).map_err(std::io::Error::other)?];
+    file.read_exact_at(&mut bytes, 0)?;
+
+    Ok(bytes)
 }
 
 /// Reads in place: the file's cursor belongs to the writer.

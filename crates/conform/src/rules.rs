@@ -16,7 +16,7 @@ impl ProtocolRule {
     /// The rule called `name`.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
-        RULES.iter().copied().find(|rule| rule.name == name)
+        rules().find(|rule| rule.name == name)
     }
 
     /// Where the page explains it.
@@ -30,7 +30,7 @@ const fn rule(name: &'static str, section: &'static str) -> ProtocolRule {
     ProtocolRule { name, section }
 }
 
-/// All rules, in the order of the page.
+/// The rules of robots that put and get over zenoh, in the order of the page.
 pub const RULES: [ProtocolRule; 36] = [
     rule("join.request", "joining"),
     rule("join.ready-last", "joining"),
@@ -69,3 +69,22 @@ pub const RULES: [ProtocolRule; 36] = [
     rule("number.integers", "numbers-and-chance"),
     rule("wire.qos", "words-and-transport"),
 ];
+
+/// Rule: lines have known fields only.
+pub const STDIO_FIELDS: &str = "stdio.fields";
+/// Rule: the log is within its limits.
+pub const STDIO_LOG: &str = "stdio.log";
+/// Rule: the program exits with status 0, in time.
+pub const STDIO_END: &str = "stdio.end";
+
+/// The rules of programs that `cars exec` runs. Over zenoh nothing shows whether they hold: `cars exec` reports it.
+pub const STDIO_RULES: [ProtocolRule; 3] = [
+    rule(STDIO_FIELDS, "robots-over-stdin-and-stdout"),
+    rule(STDIO_LOG, "robots-over-stdin-and-stdout"),
+    rule(STDIO_END, "robots-over-stdin-and-stdout"),
+];
+
+/// All rules.
+pub fn rules() -> impl Iterator<Item = ProtocolRule> {
+    RULES.into_iter().chain(STDIO_RULES)
+}

@@ -1,6 +1,7 @@
 //! Runs any program as a robot. This process implements the protocol and exchanges JSON Lines with the program over its
 //! standard input and output (`docs/protocol.md`, "Robots over stdin and stdout").
 
+mod faults;
 mod line;
 mod program;
 mod proxy;
@@ -8,7 +9,7 @@ mod remarks;
 
 use std::ffi::OsString;
 use std::sync::mpsc::{Receiver, sync_channel};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
 use nix::sys::signal::{SigSet, Signal};
@@ -17,9 +18,11 @@ use robot::{Host, HostError, HostOptions, Stopper};
 
 use crate::ending::code_of;
 use crate::error::LaunchError;
+use faults::Faults;
+pub use faults::{FaultListener, ProgramFault};
 use line::EndReason;
 use program::{ASKING, END_PATIENCE, Program, start_thread};
-use proxy::ProgramRobot;
+use proxy::{ProgramRobot, SilenceNotice};
 use remarks::Remarks;
 
 /// How long to wait for a signal that has killed the program: a signal to the process group reaches this process, too.
@@ -36,10 +39,19 @@ pub enum ProgramEnd {
     Failed(String),
 }
 
+/// What people and programs are told about a program while it runs.
+pub struct ProgramNotices {
+    /// What to report, once, when the program does not answer for `after`.
+    pub silence: String,
+    /// How long to wait for an answer before that.
+    pub after: Duration,
+    /// Receives what the program does against the rules of the page, beside the log of the run and standard error.
+    pub on_fault: Option<FaultListener>,
+}
+
 /// Runs a program as the robot `name` until the run or the program ends.
 ///
-/// It must be called before this process has other threads, because it blocks the signals to end. `notice` is what to
-/// report, once, when the program does not answer for `notice_after`.
+/// It must be called before this process has other threads, because it blocks the signals to end.
 ///
 /// # Errors
 /// If the program cannot be started.
@@ -47,8 +59,7 @@ pub fn exec(
     name: &RobotName,
     options: HostOptions,
     command: &[OsString],
-    notice: &str,
-    notice_after: Duration,
+    notices: ProgramNotices,
 ) -> Result<ProgramEnd, LaunchError> {
     // All later threads inherit the mask, so only the thread in `listen` receives these signals. So does the program, until
     // `cars child` empties it.
@@ -62,12 +73,17 @@ pub fn exec(
     // From here on a signal ends the program as well. Until then it waits: it is blocked.
     let asked = listen(asking, &program, stopper.clone())?;
     let remarks = Remarks::default();
+    // Shared: the robot reports faults of lines, and after it has left the run, this thread that of the end.
+    let faults = Arc::new(Mutex::new(Faults::new(notices.on_fault)));
     let proxy = Box::new(ProgramRobot::new(
         program.clone(),
         events,
-        format!("{name}: {notice}"),
-        notice_after,
+        SilenceNotice {
+            text: format!("{name}: {}", notices.silence),
+            after: notices.after,
+        },
         remarks.clone(),
+        faults.clone(),
     ));
     let outcome = Host::connect(vec![(name.clone(), proxy)], options).and_then(|host| {
         let stopper = stopper.get_or_init(|| host.stopper());
@@ -94,6 +110,10 @@ pub fn exec(
         Ok(end) => {
             // The run is right without it, so the robot has not failed.
             if let Some(remark) = program.end(end.into()) {
+                faults
+                    .lock()
+                    .unwrap_or_else(PoisonError::into_inner)
+                    .end(&remark);
                 terminal::note(format_args!("{name}: {remark}"));
             }
             Ok(ProgramEnd::WithRun)

@@ -263,6 +263,12 @@ impl<'a> Cars<'a> {
         }
     }
 
+    /// What was left out of the log in this epoch so far because of its limits, in words; `None` if nothing was.
+    #[must_use]
+    pub fn log_warning(&self) -> Option<String> {
+        self.left_out.warning()
+    }
+
     /// Writes a warning about the robot to the log of the run, also where its own lines have used up their limit. For libraries that
     /// run robots; they bound how many there are.
     pub fn warn(&mut self, warning: &str) {

@@ -9,6 +9,7 @@ mod news;
 mod queries;
 mod repeated;
 mod returns;
+mod stdio;
 mod ticks;
 mod tolerance;
 mod waiting;
@@ -23,7 +24,7 @@ use std::thread::Builder;
 use crate::findings::{Findings, VerdictsByRule};
 use crate::kit::{CannotRun, Kit};
 use crate::report::{AnswerTimes, CheckReport, RuleFailure, RuleOutcome, RuleVerdict};
-use crate::rules::{ProtocolRule, RULES};
+use crate::rules::{self, ProtocolRule};
 use crate::setting::CheckSetting;
 
 /// A check, with its rules; the first one gets the failure that breaks it off.
@@ -94,8 +95,13 @@ pub fn check(
     let (mut verdicts, answers) = all(&kit, rules)?;
 
     let mut outcomes = Vec::new();
-    for rule in RULES {
-        if !rules.is_empty() && !rules.contains(&rule) {
+    for rule in rules::rules() {
+        let is_shown = if rules.is_empty() {
+            kit.stdio.is_program() || !rules::STDIO_RULES.contains(&rule)
+        } else {
+            rules.contains(&rule)
+        };
+        if !is_shown {
             continue;
         }
         let verdict = verdicts.remove(rule.name);
@@ -126,7 +132,8 @@ fn all(
     let (broken, times) = ticks::usual(kit, &mut findings)?;
     if let Some(rule) = broken {
         let reason = format!("the robot does not get through the usual ticks, see {rule}");
-        for rule in RULES {
+        stdio::judge(kit, &mut findings);
+        for rule in rules::rules() {
             findings.skip(rule.name, &reason);
         }
         return Ok((findings.0, times));
@@ -137,6 +144,7 @@ fn all(
 
     let due: Vec<&Check> = CHECKS
         .iter()
+        .chain(&stdio::CHECKS)
         .filter(|check| {
             wanted.is_empty() || wanted.iter().any(|rule| check.rules.contains(&rule.name))
         })
@@ -163,7 +171,8 @@ fn all(
         work();
     });
 
-    let findings = all.into_inner().unwrap_or_else(PoisonError::into_inner);
+    let mut findings = all.into_inner().unwrap_or_else(PoisonError::into_inner);
+    stdio::judge(kit, &mut findings);
     Ok((findings.0, times))
 }
 
@@ -175,14 +184,16 @@ mod tests {
     fn each_rule_has_a_check() {
         let mut checked: Vec<&str> = CHECKS
             .iter()
+            .chain(&stdio::CHECKS)
             .flat_map(|check| check.rules)
             .chain(&ticks::USUAL)
+            .chain(&stdio::ALWAYS)
             .copied()
             .collect();
         checked.sort_unstable();
         checked.dedup();
 
-        let mut rules: Vec<&str> = RULES.iter().map(|rule| rule.name).collect();
+        let mut rules: Vec<&str> = rules::rules().map(|rule| rule.name).collect();
         rules.sort_unstable();
         assert_eq!(checked, rules);
     }

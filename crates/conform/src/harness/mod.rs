@@ -26,6 +26,7 @@ use crate::patience::{Limit, PATIENCE};
 use crate::process::RobotProcess;
 use crate::report::RuleFailure;
 use crate::seen::{ReportedCommand, Seen};
+use crate::stdio::STDIO_VARIABLE;
 use crate::wire::{Joining, Wire, WireEvent};
 
 /// How often a wait looks whether the process still runs.
@@ -139,6 +140,7 @@ impl<'k> Harness<'k> {
             ("CARS_CONNECT", kit.endpoint.clone()),
             ("CARS_PATIENCE_S", options.patience_s.to_string()),
             ("CARS_GONE_PATIENCE_S", options.gone_patience_s.to_string()),
+            (STDIO_VARIABLE, "true".to_owned()),
         ];
         let process = RobotProcess::start(&kit.command, &environment)
             .map_err(|error| RuleFailure::new("the command can be started", error.to_string()))?;
@@ -475,5 +477,12 @@ impl<'k> Harness<'k> {
             self.pump(LOOK_AGAIN);
         }
         Ok(())
+    }
+}
+
+impl Drop for Harness<'_> {
+    fn drop(&mut self) {
+        // Whatever the check was about: each line of a program counts.
+        self.kit.stdio.take(&self.process.output());
     }
 }

@@ -1,7 +1,7 @@
 //! The robot whose decisions are made by a program: one exchange of lines in each tick.
 
-use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use protocol::codec::MAX_MESSAGE_BYTES;
@@ -10,6 +10,7 @@ use protocol::random::unit;
 use robot::{Action, BadParameters, CallError, Cars, ReceivedCommand, Robot};
 use serde_json::Value;
 
+use super::faults::Faults;
 use super::line::{
     Answered, Arrived, DoneLine, FromProgram, QueryLine, ReadLine, ToProgram, UnknownFields, quote,
 };
@@ -23,16 +24,22 @@ const MAX_COMMANDS: usize = protocol::messages::MAX_ENTRIES;
 /// Most bytes of its lines that become part of the report. The rest of a message is for the other fields of the report.
 const MAX_REPORTED: usize = MAX_MESSAGE_BYTES - (1 << 17);
 
+/// What to report, once, when the program does not answer for a time.
+pub(super) struct SilenceNotice {
+    pub(super) text: String,
+    pub(super) after: Duration,
+}
+
 /// A robot whose program is another process.
 pub(super) struct ProgramRobot {
     program: Arc<Program>,
     events: Receiver<ProgramEvent>,
-    /// What to report when the program does not answer for `notice_after`; `None` once it has been reported.
-    notice: Option<String>,
-    notice_after: Duration,
+    /// `None` once it has been reported.
+    notice: Option<SilenceNotice>,
     /// Whether the line `init` was the last one that the program was sent, so that it may be answering it.
     is_initializing: bool,
     remarks: Remarks,
+    faults: Arc<Mutex<Faults>>,
     /// The last line `done`.
     done: DoneLine,
     panel: Panel,
@@ -42,17 +49,17 @@ impl ProgramRobot {
     pub(super) fn new(
         program: Arc<Program>,
         events: Receiver<ProgramEvent>,
-        notice: String,
-        notice_after: Duration,
+        notice: SilenceNotice,
         remarks: Remarks,
+        faults: Arc<Mutex<Faults>>,
     ) -> Self {
         Self {
             program,
             events,
             notice: Some(notice),
-            notice_after,
             is_initializing: false,
             remarks,
+            faults,
             done: DoneLine::default(),
             panel: Panel::default(),
         }
@@ -110,6 +117,7 @@ impl ProgramRobot {
                 ));
             }
             if let Some(done) = self.carry_out(cars, message)? {
+                self.check_log(cars);
                 return Ok(done);
             }
         }
@@ -120,18 +128,34 @@ impl ProgramRobot {
 
     /// Explains the first unknown fields of a type of lines in the log of the run.
     fn remark(&self, cars: &mut Cars<'_>, unknown: &UnknownFields) {
+        let tick = cars.tick();
+        self.faults()
+            .unknown_fields(|| format!("{unknown}, in tick {tick}"));
         if self.remarks.add(unknown.kind) {
             cars.warn(&unknown.to_string());
         }
     }
 
+    /// Reports that the program has written more to the log than is allowed.
+    fn check_log(&self, cars: &Cars<'_>) {
+        if let Some(warning) = cars.log_warning() {
+            self.faults()
+                .log_limits(|| format!("{warning}, in tick {}", cars.tick()));
+        }
+    }
+
+    fn faults(&self) -> std::sync::MutexGuard<'_, Faults> {
+        // A fault is reported in one step, so a panic leaves what was reported.
+        self.faults.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// Waits for the next event of the program. The first long wait is reported.
     fn next(&mut self) -> ProgramEvent {
         if let Some(notice) = &self.notice {
-            match self.events.recv_timeout(self.notice_after) {
+            match self.events.recv_timeout(notice.after) {
                 Ok(event) => return event,
                 Err(RecvTimeoutError::Disconnected) => return ProgramEvent::Ended,
-                Err(RecvTimeoutError::Timeout) => terminal::note(notice),
+                Err(RecvTimeoutError::Timeout) => terminal::note(&notice.text),
             }
             self.notice = None;
         }
