@@ -79,6 +79,9 @@ const CHECKS: [Check; 27] = [
     rules(&["determinism.seed"], epochs::streams),
 ];
 
+/// Checks of programs that `cars exec` runs.
+const STDIO_CHECKS: [Check; 1] = [rules(&[rules::STDIO_END], stdio::end)];
+
 /// Processes of the robot that run at the same time.
 const WORKERS: usize = 4;
 
@@ -144,7 +147,7 @@ fn all(
 
     let due: Vec<&Check> = CHECKS
         .iter()
-        .chain(&stdio::CHECKS)
+        .chain(&STDIO_CHECKS)
         .filter(|check| {
             wanted.is_empty() || wanted.iter().any(|rule| check.rules.contains(&rule.name))
         })
@@ -184,7 +187,7 @@ mod tests {
     fn each_rule_has_a_check() {
         let mut checked: Vec<&str> = CHECKS
             .iter()
-            .chain(&stdio::CHECKS)
+            .chain(&STDIO_CHECKS)
             .flat_map(|check| check.rules)
             .chain(&ticks::USUAL)
             .chain(&stdio::ALWAYS)

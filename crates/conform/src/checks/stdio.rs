@@ -2,7 +2,6 @@
 
 use protocol::messages::End;
 
-use super::{Check, rules};
 use crate::findings::Findings;
 use crate::harness::HarnessOptions;
 use crate::kit::Kit;
@@ -11,9 +10,6 @@ use crate::report::RuleFailure;
 use crate::rules::{STDIO_END, STDIO_FIELDS, STDIO_LOG, STDIO_RULES};
 use crate::script::{PlayScript, Straight, play, with_robot};
 use crate::stdio::fault_in;
-
-/// Checks of such programs alone.
-pub(super) const CHECKS: [Check; 1] = [rules(&[STDIO_END], end)];
 
 /// Rules that are about each line of such a program, whatever is checked.
 pub(super) const ALWAYS: [&str; 2] = [STDIO_FIELDS, STDIO_LOG];
@@ -34,7 +30,7 @@ pub(super) fn judge(kit: &Kit, findings: &mut Findings) {
 }
 
 /// The program exits as it should, however the run ends.
-fn end(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
+pub(super) fn end(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
     if !kit.stdio.is_program() {
         findings.skip(STDIO_END, NOT_A_PROGRAM);
         return Ok(());
