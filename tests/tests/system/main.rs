@@ -67,3 +67,4 @@ mod wall_clock;
 mod why;
 mod wire;
 mod worlds;
+mod zenoh_pico;

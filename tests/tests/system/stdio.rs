@@ -277,6 +277,48 @@ fn she_starts_over_and_takes_over_in_javascript_as_in_rust() {
     }
 }
 
+/// The command of Walker in Python.
+pub(crate) fn in_python() -> String {
+    format!(
+        r#"["python3", {:?}]"#,
+        root().join("sdk/python/examples/walker.py")
+    )
+}
+
+/// The record of a run in which a program is Walker: guests are in its way, and it is told something.
+pub(crate) fn walk(lab: &Lab, run: &str, command: &str) -> Vec<u8> {
+    lab.write(
+        "walk.toml",
+        "tick = \"0.1 s\"\nduration = \"60 s\"\n[guests]\ncount = 60\n[[robot]]\nname = \"Walker\"\nat = [\"7 ft\", \"9 ft\"]\n",
+    );
+    let text = format!(
+        "scenario = \"walk.toml\"\n{}",
+        process_of("Walker", command)
+    );
+    let file = lab.write(&format!("{run}.toml"), &text);
+    let file = file.display().to_string();
+    let launch = [
+        "launch",
+        &file,
+        "--no-console",
+        "--paused",
+        "--speed",
+        "max",
+    ];
+
+    let mut command = lab.cars(&[&launch[..], &["--run", run]].concat());
+    command
+        .env("PYTHONPATH", package())
+        .env("PYTHONDONTWRITEBYTECODE", "1");
+    let mut launch = Running::start(command, run, lab.out().join(run));
+    lab.until_ready(run);
+    lab.step(run, 10);
+    lab.ok(&["ctl", "command", "Walker", "sit down", "--run", run]);
+    lab.ctl(run, &["start"]);
+    launch.finish();
+    lab.bytes(run)
+}
+
 #[test]
 fn walker_in_c_is_walker_in_python_byte_for_byte() {
     if lacks_compiler() || !has_python("Walker in Python") {
@@ -284,43 +326,12 @@ fn walker_in_c_is_walker_in_python_byte_for_byte() {
     }
 
     let lab = Lab::new();
-    lab.write(
-        "walk.toml",
-        "tick = \"0.1 s\"\nduration = \"60 s\"\n[guests]\ncount = 60\n[[robot]]\nname = \"Walker\"\nat = [\"7 ft\", \"9 ft\"]\n",
+    let in_c = walk(
+        &lab,
+        "walker-c",
+        &format!(r#"["cars", "exec", "--", {:?}]"#, walker()),
     );
-    let in_c = format!(r#"["cars", "exec", "--", {:?}]"#, walker());
-    let in_python = format!(
-        r#"["python3", {:?}]"#,
-        root().join("sdk/python/examples/walker.py")
-    );
-    let runs = [("walker-c", in_c), ("walker-python", in_python)];
-    let [in_c, in_python] = runs.map(|(run, command)| {
-        let text = format!(
-            "scenario = \"walk.toml\"\n{}",
-            process_of("Walker", &command)
-        );
-        let file = lab.write(&format!("{run}.toml"), &text);
-        let file = file.display().to_string();
-        let launch = [
-            "launch",
-            &file,
-            "--no-console",
-            "--paused",
-            "--speed",
-            "max",
-        ];
-        let mut command = lab.cars(&[&launch[..], &["--run", run]].concat());
-        command
-            .env("PYTHONPATH", package())
-            .env("PYTHONDONTWRITEBYTECODE", "1");
-        let mut launch = Running::start(command, run, lab.out().join(run));
-        lab.until_ready(run);
-        lab.step(run, 10);
-        lab.ok(&["ctl", "command", "Walker", "sit down", "--run", run]);
-        lab.ctl(run, &["start"]);
-        launch.finish();
-        lab.bytes(run)
-    });
+    let in_python = walk(&lab, "walker-python", &in_python());
     assert_same(("in Python", &in_python), ("in C", &in_c));
 
     let text = String::from_utf8(in_c).unwrap();
