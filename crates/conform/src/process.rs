@@ -10,6 +10,7 @@ use nix::sys::signal::{Signal, killpg};
 use nix::unistd::Pid;
 
 use crate::load::ProcessGroup;
+use crate::stdio::without_reports;
 
 /// What is shown of a program's output, bytes from its end.
 const TAIL_BYTES: u64 = 1500;
@@ -117,7 +118,7 @@ impl RobotProcess {
             Some(status) => format!("its process has ended ({status})"),
         };
 
-        let printed = [tail(&self.output), self.errors()]
+        let printed = [without_reports(&tail(&self.output)), self.errors()]
             .join("\n")
             .trim()
             .to_owned();

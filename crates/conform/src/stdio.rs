@@ -115,6 +115,15 @@ fn failure(rule: &str, came: &str) -> RuleFailure {
     RuleFailure::new(expected, came)
 }
 
+/// What a robot has printed for people: without the reports to the kit.
+pub(crate) fn without_reports(output: &str) -> String {
+    let for_people: Vec<&str> = output
+        .lines()
+        .filter(|line| serde_json::from_str::<StdioLine>(line).is_err())
+        .collect();
+    for_people.join("\n")
+}
+
 /// The reports among the lines of an output. They begin with the rules that are observed: what another program prints is none.
 fn lines(output: &str) -> Vec<StdioLine> {
     let reports: Vec<StdioLine> = output
@@ -149,6 +158,7 @@ mod tests {
         reports.take(&begun);
         reports.take(&(StdioLine::observed().line() + &StdioLine::fault(STDIO_FIELDS, "b").line()));
         assert!(reports.is_program());
+        assert_eq!(without_reports(&format!("{begun}hello\n")), "hello");
 
         let [fields, log, _] = STDIO_RULES;
         let failure = reports.failure(fields).unwrap();
