@@ -12,7 +12,8 @@ use protocol::{Epoch, Generation, RobotName, Tick};
 
 use crate::exchange::{IncarnationNotice, Membership, Sent, TickOutcome};
 use crate::member::{Admission, Attendance, LatePolicy, Member, Received};
-use crate::outputs::{BarrierOutput, Ignored, Refused, Stamp, Timer, Timing};
+use crate::outputs::{BarrierOutput, Ignored, MissingCommand, Refused, Stamp, Timer, Timing};
+use crate::repetition::Repetition;
 
 /// What the barrier is doing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -45,6 +46,7 @@ pub struct Barrier<R, C> {
     /// Who takes part in the tick, where it is executed again: then neither tokens nor time decide.
     attendance: Option<Attendance>,
     is_announced: bool,
+    repetition: Repetition,
     straggler: Straggler,
 }
 
@@ -89,6 +91,7 @@ impl<R, C> Barrier<R, C> {
             membership: Vec::new(),
             attendance: None,
             is_announced: false,
+            repetition: Repetition::new(timing),
             straggler: Straggler::default(),
         }
     }
@@ -172,6 +175,9 @@ impl<R, C> Barrier<R, C> {
             }
         }
 
+        // Their welcome came before this clock, and they may still be reading it.
+        self.repetition.begin(!self.membership.is_empty());
+
         // Robots that cannot report are excluded before the clock goes out, so that it does not wait for them even
         // once. The tick may be complete at once, without any report: where all robots are lost.
         self.exclude_unavailable();
@@ -209,11 +215,24 @@ impl<R, C> Barrier<R, C> {
         }
 
         // The flag is that of the place in the roster, which is the same for every incarnation.
-        Ok(Admission {
+        let admission = Admission {
             epoch: self.epoch,
             generation: member.generation(),
             news_flag: news_flag(index),
-        })
+        };
+        // The open tick waits for what is welcomed here, so its clock has been put already: in a new epoch, which robots find
+        // out by that clock. A robot without a token gets the clock again when it declares it.
+        let is_open = self.phase == BarrierPhase::Open;
+        if is_open && member.has_token && member.is_awaited() && self.repetition.hasten() {
+            // By a timer, and so behind the welcome: that is on its way before any timer is looked at.
+            self.set_repeat_timer(out);
+        }
+        // Its token may have been seen before it asked.
+        if self.phase == BarrierPhase::Gathering {
+            self.check_all_joined(out);
+        }
+
+        Ok(admission)
     }
 
     /// A robot's liveliness token was declared or undeclared.
@@ -363,7 +382,8 @@ impl<R, C> Barrier<R, C> {
                 for name in self.members.keys() {
                     self.stand_in(name, out);
                 }
-                out.push(BarrierOutput::SetTimer(Timer::Repeat, self.timing.repeat));
+                self.repetition.advance();
+                self.set_repeat_timer(out);
             }
             // Where a tick is executed again, its record says who was late, not the time that it takes
             // now.
@@ -555,6 +575,25 @@ impl<R, C> Barrier<R, C> {
         awaited
     }
 
+    /// For each robot that has reported in the open tick, the first command that its report counts and that is not here.
+    #[must_use]
+    pub fn missing_commands(&self) -> Vec<MissingCommand> {
+        let mut missing = Vec::new();
+        for (name, member) in &self.members {
+            if self.is_open()
+                && let Some((counted, number)) = member.missing_command()
+            {
+                missing.push(MissingCommand {
+                    robot: name.clone(),
+                    counted,
+                    number,
+                });
+            }
+        }
+
+        missing
+    }
+
     fn is_member(&self, robot: &RobotName, is: impl FnOnce(&Member<R, C>) -> bool) -> bool {
         self.members.get(robot).is_some_and(is)
     }
@@ -658,7 +697,7 @@ impl<R, C> Barrier<R, C> {
             Timer::Announce,
             self.timing.announce,
         ));
-        out.push(BarrierOutput::SetTimer(Timer::Repeat, self.timing.repeat));
+        self.set_repeat_timer(out);
         let has_deadline = self
             .members
             .keys()
@@ -669,6 +708,13 @@ impl<R, C> Barrier<R, C> {
                 self.lateness.deadline,
             ));
         }
+    }
+
+    fn set_repeat_timer(&self, out: &mut Vec<BarrierOutput<R, C>>) {
+        out.push(BarrierOutput::SetTimer(
+            Timer::Repeat,
+            self.repetition.next(),
+        ));
     }
 
     /// Where the clock goes on without late robots, it does not wait for those that cannot report. It never waits for

@@ -17,6 +17,7 @@ mod member;
 mod model;
 mod outputs;
 mod participant;
+mod repetition;
 mod states;
 #[cfg(test)]
 mod tests;
@@ -25,6 +26,6 @@ pub use actions::{Begin, Leave, ParticipantOutput, RobotTimer, TickAnswer, Timeo
 pub use barrier::Barrier;
 pub use exchange::{Bulletin, Exchange, IncarnationNotice, Membership, Sent, TickOutcome};
 pub use member::{Admission, Attendance, LatePolicy};
-pub use outputs::{BarrierOutput, Ignored, Refused, Stamp, Timer, Timing};
+pub use outputs::{BarrierOutput, Ignored, MissingCommand, Refused, Stamp, Timer, Timing};
 pub use participant::Participant;
 pub use states::{NoState, RecentStates, StateQuery};

@@ -167,6 +167,15 @@ impl<R, C> Received<R, C> {
 
         stated.is_some_and(|stated| self.commands.range(..=stated).count() == stated as usize)
     }
+
+    /// How many commands the report states, and the lowest number that is missing.
+    fn missing(&self) -> Option<(u32, u32)> {
+        let (stated, _) = self.report.as_ref()?;
+        let mut numbers = 1..=*stated;
+        let number = numbers.find(|number| !self.commands.contains_key(number))?;
+
+        Some((*stated, number))
+    }
 }
 
 impl Incarnation {
@@ -441,6 +450,14 @@ impl<R, C> Member<R, C> {
     pub(crate) fn report(&self) -> Option<&R> {
         match &self.reply {
             TickReply::Expected(received) => received.report.as_ref().map(|(_, report)| report),
+            TickReply::GivenUp => None,
+        }
+    }
+
+    /// How many commands its report states, and the lowest number of those that the open tick waits for.
+    pub(crate) fn missing_command(&self) -> Option<(u32, u32)> {
+        match &self.reply {
+            TickReply::Expected(received) => received.missing(),
             TickReply::GivenUp => None,
         }
     }

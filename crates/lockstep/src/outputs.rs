@@ -14,6 +14,8 @@ pub struct Timing {
     pub announce: Duration,
     /// A held clock is repeated this often.
     pub repeat: Duration,
+    /// The first interval at which it is repeated for a robot that has just been welcomed; each further one is twice as long.
+    pub repeat_for_newcomers: Duration,
     /// A robot that was admitted declares its token within this time, or its place is free again.
     pub token: Duration,
 }
@@ -23,6 +25,8 @@ impl Default for Timing {
         Self {
             announce: Duration::from_millis(500),
             repeat: Duration::from_secs(2),
+            // Much less than any deadline, and much more than a round trip.
+            repeat_for_newcomers: Duration::from_millis(10),
             token: Duration::from_secs(2),
         }
     }
@@ -93,6 +97,17 @@ impl Ignored {
             Self::TooMany => "too many commands",
         }
     }
+}
+
+/// A command that a robot's report counts and that has not arrived.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub struct MissingCommand {
+    /// Who has reported.
+    pub robot: RobotName,
+    /// How many commands its report counts.
+    pub counted: u32,
+    /// The lowest number, from 1, that no command has.
+    pub number: u32,
 }
 
 /// Why a robot is not admitted.

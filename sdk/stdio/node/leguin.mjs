@@ -599,6 +599,12 @@ async function projectLocation() {
   return to ? drive(to, stand_off_m, speedMps * haste()) : walk(speedMps * haste());
 }
 
+/** Rounded, so that languages whose arc tangents differ in the last bit agree; half a turn is positive. */
+function publishedAngle(angle_rad) {
+  const rounded = Math.floor(angle_rad * 1e6 + 0.5) / 1e6;
+  return rounded === -3.141593 ? 3.141593 : rounded + 0; // + 0: not -0.
+}
+
 /** The end of every tick: where she goes, and what others see. */
 async function finishTick() {
   const proposal = await projectLocation();
@@ -621,8 +627,7 @@ async function finishTick() {
     type: "done",
     proposal,
     speed_mps: her.speedMps,
-    // Rounded, so that languages whose arc tangents differ in the last bit agree.
-    direction_rad: Math.floor(Math.atan2(her.heading.y, her.heading.x) * 1e6 + 0.5) / 1e6,
+    direction_rad: publishedAngle(Math.atan2(her.heading.y, her.heading.x)),
     emotion_state: hasAffect() ? her.emotion : "NEUTRAL",
     behavior_state: her.behavior,
     state_variables: {

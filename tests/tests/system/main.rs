@@ -64,6 +64,7 @@ mod temporary;
 mod threads;
 mod timeline;
 mod wall_clock;
+mod welcomes;
 mod why;
 mod wire;
 mod worlds;

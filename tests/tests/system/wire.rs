@@ -550,6 +550,58 @@ fn a_report_counts_when_all_its_commands_are_here_and_they_count_in_the_order_of
 }
 
 #[test]
+fn commands_that_never_arrive_as_their_report_counts_them_are_named() {
+    let (wire, a, b) = ready("wire-missing");
+    let (sender, lines) = channel::<LogRecord>();
+    let log = wire.bus.subscribe(&wire.keys.log(), move |key, bytes| {
+        let _ = sender.send(decode(key, "simulator", bytes).unwrap());
+    });
+    let _log = log.unwrap();
+    let named = |robot: &str, number: u32| {
+        let begin = format!(
+            "{robot} counts 2 in `commands` of its report of tick 1, but no command with the number {number} has arrived"
+        );
+        let is_named = |line: LogRecord| line.text.starts_with(&begin);
+        eventually("the line", || lines.try_iter().any(is_named).then_some(()));
+    };
+    wire.start();
+    a.clock_of(1);
+    b.clock_of(1);
+
+    // A begins to count for each target; B's commands are of another incarnation than its report.
+    for to in ["B", "A"] {
+        a.put_command(to, &a.command(1, 1, "first"));
+    }
+    for number in [1, 2] {
+        let command = Command {
+            generation: 2,
+            ..b.command(1, number, "foreign")
+        };
+        b.put_command("A", &command);
+    }
+    for hand in [&a, &b] {
+        hand.put(&Report {
+            commands: 2,
+            ..hand.report(1)
+        });
+    }
+    named("A", 2);
+    // Lines come in the order of names, and the first look finds both.
+    named("B", 1);
+    assert_eq!(wire.status().tick, 0, "the tick is still open");
+
+    // Corrected, they count: nothing was taken for what it is not.
+    a.put_command("B", &a.command(1, 2, "second"));
+    for number in [1, 2] {
+        b.put_command("A", &b.command(1, number, "own"));
+    }
+    let clock = b.clock_of(2);
+    let arrived = b.commands_of(&clock);
+    let texts: Vec<_> = arrived.iter().map(|one| one.command.as_str()).collect();
+    assert_eq!(texts, ["first", "second"]);
+}
+
+#[test]
 fn an_operators_put_from_any_client_is_executed_and_recorded() {
     let (wire, a, b) = ready("wire-operator");
     let put = |to: &str, bytes: &[u8]| {

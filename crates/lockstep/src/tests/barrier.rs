@@ -386,7 +386,7 @@ fn a_robot_is_asked_to_join_again_once() {
     assert!(!barrier.is_behind(&name("A"), 2));
 }
 
-fn stamp(tick: u64, generation: u32) -> Stamp {
+pub(super) fn stamp(tick: u64, generation: u32) -> Stamp {
     Stamp {
         epoch: 1,
         tick,
@@ -394,7 +394,7 @@ fn stamp(tick: u64, generation: u32) -> Stamp {
     }
 }
 
-fn sent() -> Sent<&'static str> {
+pub(super) fn sent() -> Sent<&'static str> {
     Sent {
         to: name("B").into(),
         command: "command",

@@ -1,8 +1,10 @@
 //! Rules that are local to one of the two types.
 
 mod barrier;
+mod missing;
 mod participant;
 mod queries;
+mod welcomes;
 
 use protocol::RobotName;
 use protocol::messages::Clock;

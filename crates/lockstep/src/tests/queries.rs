@@ -33,7 +33,15 @@ fn the_last_two_states_are_kept() {
     );
     assert_eq!(states.answer(at(Some(1), Some(5))), Err(NoState::Over));
     assert_eq!(states.answer(at(Some(3), Some(1))), Err(NoState::NotYet));
+
+    // One of both alone: a tick of the newest epoch, or the newest state if it is of that epoch.
+    assert_eq!(states.answer(at(None, Some(5))), Ok((2, 4)));
+    assert_eq!(states.answer(at(None, Some(7))), Err(NoState::NotYet));
+    assert_eq!(states.answer(at(Some(2), None)), Ok((2, 5)));
+    assert_eq!(states.answer(at(Some(1), None)), Err(NoState::Over));
+    assert_eq!(states.answer(at(Some(3), None)), Err(NoState::NotYet));
 }
+
 #[test]
 fn why_there_is_no_state_is_said_in_words() {
     let words = [NoState::NotYet, NoState::Over, NoState::OutOfRange].map(|why| why.to_string());

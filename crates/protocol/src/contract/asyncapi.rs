@@ -318,7 +318,8 @@ pub(crate) fn document() -> Value {
             "title": "CARS",
             "version": protocol::PROTOCOL_VERSION.to_string(),
             "description": "The contract between simulator and robots, from a robot's point of view. What it means, and \
-                            the order in which things happen, is in protocol.md. Channels are key expressions of zenoh.",
+                            the order in which things happen, is in protocol.md. Channels are key expressions of zenoh. \
+                            Integers are written without a fraction: `7.0` is an integer for JSON Schema, and is refused here.",
         },
         "defaultContentType": "application/json",
         "servers": {

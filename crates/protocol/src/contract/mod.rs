@@ -285,6 +285,8 @@ fn malformed_messages_are_named_by_key_sender_and_field() {
             "state_variables.treats",
         ),
         (r#""commands":3"#, r#""commands":3.5"#, "commands"),
+        (r#""commands":3"#, r#""commands":3.0"#, "commands"),
+        (r#""tick":12"#, r#""tick":12.0"#, "tick"),
         (r#""commands":3"#, r#""commands":4294967296"#, "commands"),
         (r#"{"epoch""#, r#"["epoch""#, "[0]"),
         (

@@ -10,6 +10,7 @@ use protocol::messages::{
 use protocol::recorded::{Frame, Header, WallTimes};
 use schemars::generate::SchemaGenerator;
 use schemars::{JsonSchema, Schema, schema_for};
+use serde_json::Value;
 
 /// A message and its schema.
 pub(crate) struct MessageSchema {
@@ -24,9 +25,26 @@ pub(crate) struct MessageSchema {
 const fn of<M: JsonSchema>(name: &'static str) -> MessageSchema {
     MessageSchema {
         name,
-        whole: || schema_for!(M),
+        whole: || {
+            let mut schema = schema_for!(M);
+            describe_integers(&mut schema);
+            schema
+        },
         part: |schemas| schemas.subschema_for::<M>(),
     }
+}
+
+/// What a schema cannot say, and validators of it do not check.
+pub(crate) const INTEGERS: &str = "Integers are written without a fraction: `7.0` is an integer for JSON Schema, and is refused here.";
+
+/// Adds what is true of integers to the description of a message that has some.
+fn describe_integers(schema: &mut Schema) {
+    if !schema.as_value().to_string().contains(r#""integer""#) {
+        return;
+    }
+    let own = schema.get("description").and_then(Value::as_str);
+    let text = own.map_or_else(|| INTEGERS.to_owned(), |own| format!("{own}\n\n{INTEGERS}"));
+    schema.insert("description".to_owned(), text.into());
 }
 
 /// What only files have, and no message has.

@@ -473,6 +473,8 @@ impl Message for Report {
     fn check(&self) -> Result<(), FieldError> {
         self.proposal.check("proposal")?;
         finite(self.speed_mps, "speed_mps")?;
+        // Not its range, and nothing corrects it: other robots get it from this robot, or, where the clock goes on without it,
+        // from the simulator, which puts its report as a state. Which of both is wall clock, so both must have the same bytes.
         finite(self.direction_rad, "direction_rad")?;
         short(&self.emotion_state, "emotion_state")?;
         short(&self.behavior_state, "behavior_state")?;

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use bus::{Bus, BusError, Declared, Publisher, Query};
 use environment::Simulation;
-use lockstep::{Barrier, BarrierOutput, Sent, Timing};
+use lockstep::{Barrier, BarrierOutput, Sent, Timer, Timing};
 use protocol::keys::Keys;
 use protocol::messages::{
     Clock, Command, CommandText, Control, End, MAX_ENTRIES, Report, RobotStatus, Status, Target,
@@ -73,10 +73,12 @@ pub(super) struct LiveEpoch {
     pub(super) clock: Option<Clock>,
     /// What observers see of its tick.
     pub(super) visibility: TickVisibility,
-    /// The last tick whose clock was put once more for its panels: robots repeat their answers.
+    /// The last tick whose clock was put once more: robots repeat their answers, also when the tick is complete.
     pub(super) asked_again: Option<Tick>,
     /// Robots that hold the clock up: awaited when people were told, and not waiting for another robot.
     pub(super) stragglers: Vec<RobotName>,
+    /// Robots of which people were told that commands are missing.
+    pub(super) told_missing: BTreeSet<RobotName>,
     pub(super) wall: WallSummary,
     /// Commands of the operator that are sent at the next tick boundary.
     pub(super) operator: Vec<Sent<CommandText>>,
@@ -134,6 +136,7 @@ impl LiveEpoch {
             visibility: TickVisibility::Hidden,
             asked_again: None,
             stragglers: Vec::new(),
+            told_missing: BTreeSet::new(),
             wall: WallSummary::default(),
             operator: Vec::new(),
             deferred: Vec::new(),
@@ -261,6 +264,10 @@ impl TickSource for LiveRun {
 
         // Timers after events: an answer that has arrived counts, though its deadline has passed meanwhile.
         while let Some(timer) = self.timers.take_due(Instant::now()) {
+            // After its deadline a robot is given up, and with it what has come from it.
+            if timer == Timer::Deadline {
+                self.report_missing_commands(frontend);
+            }
             self.barrier.timer(&timer, &mut self.outputs);
         }
         self.carry_out(frontend)?;

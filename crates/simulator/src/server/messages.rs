@@ -60,7 +60,7 @@ impl LiveRun {
             .report(&name, stamp, commands, Arc::new(report), &mut self.outputs);
     }
 
-    /// Whether an answer is put again that has counted, because the clock was put again for its panels.
+    /// Whether an answer is put again that has counted, because the clock was put again.
     fn is_repeated(&self, robot: &RobotName, stamp: Stamp) -> bool {
         let LiveEpoch {
             simulation,

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use bus::BusError;
 use environment::static_world;
-use lockstep::{BarrierOutput, IncarnationNotice, TickOutcome};
+use lockstep::{BarrierOutput, IncarnationNotice, MissingCommand, TickOutcome};
 use protocol::keys::STATE;
 use protocol::messages::{Clock, CommandText, End, Reason, Report};
 use protocol::{RobotName, Tick, encode};
@@ -185,6 +185,10 @@ impl LiveRun {
 
         let panels = self.epoch.visibility != TickVisibility::Hidden;
         let clock = Clock { panels, ..clock };
+        let is_same = |put: Clock| (put.epoch, put.tick) == (clock.epoch, clock.tick);
+        if self.epoch.clock.is_some_and(is_same) {
+            self.epoch.asked_again = Some(clock.tick);
+        }
         self.epoch.clock = Some(clock);
         self.clock.put(encode(&clock))
     }
@@ -288,10 +292,39 @@ impl LiveRun {
             line.into_iter().for_each(|line| observed.late(line));
             observed.awaited = status.awaiting;
         }
+        self.report_missing_commands(frontend);
         if is_logged {
             self.put_frame(frontend);
         }
         self.answer_stepping(frontend);
+    }
+
+    /// Tells people which commands the open tick waits for, once for each robot in an epoch. They may only be lost. But a robot that
+    /// puts them with other numbers, or as another incarnation, does so again and again, and has reported as far as it knows.
+    pub(super) fn report_missing_commands(&mut self, frontend: &mut Frontend) {
+        for missing in self.barrier.missing_commands() {
+            let MissingCommand {
+                robot,
+                counted,
+                number,
+            } = missing;
+            if !self.epoch.told_missing.insert(robot.clone()) {
+                continue;
+            }
+
+            let status = self.status(frontend);
+            // The tick that is open, not the one that is complete.
+            let tick = self.epoch.clock.map_or(status.tick, |clock| clock.tick);
+            let text = format!(
+                "{robot} counts {counted} in `commands` of its report of tick {tick}, but no command with the number {number} has \
+                 arrived: if the clock waits on after it has been repeated, have the robot number its commands of a tick from 1 over all \
+                 targets, and put each with the epoch, tick and generation of the report"
+            );
+            let line = frontend.observers.log_late(&status, &text);
+            if let Some(observed) = self.epoch.record.observed() {
+                observed.late(line);
+            }
+        }
     }
 
     fn report_released(&mut self, frontend: &mut Frontend) {
