@@ -6,13 +6,13 @@ use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-use bus::{Bus, BusError, Declared, Role};
+use bus::{Bus, BusError, Declared, Reply, Role};
 
 const PATIENCE: Duration = Duration::from_secs(20);
 
 /// A router and the socket at which it listens.
 struct Star {
-    _router: Bus,
+    router: Bus,
     endpoint: String,
     folder: PathBuf,
 }
@@ -28,7 +28,7 @@ impl Star {
         };
 
         Self {
-            _router: Bus::open(&role, None).unwrap(),
+            router: Bus::open(&role, None).unwrap(),
             endpoint,
             folder,
         }
@@ -127,6 +127,49 @@ fn a_query_has_a_reply_or_ends_without_one() {
     assert_eq!(next(&seen), "-alive/b");
     let none = a.get("where/b", "tick=1", None).unwrap();
     assert!(none.is_none(), "the queryable is undeclared");
+}
+
+/// A simulator puts news and clock again behind a welcome: they have the priority and the congestion control of a usual get, whose
+/// reply has both from it.
+#[test]
+fn what_is_put_after_a_reply_arrives_behind_it() {
+    const ROUNDS: usize = 200;
+    let star = Star::new("behind");
+    let client = star.client();
+    let (sender, received) = channel();
+    let mut subscribers = Vec::new();
+    for key in ["news", "clock"] {
+        let sender = sender.clone();
+        let subscriber = client.subscribe(key, move |key, _| {
+            let _is_over = sender.send(key.to_owned());
+        });
+        subscribers.push(subscriber.unwrap());
+    }
+    let (seen, _tokens) = tokens(&star.router, "alive/*");
+    let _token = client.token("alive/a").unwrap();
+    assert_eq!(next(&seen), "+alive/a");
+    let (asked, queries) = channel();
+    let _queryable = star.router.queryable("join", move |query| {
+        let _is_over = asked.send(query);
+    });
+    let news = star.router.publisher("news").unwrap();
+    let clock = star.router.publisher("clock").unwrap();
+
+    for _ in 0..ROUNDS {
+        let sender = sender.clone();
+        let then = move |reply: Option<Reply>| {
+            let _is_over = sender.send(reply.map_or_else(String::new, |reply| reply.key));
+        };
+        client.get_then("join", "", then).unwrap();
+        let query = queries.recv_timeout(PATIENCE).unwrap();
+        query.reply("join", vec![b'w'; 2_000]);
+        drop(query);
+        news.put(b"news".to_vec()).unwrap();
+        clock.put(b"clock".to_vec()).unwrap();
+
+        let arrived = ["join", "news", "clock"].map(|_| next(&received));
+        assert_eq!(arrived, ["join", "news", "clock"]);
+    }
 }
 
 #[test]

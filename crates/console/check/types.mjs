@@ -28,7 +28,7 @@ function collect() {
   };
   for (const message of MESSAGES) {
     const file = new URL(`../../../docs/schemas/${message}.json`, import.meta.url);
-    const { $schema, $defs, title, ...schema } = JSON.parse(readFileSync(file, "utf8"));
+    const { $schema, $comment, $defs, title, ...schema } = JSON.parse(readFileSync(file, "utf8"));
     define(title, schema);
     Object.entries($defs ?? {}).forEach(([name, definition]) => define(name, definition));
   }

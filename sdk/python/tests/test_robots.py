@@ -519,3 +519,9 @@ def test_a_robot_without_the_module_of_the_lab_costs_little() -> None:
     """Neither pandas nor polars is imported by a robot's program."""
     script = "import sys, cars; sys.exit(bool({'pandas', 'polars', 'numpy'} & set(sys.modules)))"
     subprocess.run([sys.executable, "-c", script], env=environment(), check=True)
+
+def test_half_a_turn_has_one_angle() -> None:
+    above = math.nextafter(-math.pi, 0)
+    assert {cars.published_angle(angle_rad) for angle_rad in (-math.pi, above, -math.pi + 0.1e-6, math.pi)} == {3.141593}
+    assert [cars.published_angle(-math.pi + more) for more in (0.4e-6, 0.6e-6)] == [-3.141592, -3.141592]
+    assert math.copysign(1, cars.published_angle(-0.4e-6)) == 1

@@ -10,7 +10,6 @@ use protocol::messages::{
 use protocol::recorded::{Frame, Header, WallTimes};
 use schemars::generate::SchemaGenerator;
 use schemars::{JsonSchema, Schema, schema_for};
-use serde_json::Value;
 
 /// A message and its schema.
 pub(crate) struct MessageSchema {
@@ -37,14 +36,11 @@ const fn of<M: JsonSchema>(name: &'static str) -> MessageSchema {
 /// What a schema cannot say, and validators of it do not check.
 pub(crate) const INTEGERS: &str = "Integers are written without a fraction: `7.0` is an integer for JSON Schema, and is refused here.";
 
-/// Adds what is true of integers to the description of a message that has some.
+/// Says what is true of integers beside a message that has some. A comment, because the descriptions are those of the types.
 fn describe_integers(schema: &mut Schema) {
-    if !schema.as_value().to_string().contains(r#""integer""#) {
-        return;
+    if schema.as_value().to_string().contains(r#""integer""#) {
+        schema.insert("$comment".to_owned(), INTEGERS.into());
     }
-    let own = schema.get("description").and_then(Value::as_str);
-    let text = own.map_or_else(|| INTEGERS.to_owned(), |own| format!("{own}\n\n{INTEGERS}"));
-    schema.insert("description".to_owned(), text.into());
 }
 
 /// What only files have, and no message has.

@@ -25,6 +25,8 @@ impl LiveRun {
             }
         };
 
+        // Before anything that the barrier wants put because of it: one session's messages arrive in their order, and a reply has the
+        // priority of its get. So news and clock that are put again arrive behind the welcome.
         query.reply(query.key(), encode(&answer));
     }
 
