@@ -296,6 +296,11 @@ fn limits_times_and_version_are_those_of_the_code() {
             "with its news, again every 2 s",
         ),
         (
+            "lockstep",
+            "repeat_for_newcomers: Duration::from_millis(10)",
+            "after 10 ms and then at doubling intervals",
+        ),
+        (
             "simulator",
             "MAX_DELIVERED_BYTES: usize = 512 * 1024",
             "more than 524288 bytes arrive at one robot in one tick",
