@@ -13,6 +13,8 @@ const SHOWN: usize = 200;
 /// Where two plays differ: what the first has, and what the second has, in words.
 #[derive(Debug)]
 pub(crate) struct PlayDifference {
+    /// The first tick that differs; none where one play ended before the other.
+    pub(crate) tick: Option<Tick>,
     pub(crate) first: String,
     pub(crate) second: String,
 }
@@ -43,12 +45,14 @@ pub(crate) fn difference(one: &Transcript, two: &Transcript) -> Option<PlayDiffe
 
         let field = first_that_differs(&first, &second);
         return Some(PlayDifference {
+            tick: Some(one.tick),
             first: shown(&first, &field, one.tick),
             second: shown(&second, &field, one.tick),
         });
     }
 
     (one.len() != two.len()).then(|| PlayDifference {
+        tick: None,
         first: format!("{} ticks", one.len()),
         second: format!("{} ticks", two.len()),
     })
@@ -91,7 +95,7 @@ pub(crate) fn demand_same(
 
     match difference(usual, other) {
         None => Ok(()),
-        Some(PlayDifference { first, second }) => Err(RuleFailure::new(
+        Some(PlayDifference { first, second, .. }) => Err(RuleFailure::new(
             format!("{what} makes no difference: {first}"),
             second,
         )),

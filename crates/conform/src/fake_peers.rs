@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use bus::{Bus, BusError, Declared, Query};
 use protocol::keys::{Keys, QUERIES, STATE};
-use protocol::messages::{PublicState, SensedBody, SensedKind, SensedRobot, Variable};
+use protocol::messages::{Point, PublicState, SensedBody, SensedKind, SensedRobot, Variable};
 use protocol::{Epoch, Message, RobotName, Tick, encode};
 use serde_json::{Value, json};
 
@@ -13,6 +13,10 @@ use crate::setting::RosterRobot;
 
 /// Below this, each whole number has a floating-point number of its own.
 const MAX_WHOLE: f64 = 9_007_199_254_740_992.0;
+
+/// How far a robot without a script moves in a tick, meters, and after how many ticks it is back.
+const PACE_M: f64 = 0.01;
+const PACES: Tick = 50;
 
 /// A query that one of them received.
 #[derive(Debug, Clone)]
@@ -26,11 +30,24 @@ pub(crate) struct ReceivedQuery {
     pub(crate) now: (Epoch, Tick),
 }
 
+/// A reply that does not answer: the robot must query again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Unhelpful {
+    /// An error reply, as of a robot that has not reported yet.
+    Refusal,
+    /// The state of an earlier tick, which says so.
+    EarlierState,
+    /// No reply, as where the query was lost.
+    Silence,
+}
+
 #[derive(Default)]
 struct PeersState {
     now: (Epoch, Tick),
     asked: Vec<ReceivedQuery>,
     is_holding: bool,
+    /// How the next queries of each robot are replied to, instead of with its state.
+    unhelpful: BTreeMap<RobotName, Vec<Unhelpful>>,
     held: Vec<(RobotName, String, Query)>,
 }
 
@@ -83,6 +100,35 @@ impl FakePeers {
         self.state().is_holding = true;
     }
 
+    /// They reply in this order to the next queries of each robot, and then as usual.
+    pub(crate) fn be_unhelpful(&self, replies: &[Unhelpful]) {
+        let mut last_first = replies.to_vec();
+        last_first.reverse();
+        self.state().unhelpful = self
+            .names()
+            .map(|name| (name.clone(), last_first.clone()))
+            .collect();
+    }
+
+    /// A robot that was queried, and has not been queried as often as [`Self::be_unhelpful`] demands.
+    pub(crate) fn given_up(&self) -> Option<RobotName> {
+        let state = self.state();
+        let asked: Vec<&RobotName> = state
+            .asked
+            .iter()
+            .filter(|query| query.now == state.now)
+            .map(|query| &query.of)
+            .collect();
+        let left = |name: &RobotName| {
+            state
+                .unhelpful
+                .get(name)
+                .is_some_and(|left| !left.is_empty())
+        };
+
+        asked.into_iter().find(|name| left(name)).cloned()
+    }
+
     /// Whether they hold a query back.
     pub(crate) fn has_held(&self) -> bool {
         !self.state().held.is_empty()
@@ -112,7 +158,11 @@ impl FakePeers {
         let state = state.unwrap_or_else(|| PublicState {
             epoch,
             tick,
-            location: role.location,
+            // Each tick has another one, so that a robot shows whose state it used.
+            location: Point::new(
+                role.location.x + PACE_M * (tick % PACES) as f64,
+                role.location.y,
+            ),
             speed_mps: 0.0,
             direction_rad: 0.0,
             state_variables: [("ticks".to_owned(), Variable::Number(tick as f64))].into(),
@@ -203,12 +253,24 @@ impl FakePeers {
     /// During a tick all of them answer with the state reported for the tick before.
     fn answer(&self, name: &RobotName, what: &str, query: &Query) {
         let (epoch, now) = self.state().now;
+        let unhelpful = self
+            .state()
+            .unhelpful
+            .get_mut(name)
+            .and_then(std::vec::Vec::pop);
+        if unhelpful == Some(Unhelpful::Refusal) {
+            return query.reply_err("it is not reported yet");
+        }
+        // A query that is released without a reply ends the get.
+        if unhelpful == Some(Unhelpful::Silence) {
+            return;
+        }
         let tick = query
             .parameter("tick")
             .and_then(|tick| tick.parse::<Tick>().ok())
             .unwrap_or(now);
         let Some(state) = tick
-            .checked_sub(1)
+            .checked_sub(1 + u64::from(unhelpful.is_some()))
             .and_then(|tick| self.state_of(name, epoch, tick))
         else {
             return query.reply_err("nothing is known before tick 1");
@@ -222,10 +284,21 @@ impl FakePeers {
 
     /// Puts their states of the tick before, for robots that subscribe to them, before the clock of the tick.
     pub(crate) fn put_states(&self, bus: &Bus, keys: &Keys) -> Result<(), BusError> {
-        let (epoch, tick) = self.state().now;
-        let Some(before) = tick.checked_sub(1) else {
-            return Ok(());
-        };
+        let (_, tick) = self.state().now;
+        match tick.checked_sub(1) {
+            Some(before) => self.put_states_of(before, bus, keys),
+            None => Ok(()),
+        }
+    }
+
+    /// The same for a tick of the epoch under way.
+    pub(crate) fn put_states_of(
+        &self,
+        before: Tick,
+        bus: &Bus,
+        keys: &Keys,
+    ) -> Result<(), BusError> {
+        let (epoch, _) = self.state().now;
         for name in self.names() {
             if let Some(state) = self.state_of(name, epoch, before) {
                 bus.put(&keys.query(name, STATE), self.dress(&state))?;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::report::{RuleFailure, RuleVerdict};
+use crate::report::{KitPart, RuleFailure, RuleVerdict};
 
 /// What was found, by rule.
 pub(crate) type VerdictsByRule = BTreeMap<&'static str, RuleVerdict>;
@@ -19,9 +19,37 @@ impl Findings {
         }
     }
 
+    /// The failures among them, as those of a part.
+    pub(crate) fn of_part(mut self, of: KitPart) -> Self {
+        self.0.retain(|_, verdict| match verdict {
+            RuleVerdict::Failed(failure) => {
+                failure.part = of;
+                true
+            }
+            _ => false,
+        });
+        self
+    }
+
+    /// Whether any rule was found broken.
+    pub(crate) fn is_broken(&self) -> bool {
+        let mut verdicts = self.0.values();
+        verdicts.any(|verdict| matches!(verdict, RuleVerdict::Failed(_)))
+    }
+
     /// Whether the rule was found broken.
     pub(crate) fn has_failed(&self, rule: &'static str) -> bool {
         matches!(self.0.get(rule), Some(RuleVerdict::Failed(_)))
+    }
+
+    /// Nothing is known of rules whose checks presume another one, of the second place, that is broken.
+    pub(crate) fn presume(&mut self, presumed: &[(&'static str, &'static str)]) {
+        for (rule, other) in presumed {
+            if self.has_failed(other) && self.has_failed(rule) {
+                self.0.remove(rule);
+                self.skip(rule, &format!("its check presumes {other}"));
+            }
+        }
     }
 
     /// The rule holds, unless it was found broken.

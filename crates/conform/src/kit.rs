@@ -12,6 +12,7 @@ use protocol::messages::{JoinRequest, Point, SensedLayer, SensedRow, Welcome};
 use protocol::{PROTOCOL_VERSION, RobotName, RunName};
 
 use crate::process;
+use crate::report::KitPart;
 use crate::setting::{CheckSetting, RosterRobot};
 use crate::stdio::StdioReports;
 use crate::transcript::Transcript;
@@ -49,6 +50,8 @@ pub(crate) struct Kit {
 struct Learned {
     request: JoinRequest,
     fake_peers: BTreeMap<RobotName, RosterRobot>,
+    /// The same for the part in a run: at least two others.
+    in_run: BTreeMap<RobotName, RosterRobot>,
 }
 
 /// Attempts to find a free port before giving up.
@@ -98,6 +101,7 @@ impl Kit {
             .map_err(CannotRun::Robot)?;
         let learned = Learned {
             request: request.clone(),
+            in_run: self.setting.with_others(&fake_peers),
             fake_peers,
         };
         self.learned
@@ -127,17 +131,25 @@ impl Kit {
         self.learned().request.sdk.clone()
     }
 
+    /// The robots of a roster: the usual one, or that of the part in a run.
+    fn roster(learned: &Learned, part: KitPart) -> BTreeMap<RobotName, RosterRobot> {
+        match part {
+            KitPart::Alone => learned.fake_peers.clone(),
+            KitPart::InRun => learned.in_run.clone(),
+        }
+    }
+
     /// The robots that the kit plays.
-    pub(crate) fn others(&self) -> BTreeMap<RobotName, RosterRobot> {
+    pub(crate) fn others(&self, part: KitPart) -> BTreeMap<RobotName, RosterRobot> {
         let learned = self.learned();
-        let mut others = learned.fake_peers.clone();
+        let mut others = Self::roster(learned, part);
         others.remove(&learned.request.name);
         others
     }
 
     /// The sender of the robot's commands: the first of the others, or the operator.
     pub(crate) fn sender(&self) -> RobotName {
-        self.others()
+        self.others(KitPart::Alone)
             .into_keys()
             .next()
             .unwrap_or_else(RobotName::operator)
@@ -203,11 +215,11 @@ impl Kit {
     }
 
     /// What the robot is welcomed with at tick 0.
-    pub(crate) fn template(&self, run: &RunName) -> Welcome {
+    pub(crate) fn template(&self, run: &RunName, part: KitPart) -> Welcome {
         let learned = self.learned.get();
         let name = learned.map_or_else(RobotName::operator, |learned| learned.request.name.clone());
         let fake_peers = learned
-            .map(|learned| learned.fake_peers.clone())
+            .map(|learned| Self::roster(learned, part))
             .unwrap_or_default();
         let role = fake_peers.get(&name).cloned().unwrap_or_default();
         let setting = &self.setting;

@@ -1,5 +1,5 @@
 //! The conformance kit: it plays simulator to one robot over the real bus and checks the rules of `docs/protocol.md`
-//! one by one.
+//! one by one, and in a run.
 //!
 //! The robot is a program, in any language. It is started anew for each group of rules, so that what a rule does to it (a
 //! malformed message, a refusal, a signal) touches no other rule. The simulator's side of the lock-step is
@@ -9,6 +9,9 @@
 //! No verdict follows from the wall clock where a loaded machine can have the same effect: checks judge by the order of
 //! messages, or while they withhold what the robot waits for; a late answer counts only if it is late in each of several
 //! repetitions and the kit's own queryable replies in time (`patience.rs`, `checks/computing.rs`).
+//!
+//! A second part (`checks/run.rs`) plays a run of at least three robots, in which all of it happens: it finds what shows only
+//! there. Its failures count where no rule is broken alone, and say that they are of that part.
 //!
 //! Much of the contract is about what must *not* make a difference: a repeated clock, an unknown field, news that come
 //! late. Such a rule is checked by playing the same ticks twice, with the disturbance and without it: reports and commands
@@ -38,7 +41,9 @@ mod wire;
 pub use checks::check;
 pub use flushing::unflushed;
 pub use kit::CannotRun;
-pub use report::{AnswerTimes, CheckReport, RuleFailure, RuleOutcome, RuleVerdict};
+pub use report::{
+    AnswerTimes, CheckReport, KitPart, PlayedRun, RuleFailure, RuleOutcome, RuleVerdict,
+};
 pub use rules::{
     PAGE, ProtocolRule, RULES, STDIO_END, STDIO_FIELDS, STDIO_LOG, STDIO_RULES, rules,
 };

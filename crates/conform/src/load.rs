@@ -13,13 +13,24 @@ pub(crate) struct ProcessGroup(pub(crate) Pid);
 impl ProcessGroup {
     /// Whether no thread of the group runs or waits for a processor. Where the system does not show it, the group is taken to rest.
     pub(crate) fn is_idle(self) -> bool {
-        let mut is_idle = true;
+        self.all_threads(|state| state != "R")
+    }
+
+    /// Whether all threads of the group are stopped, or have ended. Where the system does not show it, they are taken to be.
+    pub(crate) fn is_stopped(self) -> bool {
+        self.all_threads(|state| ["T", "Z", "X"].contains(&state))
+    }
+
+    /// Whether the states of all threads are such, as proc(5) writes them.
+    fn all_threads(self, is_such: impl Fn(&str) -> bool) -> bool {
+        let mut are_such = true;
         self.each_thread(|thread| {
             let stat = std::fs::read_to_string(thread.join("stat")).unwrap_or_default();
-            let state = after_name(&stat).split_whitespace().next();
-            is_idle &= state != Some("R");
+            if let Some(state) = after_name(&stat).split_whitespace().next() {
+                are_such &= is_such(state);
+            }
         });
-        is_idle
+        are_such
     }
 
     /// How long the group's threads have waited for a processor so far, together. Threads that have ended do not count.

@@ -86,6 +86,11 @@ impl RobotProcess {
         let _ended = killpg(self.group.0, signal);
     }
 
+    /// Whether the program, and all that it started, is stopped by a signal.
+    pub(crate) fn is_stopped(&self) -> bool {
+        self.group.is_stopped()
+    }
+
     /// Whether the program, and all that it started, rests.
     pub(crate) fn is_idle(&self) -> bool {
         self.group.is_idle()

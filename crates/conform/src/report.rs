@@ -2,14 +2,47 @@
 
 use std::fmt;
 
-use protocol::RobotName;
+use protocol::{RobotName, Tick};
 use serde::Serialize;
 
 use crate::rules::ProtocolRule;
 
+/// A part of the kit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum KitPart {
+    /// The checks that take the robot through one thing at a time.
+    #[serde(rename = "alone")]
+    Alone,
+    /// A run of at least three robots, in which all of it happens.
+    #[serde(rename = "in a run")]
+    InRun,
+}
+
+impl fmt::Display for KitPart {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Alone => "alone",
+            Self::InRun => "in a run",
+        })
+    }
+}
+
+/// The part in a run, as it was played.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct PlayedRun {
+    /// Robots of its roster.
+    pub robots: usize,
+    /// Ticks after the first.
+    pub ticks: Tick,
+    /// How often it was played with everything that happens in it.
+    pub plays: usize,
+}
+
 /// Why a rule failed.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct RuleFailure {
+    /// Where it was seen.
+    pub part: KitPart,
     /// What a correct robot does.
     pub expected: String,
     /// What this one did.
@@ -19,6 +52,7 @@ pub struct RuleFailure {
 impl RuleFailure {
     pub(crate) fn new(expected: impl Into<String>, came: impl Into<String>) -> Self {
         Self {
+            part: KitPart::Alone,
             expected: expected.into(),
             came: came.into(),
         }
@@ -97,6 +131,8 @@ pub struct CheckReport {
     pub outcomes: Vec<RuleOutcome>,
     /// How long it took to answer.
     pub answers: Option<AnswerTimes>,
+    /// The part in a run; absent where no rule that was asked for needs it.
+    pub in_run: Option<PlayedRun>,
 }
 
 impl CheckReport {
@@ -148,6 +184,7 @@ impl CheckReport {
             "skipped": self.count(|verdict| matches!(verdict, RuleVerdict::Skipped { .. })),
             "rules": rules,
             "time.answer": self.answers,
+            "in_run": self.in_run,
         })
     }
 }
@@ -169,9 +206,14 @@ impl fmt::Display for CheckReport {
                     let reason = reason.replace(['\n', '#'], " ");
                     writeln!(f, "ok {number} - {} # SKIP {reason}", rule.name)?;
                 }
-                RuleVerdict::Failed(RuleFailure { expected, came }) => {
+                RuleVerdict::Failed(RuleFailure {
+                    part,
+                    expected,
+                    came,
+                }) => {
                     writeln!(f, "not ok {number} - {}", rule.name)?;
                     writeln!(f, "  ---")?;
+                    writeln!(f, "  part: {part}")?;
                     writeln!(f, "  expected: {}", scalar(expected))?;
                     writeln!(f, "  came: {}", scalar(came))?;
                     writeln!(f, "  see: {}", scalar(&rule.reference()))?;
@@ -184,6 +226,14 @@ impl fmt::Display for CheckReport {
                 f,
                 "# time.answer over {} ticks: min {:.2} ms, median {:.2} ms, p99 {:.2} ms, max {:.2} ms",
                 times.ticks, times.min_ms, times.median_ms, times.p99_ms, times.max_ms
+            )?;
+        }
+
+        if let Some(run) = self.in_run {
+            writeln!(
+                f,
+                "# in a run: {} robots, {} ticks, played {} times, and once undisturbed",
+                run.robots, run.ticks, run.plays
             )?;
         }
 

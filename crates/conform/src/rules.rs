@@ -31,7 +31,7 @@ const fn rule(name: &'static str, section: &'static str) -> ProtocolRule {
 }
 
 /// The rules of robots that put and get over zenoh, in the order of the page.
-pub const RULES: [ProtocolRule; 36] = [
+pub const RULES: [ProtocolRule; 41] = [
     rule("join.request", "joining"),
     rule("join.ready-last", "joining"),
     rule("join.refused", "joining"),
@@ -46,6 +46,10 @@ pub const RULES: [ProtocolRule; 36] = [
     rule("command.payload", "commands"),
     rule("operator.commands", "commands"),
     rule("news.wait", "a-tick"),
+    rule("tick.newest", "a-tick"),
+    rule("query.reply", "queries"),
+    rule("query.again", "queries"),
+    rule("query.waiting", "queries"),
     rule("query.tick", "queries"),
     rule("query.at-once", "queries"),
     rule("query.asking", "queries"),
@@ -59,6 +63,7 @@ pub const RULES: [ProtocolRule; 36] = [
     rule("return.generation", "incarnations"),
     rule("return.rejoin", "incarnations"),
     rule("return.replaced", "incarnations"),
+    rule("return.own-joined", "incarnations"),
     rule("end.clock", "the-end"),
     rule("end.sigterm", "the-end"),
     rule("end.gone", "the-end"),

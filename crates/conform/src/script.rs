@@ -14,6 +14,9 @@ use crate::transcript::{PlayedTick, Transcript};
 const SENSES: Tick = 12;
 const CUT_OFF: Tick = 14;
 const OUT_OF_RANGE: Tick = 8;
+/// The first of the words that come in turn, and how far they are apart, ticks.
+const FIRST_WORD: Tick = 5;
+const WORD_EVERY: usize = 10;
 
 /// A command that arrives at the robot.
 #[derive(Debug, Clone)]
@@ -48,6 +51,9 @@ pub(crate) struct PlayScript {
 
 /// What a check does between the ticks. None of it may make a difference to the robot.
 pub(crate) trait Disturbance {
+    /// Changes news in a way that makes no difference.
+    fn news(&mut self, _stage: &Harness<'_>, _news: &mut TickUpdate) {}
+
     /// Before a tick is granted.
     fn before(&mut self, _stage: &mut Harness<'_>, _tick: Tick) -> Result<(), RuleFailure> {
         Ok(())
@@ -85,6 +91,21 @@ impl PlayScript {
                 ArrivingCommand::new(&from, &one, 20),
             ],
         }
+    }
+
+    /// Ticks in which both words arrive in turn, every ten ticks from each of these senders, to the end.
+    pub(crate) fn in_turn(kit: &Kit, senders: &[RobotName], ticks: Tick) -> Self {
+        let texts = kit.texts();
+        let mut arrivals = Vec::new();
+        for (tick, text) in (FIRST_WORD..=ticks)
+            .step_by(WORD_EVERY)
+            .zip(texts.iter().cycle())
+        {
+            for sender in senders {
+                arrivals.push(ArrivingCommand::new(sender, text, tick));
+            }
+        }
+        Self { ticks, arrivals }
     }
 
     /// A few quiet ticks.
@@ -160,7 +181,8 @@ pub(crate) fn step(
 ) -> Result<PlayedTick, RuleFailure> {
     let epoch = harness.epoch();
     let tick = harness.next_tick();
-    let news = news_of(harness, script, tick);
+    let mut news = news_of(harness, script, tick);
+    disturbance.news(harness, &mut news);
     disturbance.before(harness, tick)?;
     harness.open(&news)?;
     disturbance.during(harness, tick)?;

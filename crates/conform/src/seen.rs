@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use bus::{Qos, Reply};
 use protocol::keys::{Keys, STATE};
-use protocol::messages::{Command, JoinRequest, PublicState};
+use protocol::messages::{Command, JoinRequest, PublicState, Waiting};
 use protocol::{Tick, decode};
 
 use crate::reading::{self, Reading};
@@ -62,6 +62,8 @@ pub(crate) struct Seen {
     pub(crate) replies: BTreeMap<usize, (usize, Option<Reply>)>,
     /// Messages that were put in a way that may lose or reorder them.
     pub(crate) wrong_qos: Vec<String>,
+    /// What it put on `waiting`.
+    pub(crate) waiting: Vec<Waiting>,
     /// How many messages, tokens and replies came: the place of the next one.
     pub(crate) count: usize,
     /// Robots whose liveliness tokens are declared.

@@ -67,8 +67,10 @@ const TICKS: Tick = 100;
 /// Where a robot without a scenario starts, and where the other one stands, meters.
 const CENTER: Point = Point { x: 5.0, y: 5.0 };
 const BESIDE: Point = Point { x: 7.0, y: 6.0 };
-/// The other one, and what it is called where the robot itself has that name.
-const OTHERS: [&str; 2] = ["Echo", "Echo2"];
+/// The other ones, and what they are called where a robot of the roster has that name.
+const OTHERS: [&str; 4] = ["Echo", "Echo2", "Echo3", "Echo4"];
+/// Robots of the part in a run, at least.
+const RUN_ROBOTS: usize = 3;
 
 impl Default for CheckSetting {
     /// A small field with one other robot, and no parameters.
@@ -115,6 +117,25 @@ impl CheckSetting {
         }
 
         Ok(self.fake_peers.clone())
+    }
+
+    /// A roster with at least two robots beside the one that is checked: those of `roster`, and others that stand still.
+    pub(crate) fn with_others(
+        &self,
+        roster: &BTreeMap<RobotName, RosterRobot>,
+    ) -> BTreeMap<RobotName, RosterRobot> {
+        let mut roster = roster.clone();
+        let [width_m, height_m] = self.field_m;
+        for name in OTHERS.iter().filter_map(|other| RobotName::new(other).ok()) {
+            if roster.len() >= RUN_ROBOTS {
+                break;
+            }
+            roster.entry(name).or_insert_with(|| RosterRobot {
+                location: Point::new(width_m / 4.0, height_m * 0.75),
+                ..RosterRobot::default()
+            });
+        }
+        roster
     }
 }
 

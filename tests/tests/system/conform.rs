@@ -96,6 +96,8 @@ fn wrong(rule: &str) -> Command {
 fn setting() -> CheckSetting {
     CheckSetting {
         ticks: 40,
+        // One sends the robot to sleep, and the other one wakes it.
+        commands: vec!["rest".to_owned(), "fly".to_owned()],
         ..CheckSetting::default()
     }
 }
@@ -133,7 +135,7 @@ fn the_robots_of_the_project_conform_with_default_parameters() {
 }
 
 /// Further ways to break a rule, after the one that is named like the rule.
-const OTHERWISE: [&str; 51] = [
+const OTHERWISE: [&str; 69] = [
     "join.request:instance",
     "join.ready-last:first",
     "join.ready-last:queryables",
@@ -143,6 +145,24 @@ const OTHERWISE: [&str; 51] = [
     "tick.answer:generation",
     "tick.answer:unasked",
     "tick.state-first:unsubscribed",
+    "command.order:sorts",
+    "command.twice:ten",
+    "command.sent:generation",
+    "command.sent:targets",
+    "command.sent:ten",
+    "command.payload:long",
+    "news.wait:equal",
+    "tick.newest:every",
+    "query.reply:newest",
+    "query.again:never",
+    "return.generation:any",
+    "return.generation:lower",
+    "return.own-joined:over",
+    "return.own-joined:lower",
+    "end.gone:back",
+    "end.gone:over",
+    "number.angles:half",
+    "number.angles:awake",
     "command.sent:late",
     "command.sent:numbers",
     "command.sent:count",
@@ -188,7 +208,7 @@ const OTHERWISE: [&str; 51] = [
 ];
 
 /// Further ways that are about how a message is written or put.
-const OTHERWISE_ON_THE_WIRE: [&str; 7] = [
+const OTHERWISE_ON_THE_WIRE: [&str; 9] = [
     "end.gone:status",
     "robust.malformed:silent",
     "number.integers:command",
@@ -196,6 +216,8 @@ const OTHERWISE_ON_THE_WIRE: [&str; 7] = [
     "wire.qos:command",
     "wire.qos:express",
     "wire.qos:state",
+    "wire.qos:hasty",
+    "wire.qos:waiting",
 ];
 
 /// How many kits run at the same time: their robots mostly wait.
@@ -253,6 +275,10 @@ fn rules_can_be_broken_in_more_than_one_way() {
         // A state is put where there is a subscriber, which another check has.
         if *how == "wire.qos:state" {
             rules.push(ProtocolRule::named("query.tick").unwrap());
+        }
+        // It waits for an answer where others hold theirs back.
+        if ["wire.qos:waiting", "wire.qos:hasty"].contains(how) {
+            rules.push(ProtocolRule::named("query.waiting").unwrap());
         }
         robots.push((*how, rules));
     }

@@ -106,7 +106,7 @@ fn the_sections_have_the_names_that_others_link_to() {
 /// `cars conform` names these rules: each is one sentence of the page.
 #[test]
 fn the_rules_are_there_once_each() {
-    const RULES: [&str; 36] = [
+    const RULES: [&str; 41] = [
         "wire.qos",
         "join.request",
         "join.ready-last",
@@ -117,12 +117,16 @@ fn the_rules_are_there_once_each() {
         "tick.state-first",
         "tick.velocity",
         "news.wait",
+        "tick.newest",
         "command.order",
         "command.twice",
         "command.sent",
         "command.payload",
         "operator.commands",
         "query.asking",
+        "query.reply",
+        "query.again",
+        "query.waiting",
         "query.tick",
         "query.at-once",
         "query.once",
@@ -135,6 +139,7 @@ fn the_rules_are_there_once_each() {
         "return.generation",
         "return.rejoin",
         "return.replaced",
+        "return.own-joined",
         "end.clock",
         "end.sigterm",
         "end.gone",

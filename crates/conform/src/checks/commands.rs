@@ -16,6 +16,11 @@ use crate::transcript::Transcript;
 /// The tick in whose news the last commands of these checks arrive, and the last tick.
 const LAST: Tick = 6;
 const TICKS: Tick = 12;
+/// More commands in the news of a tick than a robot that counts on few of them has room for.
+const MANY: usize = 42;
+/// A long text, bytes. A robot may quote it in a line of its log, which has the same limit.
+const LONG_TEXT: usize = 2000;
+const SHORT_TEXT: usize = 90;
 
 /// Plays ticks in whose news these commands arrive, each from the sender of the kit's commands.
 fn commanded(kit: &Kit, commands: &[(&str, Tick)]) -> Result<Transcript, RuleFailure> {
@@ -59,11 +64,7 @@ pub(super) fn order(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailur
         let swapped = values(&commanded(kit, &[(&two, LAST - 1), (&one, LAST)])?);
         let in_order = values(&commanded(kit, &[(&one, LAST), (&two, LAST)])?);
         let reversed = values(&commanded(kit, &[(&two, LAST), (&one, LAST)])?);
-        // To this robot the order within a tick makes no difference: there is nothing to see.
-        if in_order == reversed {
-            continue;
-        }
-
+        // Also where both are the same: a robot that sorts its commands takes one of the orders, whichever the news list.
         let votes = vote(&in_order, &straight, &swapped);
         let back = vote(&reversed, &swapped, &straight);
         for (votes, first, second) in [(&votes, &one, &two), (&back, &two, &one)] {
@@ -142,8 +143,18 @@ fn shown(kit: &Kit) -> String {
         .join(", ")
 }
 
+/// Commands are executed as often as the news list them, and then each is answered by a robot that answers each.
+pub(super) fn many(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
+    twice(kit, findings)?;
+    let answered = many_sent(kit, findings);
+    if let Err(failure) = answered {
+        findings.fail("command.sent", failure);
+    }
+    Ok(())
+}
+
 /// A command that is listed twice is executed twice.
-pub(super) fn twice(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
+fn twice(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
     if kit.is_deterministic.get() == Some(&false) {
         findings.skip(
             "command.twice",
@@ -184,7 +195,7 @@ pub(super) fn twice(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailur
             ));
         }
         if votes.right > 0 {
-            return Ok(());
+            return demand_many(kit, &text, &none, &once);
         }
     }
 
@@ -193,6 +204,35 @@ pub(super) fn twice(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailur
         shown(kit)
     );
     findings.skip("command.twice", &reason);
+    Ok(())
+}
+
+/// As many executions as the news list, also where that is more than a few. A counter that stops early is not one of commands.
+fn demand_many(
+    kit: &Kit,
+    text: &str,
+    none: &BTreeMap<String, f64>,
+    once: &BTreeMap<String, f64>,
+) -> Result<(), RuleFailure> {
+    let apart = numbers(&commanded(kit, &over_ticks(text))?);
+    let together = numbers(&commanded(kit, &[(text, LAST); MANY])?);
+    for (name, first) in once {
+        let (Some(before), Some(wanted), Some(came)) =
+            (none.get(name), apart.get(name), together.get(name))
+        else {
+            continue;
+        };
+        // Counted exactly over several ticks: so it counts commands, whatever else it depends on.
+        let is_counter = first - before != 0.0 && wanted - before == MANY as f64 * (first - before);
+        if is_counter && came < wanted {
+            return Err(RuleFailure::new(
+                format!(
+                    "{MANY} commands in the news of a tick are all executed: {name} = {wanted}"
+                ),
+                format!("{name} = {came}"),
+            ));
+        }
+    }
     Ok(())
 }
 
@@ -211,7 +251,8 @@ fn numbers(transcript: &Transcript) -> BTreeMap<String, f64> {
         .collect()
 }
 
-/// News with a payload are read, also with the largest one: a robot that expects none ignores it.
+/// News with a long text are read, also by a robot that does not understand it, and so are those with a payload, also with
+/// the largest one: a robot that expects none ignores it.
 pub(super) fn payload(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     let [text, _] = kit.texts();
     // With its quotation marks.
@@ -221,6 +262,8 @@ pub(super) fn payload(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         json!(largest),
     ];
 
+    demand_long(kit)?;
+
     for (payload, tick) in payloads.into_iter().zip([LAST - 1, LAST]) {
         let arrival = ArrivingCommand {
             payload: Payload::new(payload),
@@ -229,6 +272,78 @@ pub(super) fn payload(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         played(kit, &PlayScript::with(TICKS, vec![arrival]))?;
     }
     Ok(())
+}
+
+/// A long text is read, and counted like a short one where a variable counts commands that the robot does not know.
+fn demand_long(kit: &Kit) -> Result<(), RuleFailure> {
+    let short = "x".repeat(SHORT_TEXT);
+    let long = "x".repeat(LONG_TEXT);
+    let came = numbers(&commanded(kit, &[(&long, LAST)])?);
+    if kit.is_deterministic.get() == Some(&false) {
+        return Ok(());
+    }
+
+    let none = numbers(&commanded(kit, &[])?);
+    let once = numbers(&commanded(kit, &[(&short, LAST)])?);
+    let apart = numbers(&commanded(kit, &[(&short, LAST - 1), (&short, LAST)])?);
+    for (name, first) in &once {
+        let (Some(before), Some(second), Some(came)) =
+            (none.get(name), apart.get(name), came.get(name))
+        else {
+            continue;
+        };
+        let is_counter = first != before && first - before == second - first;
+        if is_counter && came == before {
+            return Err(RuleFailure::new(
+                format!(
+                    "a text of {LONG_TEXT} bytes counts as one of {SHORT_TEXT}: {name} = {first}"
+                ),
+                format!("{name} = {came}"),
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// A robot that answers each of many commands also answers each of them where they are in the news of one tick.
+fn many_sent(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
+    let none = sent(kit, &[])?;
+    for [text, _] in kit.pairs() {
+        let once = sent(kit, &[(&text, LAST)])?;
+        if once <= none {
+            continue;
+        }
+
+        let apart = sent(kit, &over_ticks(&text))?;
+        // Only one that has an answer to each in a few ticks shows that it answers them all.
+        if apart != none + MANY * (once - none) {
+            continue;
+        }
+        let together = sent(kit, &[(text.as_str(), LAST); MANY])?;
+        if together < apart {
+            return Err(RuleFailure::new(
+                format!(
+                    "{apart} commands in answer to {MANY} in the news of a tick, as to those of several ticks"
+                ),
+                format!("{together} commands"),
+            ));
+        }
+        return Ok(());
+    }
+
+    findings.skip("command.sent", "the robot does not answer each command");
+    Ok(())
+}
+
+/// How many commands the robot sends while these arrive.
+fn sent(kit: &Kit, commands: &[(&str, Tick)]) -> Result<usize, RuleFailure> {
+    let played = commanded(kit, commands)?;
+    Ok(played.iter().map(|entry| entry.commands.len()).sum())
+}
+
+/// As many commands, in all ticks up to the last one.
+fn over_ticks(text: &str) -> Vec<(&str, Tick)> {
+    (0..MANY as Tick).map(|at| (text, 1 + at % LAST)).collect()
 }
 
 /// A command from the operator, who is not a robot of the roster, is executed like any other, and not answered.

@@ -6,12 +6,14 @@ use nix::sys::signal::Signal;
 use protocol::messages::End;
 
 use super::waiting;
+use crate::comparison::demand_same;
 use crate::findings::Findings;
 use crate::harness::{Harness, HarnessOptions};
 use crate::kit::Kit;
 use crate::patience::{PATIENCE, in_each_attempt};
 use crate::report::RuleFailure;
-use crate::script::{PlayScript, Straight, play, step, with_robot};
+use crate::script::{Disturbance, PlayScript, Straight, play, step, usual, with_robot};
+use crate::transcript::PlayedTick;
 
 /// A process ends within this time after SIGTERM. The page allows 2 s; signals and the kernel need some, too.
 const END_PATIENCE: Duration = Duration::from_secs(5);
@@ -19,8 +21,10 @@ const END_PATIENCE: Duration = Duration::from_secs(5);
 const GONE_S: u32 = 2;
 /// The same where the wait is not to end.
 const LONG_GONE_S: u32 = 60;
-/// A robot that ends at once when the simulator is gone has ended after this time.
-const HASTY: Duration = Duration::from_millis(1200);
+/// The tick after which the simulator is gone.
+const CUT_AFTER: u64 = 12;
+/// How long the simulator's token is away: longer than any lease, as after a cut.
+const CUT: Duration = Duration::from_secs(7);
 
 /// However a run ends, and whatever the robot waits for: it ends, as it should.
 pub(super) fn clock(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
@@ -84,16 +88,36 @@ fn without_simulator(kit: &Kit, gone_patience_s: u32) -> Result<Harness<'_>, Rul
     Ok(harness)
 }
 
-/// It does not end before its patience is over. There is so much of it that no machine uses it up meanwhile.
+/// It does not end before its patience is over, and goes on where it was. There is so much patience that no machine uses it up
+/// meanwhile.
 fn gone_for_a_while(kit: &Kit) -> Result<(), RuleFailure> {
-    let mut harness = without_simulator(kit, LONG_GONE_S)?;
-    harness.pass(HASTY);
-    let expected =
-        format!("it waits {LONG_GONE_S} s (CARS_GONE_PATIENCE_S) for a simulator that is gone");
-    demand_running(&mut harness, &expected)?;
-
-    harness.show_simulator(true)?;
-    step(&mut harness, &PlayScript::quiet(1), &mut Straight).map(drop)
+    struct SimulatorAway;
+    impl Disturbance for SimulatorAway {
+        fn after(
+            &mut self,
+            harness: &mut Harness<'_>,
+            entry: &PlayedTick,
+        ) -> Result<(), RuleFailure> {
+            if entry.tick != CUT_AFTER {
+                return Ok(());
+            }
+            harness.show_simulator(false)?;
+            harness.pass(CUT);
+            let expected = format!(
+                "it waits {LONG_GONE_S} s (CARS_GONE_PATIENCE_S) for a simulator that is gone"
+            );
+            demand_running(harness, &expected)?;
+            harness.show_simulator(true).map(drop)
+        }
+    }
+    let options = HarnessOptions {
+        gone_patience_s: LONG_GONE_S,
+        ..HarnessOptions::default()
+    };
+    let mut harness = with_robot(kit, options)?;
+    let played = play(&mut harness, &PlayScript::usual(kit), &mut SimulatorAway)?;
+    let what = format!("that the simulator was gone for {} s", CUT.as_secs());
+    demand_same(kit, &what, usual(kit)?, &played)
 }
 
 /// The simulator is back before the robot's patience is over, and the time is over when its patience would have been.

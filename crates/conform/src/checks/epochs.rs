@@ -43,7 +43,7 @@ pub(super) fn same_seed(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFa
     }
     match found {
         None => Ok(()),
-        Some(PlayDifference { first, second }) => Err(RuleFailure::new(
+        Some(PlayDifference { first, second, .. }) => Err(RuleFailure::new(
             format!("another process reports the same for the same seed: {first}"),
             second,
         )),

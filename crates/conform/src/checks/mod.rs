@@ -6,9 +6,11 @@ mod ends;
 mod epochs;
 mod joining;
 mod news;
+mod peers;
 mod queries;
 mod repeated;
 mod returns;
+mod run;
 mod stdio;
 mod ticks;
 mod tolerance;
@@ -23,7 +25,7 @@ use std::thread::Builder;
 
 use crate::findings::{Findings, VerdictsByRule};
 use crate::kit::{CannotRun, Kit};
-use crate::report::{AnswerTimes, CheckReport, RuleFailure, RuleOutcome, RuleVerdict};
+use crate::report::{AnswerTimes, CheckReport, PlayedRun, RuleFailure, RuleOutcome, RuleVerdict};
 use crate::rules::{self, ProtocolRule};
 use crate::setting::CheckSetting;
 
@@ -41,9 +43,14 @@ const fn rules(
 }
 
 /// Checks that need nothing but the usual ticks before; those that take longest begin.
-const CHECKS: [Check; 27] = [
+const CHECKS: [Check; 32] = [
     rules(&["join.refused"], joining::refused),
     rules(&["end.gone"], ends::gone),
+    rules(&["tick.newest"], peers::newest),
+    rules(&["query.reply"], peers::reply),
+    rules(&["query.again"], peers::again),
+    rules(&["query.waiting"], peers::waiting),
+    rules(&["return.own-joined"], peers::own_joined),
     rules(&["query.at-once"], queries::at_once),
     rules(&["query.once"], queries::once),
     rules(&["end.clock"], ends::clock),
@@ -65,7 +72,7 @@ const CHECKS: [Check; 27] = [
     rules(&["query.asking"], queries::asking),
     rules(&["query.unknown"], queries::unknown),
     rules(&["command.order"], commands::order),
-    rules(&["command.twice"], commands::twice),
+    rules(&["command.twice", "command.sent"], commands::many),
     rules(&["command.payload"], commands::payload),
     rules(&["operator.commands"], commands::from_operator),
     rules(&["clock.duplicate"], repeated::duplicate),
@@ -81,6 +88,12 @@ const CHECKS: [Check; 27] = [
 
 /// Checks of programs that `cars exec` runs.
 const STDIO_CHECKS: [Check; 1] = [rules(&[rules::STDIO_END], stdio::end)];
+/// Rules whose checks presume that the robot keeps another one: without it they show nothing.
+const PRESUMED: [(&str, &str); 3] = [
+    ("tick.newest", "news.wait"),
+    ("query.reply", "news.wait"),
+    ("query.reply", "query.again"),
+];
 
 /// Processes of the robot that run at the same time.
 const WORKERS: usize = 4;
@@ -95,7 +108,11 @@ pub fn check(
     rules: &[ProtocolRule],
 ) -> Result<CheckReport, CannotRun> {
     let kit = Kit::open(command, setting)?;
-    let (mut verdicts, answers) = all(&kit, rules)?;
+    let AllFindings {
+        mut verdicts,
+        answers,
+        in_run,
+    } = all(&kit, rules)?;
 
     let mut outcomes = Vec::new();
     for rule in rules::rules() {
@@ -121,37 +138,53 @@ pub fn check(
         sdk: kit.sdk(),
         outcomes,
         answers,
+        in_run,
     })
 }
 
+/// What all checks found.
+struct AllFindings {
+    verdicts: VerdictsByRule,
+    answers: Option<AnswerTimes>,
+    in_run: Option<PlayedRun>,
+}
+
 /// Takes the robot through all checks that the wanted rules need.
-fn all(
-    kit: &Kit,
-    wanted: &[ProtocolRule],
-) -> Result<(VerdictsByRule, Option<AnswerTimes>), CannotRun> {
+fn all(kit: &Kit, wanted: &[ProtocolRule]) -> Result<AllFindings, CannotRun> {
     let mut findings = Findings::default();
     // First and alone: all other checks compare with these ticks, and a robot that does not get through
     // them shows nothing else.
-    let (broken, times) = ticks::usual(kit, &mut findings)?;
+    let (broken, answers) = ticks::usual(kit, &mut findings)?;
     if let Some(rule) = broken {
         let reason = format!("the robot does not get through the usual ticks, see {rule}");
         stdio::judge(kit, &mut findings);
         for rule in rules::rules() {
             findings.skip(rule.name, &reason);
         }
-        return Ok((findings.0, times));
+        return Ok(AllFindings {
+            verdicts: findings.0,
+            answers,
+            in_run: None,
+        });
     }
     // Then whether the robot repeats itself: if not, differences mean nothing.
     let again = epochs::same_seed(kit, &mut findings);
     findings.close(&["determinism.seed"], again);
 
-    let due: Vec<&Check> = CHECKS
-        .iter()
-        .chain(&STDIO_CHECKS)
-        .filter(|check| {
-            wanted.is_empty() || wanted.iter().any(|rule| check.rules.contains(&rule.name))
-        })
-        .collect();
+    let is_wanted =
+        |rules: &[&str]| wanted.is_empty() || wanted.iter().any(|rule| rules.contains(&rule.name));
+    let mut due = Vec::new();
+    for check in CHECKS.iter().chain(&STDIO_CHECKS) {
+        if is_wanted(check.rules) {
+            due.push(check);
+        }
+    }
+    // It waits most of the time, beside the other checks.
+    let play_run = || {
+        let mut own = Findings::default();
+        let run = is_wanted(&run::RULES).then(|| run::check(kit, &mut own));
+        (run, own)
+    };
     let next = AtomicUsize::new(0);
     let all = Mutex::new(findings);
     let work = || {
@@ -166,17 +199,32 @@ fn all(
                 .merge(own);
         }
     };
-    std::thread::scope(|scope| {
+    let (in_run, found_in_run) = std::thread::scope(|scope| {
+        let run = Builder::new().spawn_scoped(scope, play_run);
         // This thread is a worker, too, so the checks are made even if the system starts no other one.
         for _ in 1..WORKERS {
             let _fewer_at_once = Builder::new().spawn_scoped(scope, work);
         }
         work();
+        match run.map(std::thread::ScopedJoinHandle::join) {
+            Ok(Ok(run)) => run,
+            Ok(Err(panic)) => std::panic::resume_unwind(panic),
+            Err(_) => play_run(),
+        }
     });
 
     let mut findings = all.into_inner().unwrap_or_else(PoisonError::into_inner);
+    // A robot that breaks a rule alone breaks others by it in a run, where nothing is for itself.
+    if !findings.is_broken() {
+        findings.merge(found_in_run);
+    }
+    findings.presume(&PRESUMED);
     stdio::judge(kit, &mut findings);
-    Ok((findings.0, times))
+    Ok(AllFindings {
+        verdicts: findings.0,
+        answers,
+        in_run,
+    })
 }
 
 #[cfg(test)]

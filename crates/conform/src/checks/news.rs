@@ -60,7 +60,38 @@ pub(super) fn wait(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         &played,
     )?;
 
+    all_flags(kit)?;
     others_flags(kit)
+}
+
+/// Its flag among those of all others is its flag.
+fn all_flags(kit: &Kit) -> Result<(), RuleFailure> {
+    let mut harness = with_robot(kit, HarnessOptions::default())?;
+    play(&mut harness, &PlayScript::quiet(2), &mut Straight)?;
+    // The barrier's own clock, which has one flag, does not reach the robot.
+    harness.is_cut_off = true;
+    harness.open(&TickUpdate {
+        correction: Some(Correction {
+            location: harness.body.stands,
+            blocked: false,
+        }),
+        ..TickUpdate::default()
+    })?;
+    harness.put_clock(&Clock {
+        epoch: 1,
+        tick: 3,
+        news: u32::MAX,
+        ..Clock::default()
+    })?;
+    harness.settle(QUIET);
+    if harness.has_answered(3) {
+        return Err(RuleFailure::new(
+            "no report for a clock that has its flag and those of all others, before its news are here",
+            "a report",
+        ));
+    }
+    harness.put_news(&harness.open_news())?;
+    harness.complete().map(drop)
 }
 
 /// News of the tick before and of the epoch before, which would move the robot.

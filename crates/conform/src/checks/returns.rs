@@ -47,16 +47,21 @@ fn returned(kit: &Kit, last: Tick) -> Result<Harness<'_>, RuleFailure> {
 
 /// Further welcomes are those of a second incarnation. Its predecessor has reported as usual, [`LAST`] being the last tick.
 fn bequeath(kit: &Kit, harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
-    let state =
-        |tick| usual(kit).map(|usual| usual.iter().find(|entry| entry.tick == tick).map(state_of));
+    let usual = usual(kit)?;
+    let last = usual.iter().position(|entry| entry.tick == LAST);
+    inherit(harness, &usual[..=last.unwrap_or_default()], GENERATION);
+    Ok(())
+}
 
-    harness.template.state_before = state(LAST - 1)?;
-    harness.template.last_state = state(LAST)?;
-    harness.template.stream = format!("robot/{}#{GENERATION}", harness.template.name);
+/// Further welcomes are those of an incarnation whose predecessor has reported this.
+pub(super) fn inherit(harness: &mut Harness<'_>, reported: &[PlayedTick], generation: Generation) {
+    let mut last_first = reported.iter().rev().map(state_of);
+    harness.template.last_state = last_first.next();
+    harness.template.state_before = last_first.next();
+    harness.template.stream = format!("robot/{}#{generation}", harness.template.name);
     if let Some(last) = &harness.template.last_state {
         harness.template.location = last.location;
     }
-    Ok(())
 }
 
 /// It waits for the news that name it, shows meanwhile what its predecessor reported, and reports as what it is.
@@ -67,6 +72,19 @@ pub(super) fn generation(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure>
     harness.put_clock(&Clock {
         epoch: 1,
         tick: LAST + 1,
+        ..Clock::default()
+    })?;
+    // Nor is it the turn of an incarnation whose predecessor is named.
+    harness.put_news(&TickUpdate {
+        epoch: 1,
+        tick: LAST + 1,
+        joined: Some(GENERATION - 1),
+        ..TickUpdate::default()
+    })?;
+    harness.put_clock(&Clock {
+        epoch: 1,
+        tick: LAST + 1,
+        news: harness.flag(),
         ..Clock::default()
     })?;
     harness.settle(QUIET);
@@ -116,8 +134,8 @@ fn demand_generation(transcript: &[PlayedTick]) -> Result<(), RuleFailure> {
     }
 }
 
-/// The clock has gone on without it: it joins again as the process that it is, and then does what a new process does.
-pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
+/// A robot that has missed a tick, and whose news ask it to join again. Its requests are kept.
+fn asked_again(kit: &Kit) -> Result<Harness<'_>, RuleFailure> {
     let mut harness = with_robot(kit, HarnessOptions::default())?;
     let usual = PlayScript::usual(kit);
     for _ in 0..=LAST {
@@ -129,6 +147,12 @@ pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
 
     harness.keeps_requests = true;
     harness.open(&TickUpdate::default())?;
+    Ok(harness)
+}
+
+/// The clock has gone on without it: it joins again as the process that it is, and then does what a new process does.
+pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
+    let mut harness = asked_again(kit)?;
     let expected = "another request to join when its news have its generation as `rejoin`";
     let joining = harness
         .next_join(PATIENCE)

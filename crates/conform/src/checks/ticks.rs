@@ -90,7 +90,7 @@ pub(super) fn usual(
 }
 
 fn cannot_run(failure: RuleFailure) -> CannotRun {
-    let RuleFailure { expected, came } = failure;
+    let RuleFailure { expected, came, .. } = failure;
     CannotRun::Robot(format!("{expected}: {came}"))
 }
 
@@ -253,7 +253,7 @@ fn check_stamps(harness: &Harness<'_>, transcript: &Transcript) -> Result<(), Ru
 }
 
 /// The commands of a tick are numbered from 1, are as many as the report states, and were put before it.
-fn check_tick(harness: &Harness<'_>, entry: &PlayedTick) -> Result<(), RuleFailure> {
+pub(super) fn check_tick(harness: &Harness<'_>, entry: &PlayedTick) -> Result<(), RuleFailure> {
     let tick = entry.tick;
     let report = harness
         .seen
@@ -310,7 +310,11 @@ fn describe(sent: &ReportedCommand) -> String {
 }
 
 /// Angles as they are published, and numbers that are finite and written as they should be.
-fn check_numbers(harness: &Harness<'_>, transcript: &Transcript, findings: &mut Findings) {
+pub(super) fn check_numbers(
+    harness: &Harness<'_>,
+    transcript: &Transcript,
+    findings: &mut Findings,
+) {
     for answer in &harness.seen.answers {
         let tick = answer.reading.report.tick;
         if let Some(field) = answer.reading.not_numbers.first() {
@@ -333,7 +337,7 @@ fn check_numbers(harness: &Harness<'_>, transcript: &Transcript, findings: &mut 
     for entry in transcript {
         let direction_rad = entry.report.direction_rad;
         if !is_published_angle(direction_rad) {
-            let expected = "direction_rad from -pi to pi, rounded to 1e-6 rad, 0 instead of -0";
+            let expected = "direction_rad greater than -pi and at most pi, rounded to 1e-6 rad, 0 instead of -0";
             let came = format!("{direction_rad} in tick {}", entry.tick);
             findings.fail("number.angles", RuleFailure::new(expected, came));
         }
@@ -346,5 +350,7 @@ fn is_published_angle(angle_rad: f64) -> bool {
     let is_rounded = (micro_rad - micro_rad.round()).abs() <= ANGLE_TOLERANCE;
     let is_minus_zero = micro_rad == 0.0 && micro_rad.is_sign_negative();
 
-    is_rounded && !is_minus_zero && micro_rad.round().abs() <= HALF_TURN
+    // Greater than -pi: rounded, -3.141593 is less.
+    let whole = micro_rad.round();
+    is_rounded && !is_minus_zero && whole > -HALF_TURN && whole <= HALF_TURN
 }

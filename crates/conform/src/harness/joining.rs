@@ -1,28 +1,33 @@
 //! How robots come to take part: the one that is checked, and those that the kit plays.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use lockstep::{Admission, Refused, Stamp};
+use nix::sys::signal::Signal;
 use protocol::messages::{JoinAnswer, Refusal, TickUpdate};
-use protocol::{Epoch, RobotName, Tick};
+use protocol::{Epoch, Generation, RobotName, Tick};
 
-use super::{Harness, barrier, patient};
+use super::{Harness, barrier, patient, start};
 use crate::fake_peers::FakePeers;
-use crate::patience::{PATIENCE, START_PATIENCE};
+use crate::patience::{Limit, PATIENCE, START_PATIENCE};
 use crate::report::RuleFailure;
 use crate::wire::Joining;
 
 /// The instance of robots that the kit plays.
 const OWN_INSTANCE: &str = "conformance kit";
+/// How often news that ask a robot to join again are put, as the clock of a run would.
+const REPEAT: Duration = Duration::from_secs(2);
+/// How often it is looked whether a process is stopped.
+const SOON: Duration = Duration::from_millis(5);
 
 impl Harness<'_> {
     /// Sets the other robots up and begins the first epoch, so that the robot can be admitted.
     pub(crate) fn prepare(&mut self) -> Result<(), RuleFailure> {
         let kit = self.kit;
         let subject = kit.subject();
-        self.template = kit.template(&self.run);
+        self.template = kit.template(&self.run, self.options.part);
         self.fake_peers = FakePeers::new(
-            kit.others(),
+            kit.others(self.options.part),
             self.options.has_extras,
             self.options.writes_integers,
         );
@@ -183,6 +188,65 @@ impl Harness<'_> {
             "its liveliness token after the welcome",
             PATIENCE,
             |harness| harness.is_present().then_some(()),
+        )
+    }
+
+    /// Stops the robot's process, as a hang does.
+    pub(crate) fn hang(&mut self) -> Result<(), RuleFailure> {
+        self.process.signal(Signal::SIGSTOP);
+        // The thread that takes the signal stops the others: until it has a processor, they run on.
+        let mut limit = Limit::new(PATIENCE);
+        while !self.process.is_stopped() {
+            if limit.is_over(&self.process) {
+                return Err(RuleFailure::new(
+                    "its process is stopped by SIGSTOP",
+                    self.process.fate(),
+                ));
+            }
+            self.pass(SOON);
+        }
+        Ok(())
+    }
+
+    /// The robot's process is killed, and its token gone.
+    pub(crate) fn crash(&mut self) -> Result<(), RuleFailure> {
+        self.process.signal(Signal::SIGKILL);
+        self.until_gone()
+    }
+
+    /// Starts another process of the robot on the same run, and waits until it has joined.
+    pub(crate) fn restart(&mut self) -> Result<(), RuleFailure> {
+        self.process = start(self.kit, &self.run, &self.options)?;
+        self.until(
+            "its liveliness token after its start",
+            START_PATIENCE,
+            |harness| harness.is_present().then_some(()),
+        )
+    }
+
+    /// The generation of the process that was admitted last.
+    pub(crate) fn generation(&self) -> Generation {
+        self.barrier.presence(&self.kit.subject()).0
+    }
+
+    /// Waits until the robot, whose news ask it to, has joined again.
+    pub(crate) fn until_rejoined(&mut self, before: Generation) -> Result<(), RuleFailure> {
+        let news = TickUpdate {
+            rejoin: Some(before),
+            ..self.open_news()
+        };
+        let mut put = Instant::now();
+        self.until(
+            "another request to join when its news have its generation as `rejoin`",
+            PATIENCE,
+            |harness| {
+                // A link that broke meanwhile has lost them: they say the same in each tick.
+                if put.elapsed() > REPEAT {
+                    put = Instant::now();
+                    let _repeated_until_the_limit = harness.put_news(&news);
+                }
+                (harness.generation() > before && harness.is_present()).then_some(())
+            },
         )
     }
 

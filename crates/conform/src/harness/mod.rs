@@ -24,7 +24,7 @@ use crate::fake_peers::FakePeers;
 use crate::kit::Kit;
 use crate::patience::{Limit, PATIENCE};
 use crate::process::RobotProcess;
-use crate::report::RuleFailure;
+use crate::report::{KitPart, RuleFailure};
 use crate::seen::{ReportedCommand, Seen};
 use crate::stdio::STDIO_VARIABLE;
 use crate::wire::{Joining, Wire, WireEvent};
@@ -62,6 +62,8 @@ pub(crate) struct HarnessOptions {
     pub(crate) is_followed: bool,
     /// Whether the other robots put their states, so that a robot that subscribes need not query.
     pub(crate) puts_states: bool,
+    /// Whose roster it has.
+    pub(crate) part: KitPart,
 }
 
 impl Default for HarnessOptions {
@@ -73,6 +75,7 @@ impl Default for HarnessOptions {
             writes_integers: false,
             is_followed: false,
             puts_states: true,
+            part: KitPart::Alone,
         }
     }
 }
@@ -96,6 +99,8 @@ pub(crate) struct Harness<'k> {
     pub(crate) is_cut_off: bool,
     /// News are not put.
     pub(crate) withholds_news: bool,
+    /// Clocks have the flags of all other robots, too.
+    pub(crate) flags_all: bool,
     wire: Wire,
     barrier: Barrier<usize, ReportedCommand>,
     timers: BTreeMap<Timer, Instant>,
@@ -109,6 +114,19 @@ pub(crate) struct Harness<'k> {
     outcome: Option<TickOutcome<usize, ReportedCommand>>,
     options: HarnessOptions,
     joins: VecDeque<Joining>,
+}
+
+/// Starts the robot's program on a run.
+fn start(kit: &Kit, run: &RunName, options: &HarnessOptions) -> Result<RobotProcess, RuleFailure> {
+    let environment = [
+        ("CARS_RUN", run.to_string()),
+        ("CARS_CONNECT", kit.endpoint.clone()),
+        ("CARS_PATIENCE_S", options.patience_s.to_string()),
+        ("CARS_GONE_PATIENCE_S", options.gone_patience_s.to_string()),
+        (STDIO_VARIABLE, "true".to_owned()),
+    ];
+    RobotProcess::start(&kit.command, &environment)
+        .map_err(|error| RuleFailure::new("the command can be started", error.to_string()))
 }
 
 /// The barrier for these robots: it waits, whatever happens.
@@ -135,15 +153,7 @@ impl<'k> Harness<'k> {
         let run = kit.next_run();
         let keys = Keys::new(&run);
         let wire = Wire::open(&kit.bus, &keys)?;
-        let environment = [
-            ("CARS_RUN", run.to_string()),
-            ("CARS_CONNECT", kit.endpoint.clone()),
-            ("CARS_PATIENCE_S", options.patience_s.to_string()),
-            ("CARS_GONE_PATIENCE_S", options.gone_patience_s.to_string()),
-            (STDIO_VARIABLE, "true".to_owned()),
-        ];
-        let process = RobotProcess::start(&kit.command, &environment)
-            .map_err(|error| RuleFailure::new("the command can be started", error.to_string()))?;
+        let process = start(kit, &run, &options)?;
 
         Ok(Self {
             kit,
@@ -153,11 +163,12 @@ impl<'k> Harness<'k> {
             process,
             body: RobotBody::default(),
             repeated: BTreeSet::new(),
-            template: kit.template(&run),
+            template: kit.template(&run, options.part),
             run,
             keeps_requests: true,
             is_cut_off: false,
             withholds_news: false,
+            flags_all: false,
             wire,
             barrier: barrier([]),
             timers: BTreeMap::new(),
@@ -186,6 +197,19 @@ impl<'k> Harness<'k> {
     /// Whether the robot's token is declared.
     pub(crate) fn is_present(&self) -> bool {
         self.seen.is_present(self.kit.subject().as_str())
+    }
+
+    /// From now on the other robots put their states, or do not.
+    pub(crate) fn set_puts_states(&mut self, puts_states: bool) {
+        self.options.puts_states = puts_states;
+    }
+
+    /// The states of the others for the open tick, as they come to a robot that is slower than they.
+    pub(crate) fn put_early_states(&self) -> Result<(), RuleFailure> {
+        let tick = self.next.saturating_sub(1);
+        Ok(self
+            .fake_peers
+            .put_states_of(tick, &self.kit.bus, &self.keys)?)
     }
 
     /// Waits for one event and files it, and lets timers fire that are due. Returns whether there was an event.
@@ -274,6 +298,7 @@ impl<'k> Harness<'k> {
         let Ok(waiting) = decode::<Waiting>(key, "the robot", bytes) else {
             return;
         };
+        self.seen.waiting.push(waiting.clone());
 
         self.drive(|barrier, out| {
             barrier.waiting(&robot, waiting.epoch, waiting.tick, &waiting.on, out);
@@ -378,13 +403,17 @@ impl<'k> Harness<'k> {
             self.put_news(&TickUpdate {
                 epoch: clock.epoch,
                 tick: clock.tick,
-                joined: notice.joined,
+                joined: self.news.joined.or(notice.joined),
                 rejoin: notice.rejoin,
                 ..self.news.clone()
             })?;
         }
 
-        self.put_clock(clock)
+        let mut clock = *clock;
+        if self.flags_all {
+            clock.news |= self.flags_of_others();
+        }
+        self.put_clock(&clock)
     }
 
     /// Files what comes until `found` finds something.

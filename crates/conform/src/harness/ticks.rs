@@ -22,12 +22,27 @@ impl Harness<'_> {
         self.barrier.is_open()
     }
 
+    /// Whether the robot has put a report for a tick of the epoch under way.
+    pub(crate) fn has_answered(&self, tick: Tick) -> bool {
+        self.seen.answers.iter().any(|answer| {
+            let report = &answer.reading.report;
+            (report.epoch, report.tick) == (self.epoch, tick)
+        })
+    }
+
     /// The robot's flag in clocks.
     pub(crate) fn flag(&self) -> u32 {
         let subject = self.kit.subject();
         let index = self.barrier.roster().position(|name| *name == subject);
 
         1 << (index.unwrap_or_default() % protocol::messages::NEWS_FLAGS)
+    }
+
+    /// The flags of all other robots of the roster in clocks.
+    pub(super) fn flags_of_others(&self) -> u32 {
+        let robots = self.barrier.roster().count() as u32;
+        let all = 1u32.checked_shl(robots).map_or(u32::MAX, |flag| flag - 1);
+        all & !self.flag()
     }
 
     /// Puts a clock.
@@ -57,9 +72,12 @@ impl Harness<'_> {
 
     /// The news of the open tick, as they are put.
     pub(crate) fn open_news(&self) -> TickUpdate {
+        let generation = self.generation();
         TickUpdate {
             epoch: self.epoch,
             tick: self.next.saturating_sub(1),
+            // A further incarnation is always named.
+            joined: self.news.joined.or((generation > 1).then_some(generation)),
             ..self.news.clone()
         }
     }
@@ -167,11 +185,35 @@ impl Harness<'_> {
             ));
         }
 
+        if let Some(sent) = self.misstamped() {
+            return Some(RuleFailure::new(
+                format!("commands of generation {generation} in tick {tick}, as its report is"),
+                sent,
+            ));
+        }
+
         let stated = self.incomplete()?;
         Some(RuleFailure::new(
             format!("{stated} commands, put before the report of tick {tick} that states so many"),
             self.commands_of(tick),
         ))
+    }
+
+    /// A command of the open tick that has another generation than the robot, in words.
+    pub(crate) fn misstamped(&self) -> Option<String> {
+        let generation = self.generation();
+        let at = (self.epoch, self.next.saturating_sub(1));
+        self.seen
+            .commands
+            .iter()
+            .filter_map(|sent| sent.command.as_ref().ok())
+            .find(|command| (command.epoch, command.tick) == at && command.generation != generation)
+            .map(|command| {
+                format!(
+                    "number {} of generation {}",
+                    command.number, command.generation
+                )
+            })
     }
 
     /// How many commands the robot states for the open tick again and again, and does not put.
@@ -207,11 +249,18 @@ impl Harness<'_> {
 
     /// Grants the next tick while the robot is cut off, and goes on without it: it is lost.
     pub(crate) fn miss(&mut self) -> Result<(), RuleFailure> {
+        self.is_cut_off = true;
+        self.go_on_without()?;
+        self.is_cut_off = false;
+        Ok(())
+    }
+
+    /// Grants the next tick, which the robot cannot answer, and goes on without it: it is lost.
+    pub(crate) fn go_on_without(&mut self) -> Result<(), RuleFailure> {
         let impatient = LatePolicy {
             on_late: OnLate::Continue,
             ..patient()
         };
-        self.is_cut_off = true;
         self.drive(|barrier, out| barrier.set_lateness(impatient, out));
         self.open(&TickUpdate::default())?;
         self.until("the clock goes on", PATIENCE, |harness| {
@@ -220,7 +269,6 @@ impl Harness<'_> {
 
         // From here on the barrier waits again, whatever happens.
         self.drive(|barrier, out| barrier.set_lateness(patient(), out));
-        self.is_cut_off = false;
         Ok(())
     }
 

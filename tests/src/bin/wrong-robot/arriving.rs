@@ -25,6 +25,18 @@ impl Host {
         if self.ignores(clock.end) {
             return Ok(());
         }
+        let is_waiting = self.shared.is_in(Phase::AwaitingNews);
+        let is_queued = is_waiting
+            && self.has_begun
+            && clock.tick > self.last_clock.tick
+            && clock.end.is_none();
+        if is_queued && self.wrong.is("tick.newest") {
+            return Ok(());
+        }
+        if is_queued && self.wrong.is("tick.newest:every") {
+            self.queued.push_back(clock);
+            return Ok(());
+        }
         if self.is_unserved {
             self.is_unserved = false;
             self.serve()?;
@@ -48,6 +60,9 @@ impl Host {
         }
         if self.wrong.is("news.wait") {
             clock.news = 0;
+        }
+        if self.wrong.is("news.wait:equal") && clock.news != flag {
+            clock.news &= !flag;
         }
         if self.wrong.is("news.wait:always") && clock.news != 0 {
             clock.news |= flag;
@@ -99,6 +114,23 @@ impl Host {
         if self.wrong.is("return.replaced") && news.joined.is_some_and(|joined| joined > generation)
         {
             news.joined = None;
+        }
+        let is_seated = self.last.is_some() && (news.epoch, generation) == (1, 1);
+        if is_seated && news.joined == Some(1) {
+            if self.wrong.is("return.own-joined") {
+                self.leave = Some(Leave::Replaced);
+            }
+            self.starts_over |= self.wrong.is("return.own-joined:over");
+        }
+        let is_lower = news.joined.is_some_and(|joined| joined < generation);
+        if is_lower && self.has_begun && self.wrong.is("return.own-joined:lower") {
+            self.leave = Some(Leave::Replaced);
+        }
+        let is_other = news.joined.is_some_and(|joined| joined != generation);
+        let takes_it = is_lower && self.wrong.is("return.generation:lower")
+            || is_other && self.wrong.is("return.generation:any");
+        if takes_it && !self.has_begun && generation > 1 {
+            news.joined = Some(generation);
         }
         if self.wrong.is("return.rejoin") {
             news.rejoin = None;
@@ -169,6 +201,15 @@ impl Host {
             welcome.epoch = self.last_clock.epoch;
         }
         let admission = Admission::from(&welcome);
+        let before = self.welcome.as_ref().map(Admission::from);
+        if before.is_some_and(|before| before != admission) {
+            self.has_begun = false;
+            self.queued.clear();
+            // The news that it waited for are those of a tick that it forgets.
+            if self.shared.is_in(Phase::AwaitingNews) {
+                self.shared.enter(Phase::Idle);
+            }
+        }
 
         let mut states = welcome.states_before();
         if self.wrong.is("return.generation:state") {

@@ -1,13 +1,13 @@
 //! The robot's process: its session, its loop, its end.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::process::ExitCode;
 use std::sync::atomic::AtomicU8;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use bus::{Bus, BusError, Declared, Reply, Role, WatchedPublisher};
+use bus::{Bus, BusError, Declared, Qos, Reply, Role, WatchedPublisher};
 use lockstep::{Leave, ParticipantOutput, RobotTimer, Timeouts};
 use protocol::keys::{Keys, QUERIES, STATE};
 use protocol::messages::{Clock, CommandText, PublicState, Report, TickUpdate, Waiting, Welcome};
@@ -22,6 +22,8 @@ pub(crate) type Failure = Box<dyn std::error::Error>;
 
 /// Most events in the queue.
 const QUEUE: usize = 4096;
+/// The simulator is gone for long after this time.
+const LONG_GONE: Duration = Duration::from_secs(5);
 
 /// What arrives from the bus. Malformed messages are dropped before.
 pub(crate) enum Event {
@@ -29,6 +31,7 @@ pub(crate) enum Event {
     News(Box<TickUpdate>),
     Simulator(bool),
     Reply(RobotName, Option<Reply>),
+    State(Box<PublicState>),
 }
 
 /// The robot's process.
@@ -56,6 +59,20 @@ pub(crate) struct Host {
     pub(crate) strays: Vec<TickUpdate>,
     /// The number of the last command of the first epoch.
     pub(crate) numbered: u32,
+    /// Whether it has run a tick as what it was admitted as.
+    pub(crate) has_begun: bool,
+    /// Whether it starts over in its next tick, where it must not.
+    pub(crate) starts_over: bool,
+    /// Clocks that it is yet to answer, if it answers all.
+    pub(crate) queued: VecDeque<Clock>,
+    /// Whether it subscribes to another robot's states.
+    pub(crate) is_following: bool,
+    /// The state of another robot that arrived last, if it is to use that.
+    pub(crate) newest: Option<PublicState>,
+    /// Since when the simulator is gone.
+    gone: Option<Instant>,
+    /// Whether it has had no answer to its query, if it is to give up then.
+    pub(crate) has_given_up: bool,
     /// Whether the queryables are still to be declared.
     pub(crate) is_unserved: bool,
 }
@@ -116,6 +133,13 @@ impl Host {
             last_clock: Clock::default(),
             strays: Vec::new(),
             numbered: 0,
+            has_begun: false,
+            starts_over: false,
+            queued: VecDeque::new(),
+            is_following: false,
+            newest: None,
+            gone: None,
+            has_given_up: false,
             is_unserved: false,
         };
         host.declare()?;
@@ -255,7 +279,15 @@ impl Host {
                 ParticipantOutput::Query { of, tick, epoch } => self.query(of, tick, epoch)?,
                 ParticipantOutput::PutWaiting { tick, epoch, on } => {
                     let key = self.keys.waiting(&self.name);
-                    self.bus.put(&key, encode(&Waiting { epoch, tick, on }))?;
+                    if !self.wrong.is("query.waiting") {
+                        let bytes = encode(&Waiting { epoch, tick, on });
+                        let qos = Qos {
+                            is_blocking: !self.wrong.is("wire.qos:waiting"),
+                            is_express: self.wrong.is("wire.qos:hasty"),
+                            ..Qos::IN_ORDER
+                        };
+                        self.bus.put_with_qos(&key, bytes, qos)?;
+                    }
                 }
                 ParticipantOutput::SetTimer(timer, after) => {
                     self.timers.insert(timer, Instant::now() + after);
@@ -293,7 +325,12 @@ impl Host {
 
         for timer in due {
             self.timers.remove(&timer);
-            if timer == RobotTimer::Gone && self.wrong.is("end.gone") {
+            let is_ignored = match timer {
+                RobotTimer::Gone => self.wrong.is("end.gone"),
+                RobotTimer::Query => self.wrong.is("query.again:never"),
+                _ => false,
+            };
+            if is_ignored {
                 continue;
             }
             self.drive(|machine, out| machine.timer(timer, out))?;
@@ -309,16 +346,54 @@ impl Host {
                 if !is_present && self.wrong.is("end.gone:hasty") {
                     self.leave.get_or_insert(Leave::SimulatorGone);
                 }
+                self.on_simulator(is_present);
                 self.drive(|machine, out| machine.simulator(is_present, out))
+            }
+            Event::State(state) => {
+                self.newest = Some(*state);
+                Ok(())
             }
             Event::Reply(of, reply) => {
                 let bytes = reply.and_then(|reply| reply.result.ok());
                 let state = bytes.and_then(|bytes| self.wrong.read::<PublicState>(STATE, &bytes));
+                self.has_given_up = state.is_none() && self.wrong.is("query.again");
                 if let Some(state) = state {
-                    lock(&self.shared.machine).heard(of, state.epoch, state.tick, state);
+                    let mut tick = state.tick;
+                    if self.wrong.is("query.reply") {
+                        tick = self.last_clock.tick.saturating_sub(1);
+                    }
+                    lock(&self.shared.machine).heard(of, state.epoch, tick, state);
                 }
                 Ok(())
             }
         }
+    }
+
+    /// What it must not do when the simulator is back.
+    fn on_simulator(&mut self, is_present: bool) {
+        if !is_present {
+            self.gone = Some(Instant::now());
+            return;
+        }
+
+        let was_long = self.gone.take().is_some_and(|at| at.elapsed() > LONG_GONE);
+        if was_long && self.wrong.is("end.gone:back") {
+            self.leave.get_or_insert(Leave::SimulatorGone);
+        }
+        self.starts_over |= was_long && self.wrong.is("end.gone:over");
+    }
+
+    /// Subscribes to the states of another robot.
+    pub(crate) fn follow(&mut self, other: &RobotName) -> Result<(), BusError> {
+        let queue = self.queue.clone();
+        let wrong = self.wrong.clone();
+        let key = self.keys.query(other, STATE);
+        let states = self.bus.subscribe(&key, move |key, bytes| {
+            if let Some(state) = wrong.read(key, bytes) {
+                let _ = queue.send(Event::State(Box::new(state)));
+            }
+        })?;
+        self.declared.push(states);
+        Ok(())
     }
 }

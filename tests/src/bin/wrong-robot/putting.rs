@@ -1,5 +1,6 @@
 //! What the robot puts: commands, states, reports.
 
+use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
@@ -70,9 +71,18 @@ impl Host {
             first = self.numbered + 1;
         }
 
+        let mut numbers: BTreeMap<String, u32> = BTreeMap::new();
         for (to, mut command) in answer.commands_from(first) {
             // If the report has a wrong generation, so do its commands.
             command.generation = answer.report.generation;
+            if self.wrong.is("command.sent:generation") {
+                command.generation = 1;
+            }
+            if self.wrong.is("command.sent:targets") {
+                let number = numbers.entry(to.to_string()).or_insert(0);
+                *number += 1;
+                command.number = *number;
+            }
             let mut bytes = encode(&command);
             if self.wrong.is("number.integers:command") {
                 bytes = with_fraction(&bytes, "number");

@@ -18,6 +18,11 @@ use crate::walker::Walker;
 /// How long the robot computes in its slow tick.
 const COMPUTES: Duration = Duration::from_millis(150);
 const SLOW_TICK: Tick = 11;
+/// A tick after which only a command has woken it.
+const LATE_TICK: Tick = 36;
+/// What a robot counts on that has little room: commands, and bytes of a text.
+const TEN: usize = 10;
+const SHORT_TEXT: usize = 100;
 
 /// The results of a tick.
 pub(crate) type Outcome = (Vec<Sent<CommandText>>, PublicState, Report);
@@ -25,9 +30,11 @@ pub(crate) type Outcome = (Vec<Sent<CommandText>>, PublicState, Report);
 impl Host {
     pub(crate) fn run_tick(&mut self, turn: Turn<TickUpdate>) -> Result<(), Failure> {
         self.shared.enter(Phase::Computing);
-        if turn.begin != Begin::GoOn {
+        let starts_over = std::mem::take(&mut self.starts_over);
+        if turn.begin != Begin::GoOn || starts_over {
             self.begin();
         }
+        self.has_begun = true;
 
         let stray = self
             .strays
@@ -38,7 +45,10 @@ impl Host {
         let (commands, state, report) = self.act(turn.epoch, turn.tick, &news)?;
         self.drive(|machine, out| machine.done(commands, state, report, out))?;
         self.shared.enter(Phase::Idle);
-        Ok(())
+        match self.queued.pop_front() {
+            Some(clock) => self.on_clock(clock),
+            None => Ok(()),
+        }
     }
 
     /// Returns the robot to the state of its last welcome.
@@ -83,6 +93,15 @@ impl Host {
         if wrong.is("command.order") {
             deliveries.reverse();
         }
+        if wrong.is("command.order:sorts") {
+            deliveries.sort_by(|one, other| one.command.cmp(&other.command));
+        }
+        if wrong.is("command.twice:ten") {
+            deliveries.truncate(TEN);
+        }
+        if wrong.is("command.payload:long") {
+            deliveries.retain(|delivery| delivery.command.len() <= SHORT_TEXT);
+        }
         if wrong.is("command.twice") {
             deliveries.dedup();
         }
@@ -98,6 +117,11 @@ impl Host {
             }
             walker.received += 1;
             walker.last.clone_from(&delivery.command);
+            match delivery.command.as_str() {
+                "rest" => walker.is_asleep = true,
+                "fly" => walker.is_asleep = false,
+                _ => {}
+            }
             log.push(format!(
                 "received {:?} from {}",
                 delivery.command, delivery.from
@@ -115,6 +139,10 @@ impl Host {
             }
         }
 
+        if wrong.is("command.sent:ten") {
+            commands.truncate(TEN);
+        }
+
         let seen = self.ask_another(tick, epoch, news, &welcome)?;
         if tick == SLOW_TICK {
             std::thread::sleep(COMPUTES);
@@ -123,7 +151,9 @@ impl Host {
         let step_y_m = (unit(&mut walker.random) - 0.5) * 0.2;
         walker.proposal = Point::new(walker.at.x + step_x_m, walker.at.y + step_y_m);
         let angle = unit(&mut walker.random) * 3.0;
-        let turn = if wrong.is("number.angles") { 7.0 } else { 0.0 };
+        let is_awake = tick > LATE_TICK && !walker.is_asleep;
+        let turns = wrong.is("number.angles") || wrong.is("number.angles:awake") && is_awake;
+        let turn = if turns { 7.0 } else { 0.0 };
 
         let mut state_variables: StateVariables = [
             ("received".to_owned(), Variable::from(walker.received)),
@@ -143,7 +173,11 @@ impl Host {
                 walker.at
             },
             speed_mps: 0.1,
-            direction_rad: ((angle + turn) * 1e6).round() / 1e6,
+            direction_rad: if wrong.is("number.angles:half") && tick == SLOW_TICK {
+                -3.141593
+            } else {
+                ((angle + turn) * 1e6).round() / 1e6
+            },
             state_variables,
             emotion_state: "CALM".to_owned(),
             behavior_state: "WALK".to_owned(),
@@ -242,6 +276,14 @@ impl Host {
     }
 
     fn await_state(&mut self, of: &RobotName) -> Result<Option<PublicState>, Failure> {
+        if self.wrong.is("query.reply:newest") {
+            if !std::mem::replace(&mut self.is_following, true) {
+                self.follow(of)?;
+            }
+            if self.newest.is_some() {
+                return Ok(self.newest.clone());
+            }
+        }
         loop {
             let mut actions = Vec::new();
             let found = lock(&self.shared.machine).ask(of, &mut actions);
@@ -251,7 +293,8 @@ impl Host {
             }
 
             let is_interrupted = lock(&self.shared.machine).is_interrupted();
-            if is_interrupted || self.leave.is_some() {
+            let has_given_up = std::mem::take(&mut self.has_given_up);
+            if is_interrupted || has_given_up || self.leave.is_some() {
                 return Ok(None);
             }
             self.pump()?;

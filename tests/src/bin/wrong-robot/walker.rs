@@ -13,6 +13,8 @@ pub(crate) struct Walker {
     pub(crate) received: u32,
     pub(crate) sent: u32,
     pub(crate) last: String,
+    /// Whether the last word was `rest`, and not `fly`.
+    pub(crate) is_asleep: bool,
 }
 
 impl Walker {
@@ -35,6 +37,7 @@ impl Walker {
             received: 0,
             sent: 0,
             last: String::new(),
+            is_asleep: false,
         }
     }
 }

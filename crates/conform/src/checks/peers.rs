@@ -1,0 +1,238 @@
+//! Others that are early, late or refuse, clocks that have gone on, and news that name the robot.
+
+use std::time::Duration;
+
+use protocol::Tick;
+use protocol::messages::{Clock, Correction, TickUpdate};
+
+use super::{waiting, wire};
+use crate::comparison::demand_same;
+use crate::fake_peers::Unhelpful;
+use crate::findings::Findings;
+use crate::harness::{Harness, HarnessOptions};
+use crate::kit::Kit;
+use crate::patience::PATIENCE;
+use crate::report::RuleFailure;
+use crate::script::{Disturbance, PlayScript, Straight, play, with_robot};
+use crate::transcript::PlayedTick;
+
+/// What was put has arrived after this time, also at a robot that rests.
+const ARRIVED: Duration = Duration::from_millis(100);
+/// One tick in so many is disturbed: a query that is made again takes half a second.
+const ROUND: Tick = 9;
+/// Ticks in which the answers of others are compared, fewer than the usual ones.
+const TICKS: Tick = 30;
+
+/// The usual commands in fewer ticks.
+fn shorter(kit: &Kit) -> PlayScript {
+    let usual = PlayScript::usual(kit);
+    PlayScript {
+        ticks: usual.ticks.min(TICKS),
+        ..usual
+    }
+}
+
+/// The clock has gone on twice: it answers the newest one, and never those before.
+pub(super) fn newest(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
+    let mut harness = waiting::for_news(kit)?;
+    // It waits for the news of this tick. Two clocks more, and only the last one has its news: which of them
+    // it answers does not depend on how fast it reads.
+    let held = harness.next_tick() - 1;
+    let newest = held + 2;
+    let flag = harness.flag();
+    for tick in [held + 1, newest] {
+        harness.put_clock(&Clock {
+            epoch: 1,
+            tick,
+            news: flag,
+            ..Clock::default()
+        })?;
+    }
+    // News of the ticks before come last, and late.
+    for tick in [newest, held + 1, held] {
+        harness.put_news(&TickUpdate {
+            epoch: 1,
+            tick,
+            correction: Some(Correction {
+                location: harness.body.stands,
+                blocked: false,
+            }),
+            ..TickUpdate::default()
+        })?;
+    }
+
+    let expected =
+        format!("a report for tick {newest}, the newest of three clocks, when its news are here");
+    harness.until(&expected, PATIENCE, |harness| {
+        harness.has_answered(newest).then_some(())
+    })?;
+    harness.settle(ARRIVED);
+    for tick in [held, held + 1] {
+        if harness.has_answered(tick) {
+            return Err(RuleFailure::new(
+                format!(
+                    "no report for tick {tick}, whose clock was followed by that of tick {newest}"
+                ),
+                "a report",
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// The states of others arrive before it decides, as they do where it is slower than they: those of the tick do not count.
+pub(super) fn reply(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
+    /// The others are early, or play along and the news are the same.
+    struct Peers {
+        are_early: bool,
+    }
+    impl Disturbance for Peers {
+        fn news(&mut self, harness: &Harness<'_>, news: &mut TickUpdate) {
+            // It waits for news in each tick, so that what comes before them has come.
+            news.correction = news.correction.or(Some(Correction {
+                location: harness.body.stands,
+                blocked: false,
+            }));
+        }
+
+        fn before(&mut self, harness: &mut Harness<'_>, tick: Tick) -> Result<(), RuleFailure> {
+            harness.withholds_news = self.are_early && tick > 0;
+            if self.are_early && tick.is_multiple_of(ROUND) {
+                harness.fake_peers.be_unhelpful(&[Unhelpful::EarlierState]);
+            }
+            Ok(())
+        }
+
+        fn during(&mut self, harness: &mut Harness<'_>, tick: Tick) -> Result<(), RuleFailure> {
+            if !self.are_early || tick == 0 {
+                return Ok(());
+            }
+            harness.put_early_states()?;
+            harness.pass(ARRIVED);
+            harness.put_news(&harness.open_news())
+        }
+    }
+
+    let mut straight = with_robot(kit, HarnessOptions::default())?;
+    let expected = play(
+        &mut straight,
+        &shorter(kit),
+        &mut Peers { are_early: false },
+    )?;
+    if straight.fake_peers.asked().is_empty() && !follows(&straight)? {
+        findings.skip("query.reply", "the robot queried no other one");
+        return Ok(());
+    }
+    let mut harness = with_robot(kit, HarnessOptions::default())?;
+    let played = play(&mut harness, &shorter(kit), &mut Peers { are_early: true })?;
+    demand_same(
+        kit,
+        "a state of another tick than the one before",
+        &expected,
+        &played,
+    )
+}
+
+/// Whether it subscribes to the state of another robot.
+fn follows(harness: &Harness<'_>) -> Result<bool, RuleFailure> {
+    for name in harness.fake_peers.names() {
+        let key = harness.keys.query(name, protocol::keys::STATE);
+        if harness.has_subscriber(&key)? {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}
+
+/// A query that is refused is made again, until it is answered.
+pub(super) fn again(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
+    struct Refusing;
+    impl Disturbance for Refusing {
+        fn before(&mut self, harness: &mut Harness<'_>, tick: Tick) -> Result<(), RuleFailure> {
+            let replies = if tick % ROUND < 2 {
+                &[Unhelpful::Refusal; 3][..]
+            } else {
+                &[]
+            };
+            harness.fake_peers.be_unhelpful(replies);
+            Ok(())
+        }
+
+        fn after(
+            &mut self,
+            harness: &mut Harness<'_>,
+            entry: &PlayedTick,
+        ) -> Result<(), RuleFailure> {
+            match harness.fake_peers.given_up() {
+                None => Ok(()),
+                Some(of) => Err(RuleFailure::new(
+                    format!("queries of {of} in tick {} until it answers", entry.tick),
+                    "the report, after a query that was refused",
+                )),
+            }
+        }
+    }
+
+    let mut straight = waiting::of_queries(kit)?;
+    let expected = play(&mut straight, &shorter(kit), &mut Straight)?;
+    if straight.fake_peers.asked().is_empty() {
+        findings.skip("query.again", "the robot queried no other one");
+        return Ok(());
+    }
+    let mut harness = waiting::of_queries(kit)?;
+    let played = play(&mut harness, &shorter(kit), &mut Refusing)?;
+    demand_same(kit, "that others refuse first", &expected, &played)
+}
+
+/// It says for whom it waits, in the way that ticks need.
+pub(super) fn waiting(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
+    let (mut harness, is_asking) = waiting::for_another(kit)?;
+    if !is_asking {
+        findings.skip("query.waiting", "the robot queried no other one");
+        return Ok(());
+    }
+
+    let tick = harness.next_tick() - 1;
+    let asked = harness.fake_peers.asked();
+    let expected = format!("`waiting` in tick {tick} on the robot that does not answer");
+    harness.until(&expected, PATIENCE, |harness| {
+        let mut waiting = harness.seen.waiting.iter();
+        waiting
+            .any(|waiting| {
+                (waiting.epoch, waiting.tick) == (1, tick)
+                    && asked.iter().any(|query| query.of == waiting.on)
+            })
+            .then_some(())
+    })?;
+    wire::check(&harness, findings);
+    harness.fake_peers.release();
+    harness.complete().map(drop)
+}
+
+/// Its news name its own generation again and again: nothing begins.
+pub(super) fn own_joined(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
+    /// News that place the robot where it stands, and may name it.
+    struct Naming {
+        names_it: bool,
+    }
+    impl Disturbance for Naming {
+        fn news(&mut self, harness: &Harness<'_>, news: &mut TickUpdate) {
+            if harness.next_tick().is_multiple_of(3) {
+                return;
+            }
+            news.joined = self.names_it.then_some(1);
+            news.correction = news.correction.or(Some(Correction {
+                location: harness.body.stands,
+                blocked: false,
+            }));
+        }
+    }
+
+    let play_named = |names_it| {
+        let mut harness = with_robot(kit, HarnessOptions::default())?;
+        play(&mut harness, &shorter(kit), &mut Naming { names_it })
+    };
+    let expected = play_named(false)?;
+    let played = play_named(true)?;
+    demand_same(kit, "its own generation as `joined`", &expected, &played)
+}
