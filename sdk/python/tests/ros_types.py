@@ -1,4 +1,4 @@
-"""Packages of ROS messages and services of which there is no wheel, made from their definitions with the generators of the wheels."""
+"""Packages of ROS messages and services of which there is no wheel, made from their definitions by the generators of the wheels."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import shutil
 import subprocess
 import sys
 import sysconfig
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 PREFIX = Path(sys.prefix)
@@ -48,12 +47,14 @@ def build(folder: Path, package: str, definitions: dict[str, str]) -> None:
         file.write_text(text)
     environment = {**os.environ, "AMENT_PREFIX_PATH": str(PREFIX)}
     command = [sys.executable, __file__, str(folder), package, *definitions]
-    subprocess.run(command, env=environment, check=True, capture_output=True, text=True)
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
     _compile(folder, package)
 
 
 def _generate(folder: Path, package: str, names: list[str]) -> None:
-    """Generates Python and C. The command ``rosidl generate`` of the wheels does not start: each of its extensions is listed twice."""
+    """Generates Python and C. The command ``rosidl generate`` of the wheels does not start: they list each of its extensions twice,
+    and lack catkin_pkg."""
     made = folder / package
     idl = []
     for name in names:
@@ -62,6 +63,7 @@ def _generate(folder: Path, package: str, names: list[str]) -> None:
         convert(made, package, Path(name), made / kind)
         idl.append(f"{made}:{Path(name).with_suffix('.idl')}")
 
+    stems = [Path(name).with_suffix("") for name in names]
     share = PREFIX / "share"
     packages = [f"{one}:{share / one}" for one in USED] + [f"{package}:{made}"]
     generators = {
@@ -83,7 +85,7 @@ def _generate(folder: Path, package: str, names: list[str]) -> None:
             "include_paths": packages,
             "ros_interface_dependencies": [],
             "target_dependencies": [],
-            "type_description_tuples": [f"{Path(name).with_suffix('.idl')}:{made / Path(name).with_suffix('.json')}" for name in names],
+            "type_description_tuples": [f"{stem}.idl:{made / stem}.json" for stem in stems],
         }
         arguments.write_text(json.dumps(given))
         getattr(importlib.import_module(generator), function)(str(arguments), *more)
@@ -96,26 +98,23 @@ def _generate(folder: Path, package: str, names: list[str]) -> None:
 def _compile(folder: Path, package: str) -> None:
     """Makes one extension module of all that is C and C++ in the package."""
     made = folder / package
-    flags = ["-O0", "-fPIC", "-w", f"-I{folder}", f"-I{sysconfig.get_path('include')}", *includes()]
-    numpy = Path(str(importlib.import_module("numpy").get_include()))
+    # Most of the time goes into headers: what can be is one file. Descriptions of types have names of their own, each the same.
+    together = {suffix: made / f"all{suffix}" for suffix in (".c", ".cpp")}
+    descriptions = sorted(made.rglob("*__description.c"))
+    for suffix, file in together.items():
+        sources = sorted(set(made.rglob(f"*{suffix}")).difference(descriptions))
+        file.write_text("".join(f'#include "{source}"\n' for source in sources))
+    sources = [*together.values(), *descriptions]
 
-    def compiled(source: Path) -> str:
-        made_object = source.with_name(source.name + ".o")
-        compiler = "gcc" if source.suffix == ".c" else "g++"
-        _run([compiler, *flags, f"-I{numpy}", "-c", str(source), "-o", str(made_object)])
-        return str(made_object)
-
-    sources = [source for source in sorted(made.rglob("*.c*")) if source.suffix in (".c", ".cpp")]
-    with ThreadPoolExecutor(2) as pool:
-        objects = list(pool.map(compiled, sources))
+    numpy = importlib.import_module("numpy").get_include()
+    headers = [f"-I{folder}", f"-I{sysconfig.get_path('include')}", f"-I{numpy}", *includes()]
     parts = ("generator_c", "generator_py", "typesupport_c", "typesupport_fastrtps_c")
     libraries = [f"-l{one}__rosidl_{part}" for one in USED for part in parts]
-    of_generators = ["-lrosidl_runtime_c", "-lrosidl_typesupport_c", f"-l{SERIALIZED}", "-lfastcdr", "-lrcutils", "-lrmw"]
+    libraries += ["-lrosidl_runtime_c", "-lrosidl_typesupport_c", f"-l{SERIALIZED}", "-lfastcdr", "-lrcutils", "-lrmw", "-lstdc++"]
     module = made / f"{package}_s__rosidl_typesupport_c.so"
-    _run(["g++", "-shared", "-o", str(module), *objects, f"-L{PREFIX / 'lib'}", *libraries, *of_generators])
-
-
-def _run(command: list[str]) -> None:
+    # The compiler of C takes each file as what its suffix says, where that of C++ takes all as C++.
+    command = ["gcc", "-shared", "-fPIC", "-O0", "-w", "-o", str(module), *headers, *map(str, sources)]
+    command += [f"-L{PREFIX / 'lib'}", *libraries]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, f"{' '.join(command)}\n{done.stderr}"
 

@@ -1,4 +1,4 @@
-"""A node in C over rcl, in a process of its own, as a robot: compiled as the book says, launched, stopped, and always the same run."""
+"""A node in C over rcl, in a process of its own, as a robot: compiled as the book says, and always the same run."""
 
 from __future__ import annotations
 

@@ -11,6 +11,7 @@ import threading
 from collections.abc import Sequence
 from typing import Any, Optional
 
+from ._interfaces import FEATURES, Entity, Interfaces, fill_pose
 from ._load import RosError, load
 from ._motion import rotated
 from ._topics import ros_name
@@ -35,18 +36,6 @@ SERVICES = {
     "get_state": {"do": "status"},
 }
 """Services of std_srvs/Trigger, and the controls that they are."""
-FEATURES = [
-    "ENTITY_STATE_GETTING",
-    "SIMULATION_RESET",
-    "SIMULATION_RESET_TIME",
-    "SIMULATION_RESET_STATE",
-    "SIMULATION_STATE_GETTING",
-    "SIMULATION_STATE_SETTING",
-    "SIMULATION_STATE_PAUSE",
-    "STEP_SIMULATION_SINGLE",
-    "STEP_SIMULATION_MULTIPLE",
-]
-"""What simulation_interfaces/SimulatorFeatures calls what is served here."""
 
 
 class Bridge:
@@ -73,13 +62,19 @@ class Bridge:
         self._publishers: dict[str, Any] = {}
         self._names: dict[str, str] = {}
         self._frame: dict[str, Any] = {}
+        self._transformed: Optional[tuple[int, int]] = None
         # One frame at a time is published, in their order.
-        self._lock = threading.Lock()
+        self._arrived = threading.Condition()
         for name in SERVICES:
             self._node.create_service(self._trigger, f"/cars/{name}", self._serve(name))
         self._node.create_service(self._trigger, "/cars/step", self._step)
         self._node.create_service(self._trigger, "/cars/get_features", self._features)
         self._node.create_service(self._trigger, "/cars/get_entities", self._entities)
+        try:
+            self._interfaces: Optional[Interfaces] = Interfaces(self, self._node)
+        except ImportError:
+            # On no registry as a wheel, either.
+            self._interfaces = None
 
         zenoh = self._zenoh
         config = zenoh.Config.from_file(zenoh_config) if zenoh_config else zenoh.Config()
@@ -110,20 +105,24 @@ class Bridge:
         publisher.publish(message)
 
     def _on_frame(self, sample: Any) -> None:
-        with self._lock:
+        with self._arrived:
             if self._ros.rclpy.ok():
                 self._show(json.loads(sample.payload.to_bytes()))
+            self._arrived.notify_all()
 
     def _show(self, frame: dict[str, Any]) -> None:
         ros = self._ros
         self._frame = frame
         clock = ros.rosgraph.Clock()
-        clock.clock.sec, clock.clock.nanosec = divmod(round(frame["tick"] * frame["tick_s"] * 1e9), 10**9)
+        clock.clock.sec, clock.clock.nanosec = divmod(_time_ns(frame), 10**9)
         stamp = clock.clock
         self._publish("/clock", clock)
         transforms = [self._show_robot(robot, stamp) for robot in frame["robots"]]
-        if self._tf is not None:
+        # A frame is shown again when the run is paused; those who listen to transforms warn of a stamp that they have already.
+        tick = frame["epoch"], frame["tick"]
+        if self._tf is not None and transforms and tick != self._transformed:
             self._publish("/tf", self._tf(transforms=transforms))
+            self._transformed = tick
 
         guests = ros.geometry.PoseArray()
         guests.header.stamp, guests.header.frame_id = stamp, "map"
@@ -136,15 +135,14 @@ class Bridge:
     def _show_robot(self, robot: dict[str, Any], stamp: Any) -> Any:
         ros = self._ros
         name = self._name(robot["name"])
-        cos, sin = rotated(_heading_rad(robot) / 2)
-        at = robot["location"]
         odometry = ros.nav.Odometry()
         odometry.header.stamp, odometry.header.frame_id = stamp, "map"
         odometry.child_frame_id = f"{name}/base_link"
-        pose = odometry.pose.pose
-        pose.position.x, pose.position.y = float(at["x"]), float(at["y"])
-        pose.orientation.z, pose.orientation.w = sin, cos
-        odometry.twist.twist.linear.x = float(robot["speed_mps"])
+        pose, twist = odometry.pose.pose, odometry.twist.twist
+        fill_pose(pose, robot["location"]["x"], robot["location"]["y"], _heading_rad(robot))
+        # In the frame of the robot: one that drives backwards has a negative velocity.
+        cos, sin = rotated(robot["direction_rad"] - _heading_rad(robot))
+        twist.linear.x, twist.linear.y = robot["speed_mps"] * cos, robot["speed_mps"] * sin
         self._publish(f"/{name}/odom", odometry)
         self._publish(f"/{name}/emotion", ros.std.String(data=robot["emotion_state"]))
         self._publish(f"/{name}/behavior", ros.std.String(data=robot["behavior_state"]))
@@ -165,7 +163,7 @@ class Bridge:
             self._names[robot] = name
         return self._names[robot]
 
-    def control(self, request: dict[str, Any], patience_s: float) -> dict[str, Any]:
+    def control(self, request: dict[str, Any], patience_s: float = ANSWER_S) -> dict[str, Any]:
         """Asks the simulator, and returns its answer."""
         replies = self._session.get(f"cars/{self._run}/control", payload=json.dumps(request), timeout=patience_s)
         for reply in replies:
@@ -175,9 +173,37 @@ class Bridge:
             return {"answer": "refused", "explanation": reply.err.payload.to_string()}
         return {"answer": "refused", "explanation": f"the simulator of run {self._run} did not answer within {patience_s:.0f} s"}
 
+    def step(self, ticks: int) -> dict[str, Any]:
+        """Has the simulator do so many ticks, and returns its answer when they are complete."""
+        return self.control({"do": "step", "n": ticks}, STEP_S)
+
+    def current(self) -> dict[str, Any]:
+        """The frame of the last tick that is complete, or nothing. That of a step is still on its way when the step is answered."""
+        status = self.control({"do": "status"})
+        with self._arrived:
+            if status["answer"] != "done":
+                return self._frame
+            tick = status["epoch"], status["tick"]
+            is_here = self._arrived.wait_for(lambda: (self._frame.get("epoch", 0), self._frame.get("tick", 0)) >= tick, ANSWER_S)
+            return self._frame if is_here else {}
+
+    def entities(self, frame: dict[str, Any]) -> list[Entity]:
+        """Robots and guests of a frame."""
+        time_ns = _time_ns(frame)
+        entities = []
+        for robot in frame["robots"]:
+            cos, sin = rotated(robot["direction_rad"])
+            velocity = robot["speed_mps"] * cos, robot["speed_mps"] * sin
+            at = robot["location"]
+            entities.append(Entity(self._name(robot["name"]), at["x"], at["y"], _heading_rad(robot), velocity, time_ns))
+        numbers = frame.get("guest_numbers") or range(len(frame["guests"]))
+        for number, (x, y) in zip(numbers, frame["guests"]):
+            entities.append(Entity(f"guest_{number}", x, y, 0.0, (0.0, 0.0), time_ns))
+        return entities
+
     def _serve(self, name: str) -> Any:
         def serve(_request: Any, response: Any) -> Any:
-            return _filled(response, self.control(SERVICES[name], ANSWER_S))
+            return _filled(response, self.control(SERVICES[name]))
 
         return serve
 
@@ -186,8 +212,7 @@ class Bridge:
         if steps < 1:
             response.message = f"the parameter steps of /cars is {steps}; it must be 1 or more"
             return response
-        return _filled(response, self.control({"do": "step", "n": steps}, STEP_S))
-
+        return _filled(response, self.step(steps))
 
     def _features(self, _request: Any, response: Any) -> Any:
         response.success, response.message = True, json.dumps({"features": FEATURES})
@@ -195,20 +220,18 @@ class Bridge:
 
     def _entities(self, _request: Any, response: Any) -> Any:
         """Robots and guests as the last frame has them."""
-        with self._lock:
-            frame = self._frame
-            response.success = bool(frame)
-            if not frame:
-                response.message = "there is no frame of the run yet"
-                return response
-            entities = [
-                {"name": self._name(robot["name"]), "x": robot["location"]["x"], "y": robot["location"]["y"], "yaw": _heading_rad(robot)}
-                for robot in frame["robots"]
-            ]
-            numbers = frame.get("guest_numbers") or range(len(frame["guests"]))
-            entities += [{"name": f"guest_{number}", "x": x, "y": y, "yaw": 0.0} for number, (x, y) in zip(numbers, frame["guests"])]
-            response.message = json.dumps({"tick": frame["tick"], "frame_id": "map", "entities": entities})
+        frame = self.current()
+        response.success = bool(frame)
+        if not frame:
+            response.message = "there is no frame of the run yet"
+            return response
+        entities = [{"name": one.name, "x": one.x_m, "y": one.y_m, "yaw": one.yaw_rad} for one in self.entities(frame)]
+        response.message = json.dumps({"tick": frame["tick"], "frame_id": "map", "entities": entities})
         return response
+
+
+def _time_ns(frame: dict[str, Any]) -> int:
+    return round(float(frame["tick"] * frame["tick_s"]) * 1e9)
 
 
 def _heading_rad(robot: dict[str, Any]) -> float:
