@@ -11,6 +11,8 @@ import sys
 import sysconfig
 from pathlib import Path
 
+DOMAIN = 50 + os.getpid() % 50
+"""A domain of ROS for the tests of this process: others that test on this machine would answer its calls."""
 PREFIX = Path(sys.prefix)
 """Where the wheels put headers, libraries and the index of packages."""
 USED = ("std_msgs", "geometry_msgs", "builtin_interfaces", "service_msgs")

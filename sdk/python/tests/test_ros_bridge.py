@@ -48,9 +48,9 @@ ALIVE = {"ROS_DOMAIN_ID": str(DOMAIN), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHO
 class Other:
     """A node in this process that knows nothing of CARS."""
 
-    def __init__(self) -> None:
+    def __init__(self, domain: int = DOMAIN) -> None:
         self.context = Context()
-        self.context.init([], domain_id=DOMAIN)
+        self.context.init([], domain_id=domain)
         self.node: Any = Node("other", context=self.context)
         self.executor = SingleThreadedExecutor(context=self.context)
         self.executor.add_node(self.node)

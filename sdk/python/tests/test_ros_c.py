@@ -15,14 +15,14 @@ from typing import Any
 import pytest
 from conftest import missing
 from lab import EXAMPLES, PATIENCE_S, ROOT, Lab, assert_same, eventually
-from ros_types import missing_tools
+from ros_types import DOMAIN, missing_tools
 from test_ros import ROSIE, SCENARIO
 
 import cars
 
 pytestmark = pytest.mark.thorough
 
-DOMAIN = {"ROS_DOMAIN_ID": "45", "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp"}
+ALIVE = {"ROS_DOMAIN_ID": str(DOMAIN), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp"}
 LAUNCH = """
 scenario = "c.toml"
 speed = 20
@@ -51,9 +51,9 @@ def test_a_node_in_c_is_a_robot_of_which_each_run_is_the_same(lab: Lab, program:
     (lab.folder / "launch.toml").write_text(LAUNCH.format(python=sys.executable))
 
     def launched(run: str, is_stopped: bool = False) -> list[str]:
-        node = lab.start([str(program), "--ros-args", "-r", "__ns:=/Rosie"], **DOMAIN)
+        node = lab.start([str(program), "--ros-args", "-r", "__ns:=/Rosie"], **ALIVE)
         out = ["--no-console", "-q", "--out", str(lab.folder), "--run", run, *(["--paused"] if is_stopped else [])]
-        launch = lab.start([str(lab.programs / "cars"), "launch", str(lab.folder / "launch.toml"), *out], **DOMAIN)
+        launch = lab.start([str(lab.programs / "cars"), "launch", str(lab.folder / "launch.toml"), *out], **ALIVE)
         if is_stopped:
             stopped(lab, run, node)
         assert launch.wait(PATIENCE_S) == 0, launch.communicate()
