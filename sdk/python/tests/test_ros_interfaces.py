@@ -6,9 +6,12 @@ The packages are made here, from their definitions.
 from __future__ import annotations
 
 import importlib
+import json
 import math
 import os
 import re
+import signal
+import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -101,15 +104,15 @@ def other(monkeypatch: pytest.MonkeyPatch) -> Iterator[Other]:
 
 
 @pytest.fixture
-def bridged(lab: Lab, made: Path) -> str:
-    """A run in progress, paused at tick 0, and its bridge."""
+def bridged(lab: Lab, made: Path) -> tuple[str, subprocess.Popen[str]]:
+    """A run in progress, paused at tick 0, with its bridge; its name, and one of its robots."""
     run = lab.simulator("made", SCENARIO + WHEELS, "--speed", "max", "--paused")
-    lab.robot("walker.py", "--name", "walker-1", **run)
+    walker = lab.robot("walker.py", "--name", "walker-1", **run)
     lab.start([sys.executable, str(Path(__file__).with_name("rover.py")), "--name", "Wheels"], **run)
     lab.until_ready("--run", "made", "--connect", run["CARS_CONNECT"])
     path = os.pathsep.join(filter(None, [str(made), os.environ.get("PYTHONPATH")]))
     lab.start([str(lab.programs / "cars"), "ros", "bridge"], PYTHONPATH=path, **run, **ALIVE)
-    return "made"
+    return "made", walker
 
 
 class Standard:
@@ -121,11 +124,14 @@ class Standard:
         self.srv: Any = importlib.import_module("simulation_interfaces.srv")
 
     def call(self, name: str, **fields: Any) -> Any:
+        return self.other.done(self.asked(name, **fields))
+
+    def asked(self, name: str, **fields: Any) -> Any:
         kind = getattr(self.srv, name)
         topic = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower()
         client = self.other.node.create_client(kind, f"/{topic}")
         self.other.until(topic, lambda: client.service_is_ready() or None)
-        return self.other.done(client.call_async(kind.Request(**fields)))
+        return client.call_async(kind.Request(**fields))
 
     def result(self, name: str, **fields: Any) -> int:
         return int(self.call(name, **fields).result.result)
@@ -137,7 +143,8 @@ class Standard:
         return int(self.call("GetSimulationState").state.state)
 
 
-def test_transforms_are_those_of_the_record(lab: Lab, other: Other, bridged: str) -> None:
+def test_transforms_are_those_of_the_record(lab: Lab, other: Other, bridged: tuple[str, subprocess.Popen[str]]) -> None:
+    run, _ = bridged
     seen: list[Any] = []
     other.node.create_subscription(importlib.import_module("tf2_msgs.msg").TFMessage, "/tf", seen.append, 100)
     odometries: list[Any] = []
@@ -152,10 +159,10 @@ def test_transforms_are_those_of_the_record(lab: Lab, other: Other, bridged: str
     standard = Standard(other)
     assert other.call("pause")[0]
     assert standard.set_state(standard.msg.SimulationState.STATE_QUITTING) == standard.msg.Result.RESULT_OK
-    lab.ended(bridged)
+    lab.ended(run)
     other.until("the last transforms", lambda: seen[-1].transforms[0].header.stamp.sec == 20 or None)
 
-    states = cars.load(bridged, out=lab.folder).frames("pandas").states
+    states = cars.load(run, out=lab.folder).frames("pandas").states
     rows = {(row.robot, round(row.time_s * 1e9)): row for row in states.itertuples()}
     names = {"walker_1/base_link": "walker-1", "Wheels/base_link": "Wheels"}
     stamps = []
@@ -184,7 +191,8 @@ def test_transforms_are_those_of_the_record(lab: Lab, other: Other, bridged: str
     assert min(speeds) < -0.1 and max(speeds) > 0.1
 
 
-def test_a_run_is_controlled_by_the_standard(lab: Lab, other: Other, bridged: str) -> None:
+def test_a_run_is_controlled_by_the_standard(lab: Lab, other: Other, bridged: tuple[str, subprocess.Popen[str]]) -> None:
+    run, walker = bridged
     standard = Standard(other)
     states, results = standard.msg.SimulationState, standard.msg.Result
     features = standard.call("GetSimulatorFeatures").features
@@ -236,7 +244,7 @@ def test_a_run_is_controlled_by_the_standard(lab: Lab, other: Other, bridged: st
     assert standard.set_state(states.STATE_STOPPED) == results.RESULT_OK
     assert standard.state() == states.STATE_STOPPED and clock_ns() == 0
     assert standard.call("GetEntityState", entity="walker_1").state.pose.position.x == 2.0
-    lab.cars("ctl", "--run", bridged, "--out", str(lab.folder), "speed", "2")
+    lab.cars("ctl", "--run", run, "--out", str(lab.folder), "speed", "2")
     assert standard.set_state(states.STATE_PLAYING) == results.RESULT_OK
     assert standard.state() == states.STATE_PLAYING
     assert standard.set_state(states.STATE_PLAYING) == 101
@@ -252,9 +260,20 @@ def test_a_run_is_controlled_by_the_standard(lab: Lab, other: Other, bridged: st
     assert standard.result("ResetSimulation", scope=scopes.SCOPE_ALL) == results.RESULT_OK
     assert clock_ns() == 0
 
+    # A step that hangs, because a robot does, is paused; meanwhile the others are answered.
+    walker.send_signal(signal.SIGSTOP)
+    step = standard.asked("StepSimulation", steps=50)
+    other.until("a step", lambda: json.loads(other.call("get_state")[1])["awaiting"] or None)
+    assert standard.state() == states.STATE_PAUSED and not step.done()
+    assert other.call("pause")[0]
+    answer = other.done(step).result
+    assert answer.result == results.RESULT_OPERATION_FAILED and "0 of 50 ticks" in answer.error_message
+    walker.send_signal(signal.SIGCONT)
+    assert standard.result("ResetSimulation") == results.RESULT_OK
+
     # More steps than there are left.
     answer = standard.call("StepSimulation", steps=500).result
     assert answer.result == results.RESULT_OPERATION_FAILED and "200 of 500 ticks" in answer.error_message
-    lab.ended(bridged)
+    lab.ended(run)
     answer = standard.call("GetSimulationState").result
-    assert answer.result == results.RESULT_OPERATION_FAILED and bridged in answer.error_message
+    assert answer.result == results.RESULT_OPERATION_FAILED and run in answer.error_message

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import importlib.util
 import json
 import os
 import sys
@@ -28,6 +29,8 @@ ANSWER_S = 10.0
 """How long to wait for an answer of the simulator, which comes at once."""
 STEP_S = 3600.0
 """How long to wait for that to a step, which comes when its ticks are complete."""
+THREADS = 4
+"""How many services are answered at a time."""
 SERVICES = {
     "start": {"do": "start"},
     "pause": {"do": "pause"},
@@ -48,11 +51,9 @@ class Bridge:
             self._trigger = importlib.import_module("std_srvs.srv").Trigger
         except ImportError as error:
             raise RosError(f"the bridge cannot be started ({error}): `pip install 'cars-simulator[ros]'`") from error
-        try:
-            # On no registry as a wheel; an installation of ROS has it.
-            self._tf: Any = importlib.import_module("tf2_msgs.msg").TFMessage
-        except ImportError:
-            self._tf = None
+        # Both are on no registry as a wheel; an installation of ROS has them.
+        self._tf: Any = importlib.import_module("tf2_msgs.msg").TFMessage if _is_installed("tf2_msgs") else None
+        has_interfaces = _is_installed("simulation_interfaces")
 
         ros = self._ros
         ros.rclpy.init(args=[])
@@ -65,16 +66,16 @@ class Bridge:
         self._transformed: Optional[tuple[int, int]] = None
         # One frame at a time is published, in their order.
         self._arrived = threading.Condition()
+        # A step takes as long as its ticks, and may be paused meanwhile: no service waits for another one.
+        self._group = ros.rclpy.callback_groups.ReentrantCallbackGroup()
         for name in SERVICES:
-            self._node.create_service(self._trigger, f"/cars/{name}", self._serve(name))
-        self._node.create_service(self._trigger, "/cars/step", self._step)
-        self._node.create_service(self._trigger, "/cars/get_features", self._features)
-        self._node.create_service(self._trigger, "/cars/get_entities", self._entities)
-        try:
-            self._interfaces: Optional[Interfaces] = Interfaces(self, self._node)
-        except ImportError:
-            # On no registry as a wheel, either.
-            self._interfaces = None
+            self.serve(self._trigger, f"/cars/{name}", self._serve(name))
+        self.serve(self._trigger, "/cars/step", self._step)
+        self.serve(self._trigger, "/cars/get_features", self._features)
+        self.serve(self._trigger, "/cars/get_entities", self._entities)
+        if has_interfaces:
+            Interfaces(self)
+        self._extras = ", /tf" * (self._tf is not None), " and those of simulation_interfaces" * has_interfaces
 
         zenoh = self._zenoh
         config = zenoh.Config.from_file(zenoh_config) if zenoh_config else zenoh.Config()
@@ -90,8 +91,15 @@ class Bridge:
 
     def spin(self) -> None:
         """Serves until it is interrupted."""
-        print(f"bridging run {self._run}: /clock, odometry, guests; services in /cars", flush=True)
-        self._ros.rclpy.spin(self._node)
+        topics, services = self._extras
+        print(f"bridging run {self._run}: /clock, odometry, guests{topics}; services in /cars{services}", flush=True)
+        executor = self._ros.executors.MultiThreadedExecutor(THREADS)
+        executor.add_node(self._node)
+        executor.spin()
+
+    def serve(self, kind: Any, name: str, answer: Any) -> None:
+        """Declares a service."""
+        self._node.create_service(kind, name, answer, callback_group=self._group)
 
     def close(self) -> None:
         """Ends it."""
@@ -228,6 +236,10 @@ class Bridge:
         entities = [{"name": one.name, "x": one.x_m, "y": one.y_m, "yaw": one.yaw_rad} for one in self.entities(frame)]
         response.message = json.dumps({"tick": frame["tick"], "frame_id": "map", "entities": entities})
         return response
+
+
+def _is_installed(package: str) -> bool:
+    return importlib.util.find_spec(package) is not None
 
 
 def _time_ns(frame: dict[str, Any]) -> int:

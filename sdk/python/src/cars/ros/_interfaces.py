@@ -47,11 +47,8 @@ class Entity:
 class Interfaces:
     """Serves a run as that standard has it; names of the services are those of its types: ``/step_simulation``."""
 
-    def __init__(self, bridge: Bridge, node: Any) -> None:
-        """Declares the services.
-
-        :raises ImportError: if there are no types of simulation_interfaces.
-        """
+    def __init__(self, bridge: Bridge) -> None:
+        """Declares the services."""
         self._bridge = bridge
         self._msg: Any = importlib.import_module("simulation_interfaces.msg")
         self._srv: Any = importlib.import_module("simulation_interfaces.srv")
@@ -69,7 +66,7 @@ class Interfaces:
         }
         for name, serve in services.items():
             topic = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower()
-            node.create_service(getattr(self._srv, name), f"/{topic}", serve)
+            bridge.serve(getattr(self._srv, name), f"/{topic}", serve)
 
     def _get_features(self, _request: Any, response: Any) -> Any:
         response.features.features = [getattr(self._msg.SimulatorFeatures, name) for name in FEATURES]
