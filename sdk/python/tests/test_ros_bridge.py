@@ -27,6 +27,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
+from ros_types import DOMAIN
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
@@ -41,16 +42,15 @@ count = 3
 name = "walker-1"
 at = ["2 m", "2 m"]
 """
-DOMAIN = 42
 ALIVE = {"ROS_DOMAIN_ID": str(DOMAIN), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
 
 
 class Other:
     """A node in this process that knows nothing of CARS."""
 
-    def __init__(self, domain: int = DOMAIN) -> None:
+    def __init__(self) -> None:
         self.context = Context()
-        self.context.init([], domain_id=domain)
+        self.context.init([], domain_id=DOMAIN)
         self.node: Any = Node("other", context=self.context)
         self.executor = SingleThreadedExecutor(context=self.context)
         self.executor.add_node(self.node)

@@ -21,15 +21,14 @@ import pytest
 from conftest import missing
 from lab import Lab, eventually
 from nav_msgs.msg import Odometry
-from ros_types import DOMAIN, build, missing_tools
-from test_ros_bridge import SCENARIO, Other, time_ns
+from ros_types import build, missing_tools
+from test_ros_bridge import ALIVE, SCENARIO, Other, time_ns
 
 import cars
 from cars.ros import _interfaces
 
 pytestmark = pytest.mark.thorough
 
-ALIVE = {"ROS_DOMAIN_ID": str(DOMAIN), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
 TF = {"msg/TFMessage.msg": "geometry_msgs/TransformStamped[] transforms"}
 """tf2_msgs/TFMessage of ros2/geometry2."""
 STANDARD = {
@@ -96,7 +95,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 def other(monkeypatch: pytest.MonkeyPatch) -> Iterator[Other]:
     for name, value in ALIVE.items():
         monkeypatch.setenv(name, value)
-    node = Other(DOMAIN)
+    node = Other()
     yield node
     node.executor.shutdown()
     node.node.destroy_node()
