@@ -1,5 +1,5 @@
-//! Hunts for faults: plans of faults are drawn and played until an expectation of the scenario fails ([`hunt`]); the plan is then
-//! shrunk to a minimal scenario file ([`shrink`]). A plan is played by the runs and launches of `experiments` ([`Subject`]).
+//! Hunts for faults: plans of faults are drawn and played until an expectation of the scenario fails ([`hunt()`]); the plan is then
+//! shrunk to a minimal scenario file ([`shrink()`]). A plan is played by the runs and launches of `experiments` ([`Subject`]).
 
 mod case;
 mod cause;

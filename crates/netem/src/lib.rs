@@ -1,4 +1,4 @@
-//! Network emulation: a launch over links of its own, which are cut, closed, delayed and narrowed by a plan ([`play`],
+//! Network emulation: a launch over links of its own, which are cut, closed, delayed and narrowed by a plan ([`play()`],
 //! [`FaultPlan`]). A link is a TCP proxy, a pair of network interfaces between namespaces, or the network of a container ([`Via`]).
 //!
 //! These are faults of real links. Experiments use the simulated network between robots (`[network]` of a scenario), which is
