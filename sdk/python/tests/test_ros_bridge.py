@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import os
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -125,8 +126,41 @@ def test_a_step_is_exactly_so_many_ticks(lab: Lab, other: Other) -> None:
 
     done, status = other.call("reset")
     assert done and json.loads(status)["epoch"] == 2
+    # Its robots have joined, so it can be stepped at once: the loop of a learner.
+    done, status = other.call("step")
+    assert done, status
     assert other.call("stop")[0]
     lab.ended("bridged")
+
+
+@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM])
+def test_during_a_long_step_a_run_is_paused_and_a_bridge_ends(lab: Lab, other: Other, end: signal.Signals) -> None:
+    endless = SCENARIO.replace("100 s", "10000000 s")
+    run = lab.simulator("long", endless, "--speed", "max", "--paused")
+    lab.robot("walker.py", "--name", "walker-1", **run)
+    lab.until_ready("--run", "long", "--connect", run["CARS_CONNECT"])
+    bridge = lab.start([str(lab.programs / "cars"), "ros", "bridge"], **run, **ALIVE)
+    parameters = AsyncParameterClient(other.node, "/cars")
+    assert parameters.wait_for_services(PATIENCE_S)
+
+    def set_steps(steps: int) -> None:
+        other.done(parameters.set_parameters([Parameter("steps", value=steps)]))
+
+    def begin_step() -> Any:
+        before = json.loads(other.call("get_state")[1])["tick"]
+        client = other.node.create_client(Trigger, "/cars/step")
+        assert client.wait_for_service(PATIENCE_S)
+        answer = client.call_async(Trigger.Request())
+        other.until("a tick of the step", lambda: json.loads(other.call("get_state")[1])["tick"] > before or None)
+        return answer
+
+    set_steps(1_000_000)
+    answer = begin_step()
+    assert other.call("pause")[0]
+    assert json.loads(other.done(answer).message)["tick"] < 1_000_000
+    begin_step()
+    bridge.send_signal(end)
+    bridge.communicate(timeout=PATIENCE_S)
 
 
 def time_ns(clocks: list[Any]) -> int:

@@ -39,6 +39,8 @@ pub(super) fn newest(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     // it answers does not depend on how fast it reads.
     let held = harness.next_tick() - 1;
     let newest = held + 2;
+    // The others are in that tick, too.
+    harness.fake_peers.begin(1, newest);
     let flag = harness.flag();
     for tick in [held + 1, newest] {
         harness.put_clock(&Clock {

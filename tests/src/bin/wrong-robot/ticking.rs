@@ -174,7 +174,8 @@ impl Host {
             },
             speed_mps: 0.1,
             direction_rad: if wrong.is("number.angles:half") && tick == SLOW_TICK {
-                -3.141593
+                // Half a turn as it is rounded, on the wrong side.
+                f64::from(-3_141_593) / 1e6
             } else {
                 ((angle + turn) * 1e6).round() / 1e6
             },

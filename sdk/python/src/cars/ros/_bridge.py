@@ -9,6 +9,7 @@ import json
 import os
 import sys
 import threading
+import time
 from collections.abc import Sequence
 from typing import Any, Optional
 
@@ -29,12 +30,15 @@ ANSWER_S = 10.0
 """How long to wait for an answer of the simulator, which comes at once."""
 STEP_S = 3600.0
 """How long to wait for that to a step, which comes when its ticks are complete."""
+JOIN_S = 30.0
+"""How long to wait for the robots of a further epoch, wall clock."""
+POLL_S = 0.02
+"""How often to look for them."""
 THREADS = 4
 """How many services are answered at a time."""
 SERVICES = {
     "start": {"do": "start"},
     "pause": {"do": "pause"},
-    "reset": {"do": "init"},
     "stop": {"do": "stop"},
     "get_state": {"do": "status"},
 }
@@ -70,6 +74,7 @@ class Bridge:
         self._group = ros.rclpy.callback_groups.ReentrantCallbackGroup()
         for name in SERVICES:
             self.serve(self._trigger, f"/cars/{name}", self._serve(name))
+        self.serve(self._trigger, "/cars/reset", self._reset)
         self.serve(self._trigger, "/cars/step", self._step)
         self.serve(self._trigger, "/cars/get_features", self._features)
         self.serve(self._trigger, "/cars/get_entities", self._entities)
@@ -185,6 +190,18 @@ class Bridge:
         """Has the simulator do so many ticks, and returns its answer when they are complete."""
         return self.control({"do": "step", "n": ticks}, STEP_S)
 
+    def reset(self) -> dict[str, Any]:
+        """Begins the next epoch, and returns the answer of the simulator when all robots are there again: it can be stepped."""
+        answer = self.control({"do": "init"})
+        deadline_s = time.monotonic() + JOIN_S
+        while answer["answer"] == "done" and answer["phase"] == "gathering":
+            if time.monotonic() > deadline_s:
+                names = ", ".join(robot["name"] for robot in answer["awaiting"])
+                return {"answer": "refused", "explanation": f"robots did not join epoch {answer['epoch']} within {JOIN_S:.0f} s: {names}"}
+            time.sleep(POLL_S)
+            answer = self.control({"do": "status"})
+        return answer
+
     def current(self) -> dict[str, Any]:
         """The frame of the last tick that is complete, or nothing. That of a step is still on its way when the step is answered."""
         status = self.control({"do": "status"})
@@ -221,6 +238,9 @@ class Bridge:
             response.message = f"the parameter steps of /cars is {steps}; it must be 1 or more"
             return response
         return _filled(response, self.step(steps))
+
+    def _reset(self, _request: Any, response: Any) -> Any:
+        return _filled(response, self.reset())
 
     def _features(self, _request: Any, response: Any) -> Any:
         response.success, response.message = True, json.dumps({"features": FEATURES})

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import re
-import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Optional
 
@@ -25,10 +24,6 @@ FEATURES = [
 """What simulation_interfaces/SimulatorFeatures calls what is served here."""
 LIMITS = "reset has the scope ALL; entities are filtered by name only; accelerations, turns and velocities of guests are given as 0"
 """What is said of them beside."""
-JOIN_S = 30.0
-"""How long to wait for the robots of a further epoch, wall clock."""
-POLL_S = 0.02
-"""How often to look for them."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +83,7 @@ class Interfaces:
             return self._answered(response, response.ALREADY_IN_TARGET_STATE, f"the run is {status['phase']} already")
 
         if wanted == states.STATE_STOPPED:
-            answer = self._begin_epoch()
+            answer = self._bridge.reset()
         elif wanted == states.STATE_PLAYING:
             answer = self._bridge.control({"do": "start"})
         elif wanted == states.STATE_PAUSED:
@@ -117,7 +112,7 @@ class Interfaces:
         if request.scope not in (request.SCOPE_DEFAULT, request.SCOPE_ALL):
             text = f"the scope {request.scope} is not supported: a run is reset as a whole, with SCOPE_ALL"
             return self._answered(response, self._msg.Result.RESULT_FEATURE_UNSUPPORTED, text)
-        self._is_done(self._begin_epoch(), response)
+        self._is_done(self._bridge.reset(), response)
         return response
 
     def _get_entities(self, request: Any, response: Any) -> Any:
@@ -169,19 +164,6 @@ class Interfaces:
         fill_pose(state.pose, entity.x_m, entity.y_m, entity.yaw_rad)
         state.twist.linear.x, state.twist.linear.y = entity.velocity_mps
         return state
-
-    def _begin_epoch(self) -> dict[str, Any]:
-        """Back to tick 0, when all robots are there again; held, and not paused."""
-        answer = self._bridge.control({"do": "init"})
-        deadline_s = time.monotonic() + JOIN_S
-        while answer["answer"] == "done" and answer["phase"] == "gathering":
-            if time.monotonic() > deadline_s:
-                names = ", ".join(robot["name"] for robot in answer["awaiting"])
-                text = f"robots did not join epoch {answer['epoch']} within {JOIN_S:.0f} s: {names}"
-                return {"answer": "refused", "explanation": text}
-            time.sleep(POLL_S)
-            answer = self._bridge.control({"do": "status"})
-        return answer
 
     def _state(self, status: dict[str, Any]) -> int:
         """What the standard calls the phase of a run. A run is stopped until it is played, stepped or paused."""
