@@ -306,7 +306,7 @@ fn limits_times_and_version_are_those_of_the_code() {
             "after 10 ms and then at doubling intervals",
         ),
         (
-            "simulator",
+            "environment",
             "MAX_DELIVERED_BYTES: usize = 512 * 1024",
             "more than 524288 bytes arrive at one robot in one tick",
         ),
