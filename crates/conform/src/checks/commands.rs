@@ -64,7 +64,12 @@ pub(super) fn order(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailur
         let swapped = values(&commanded(kit, &[(&two, LAST - 1), (&one, LAST)])?);
         let in_order = values(&commanded(kit, &[(&one, LAST), (&two, LAST)])?);
         let reversed = values(&commanded(kit, &[(&two, LAST), (&one, LAST)])?);
-        // Also where both are the same: a robot that sorts its commands takes one of the orders, whichever the news list.
+        // Where both are the same, the order within a tick makes no difference to this robot, or it sorts its commands: only a variable
+        // with the text of the last command tells which.
+        if in_order == reversed && !shows_last(&straight, &two, &swapped, &one) {
+            continue;
+        }
+
         let votes = vote(&in_order, &straight, &swapped);
         let back = vote(&reversed, &swapped, &straight);
         for (votes, first, second) in [(&votes, &one, &two), (&back, &two, &one)] {
@@ -89,6 +94,17 @@ pub(super) fn order(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailur
     );
     findings.skip("command.order", &reason);
     Ok(())
+}
+
+/// Whether a value is the text of the last command, in both orders of two ticks.
+fn shows_last(
+    straight: &BTreeMap<(Tick, String), Value>,
+    two: &str,
+    swapped: &BTreeMap<(Tick, String), Value>,
+    one: &str,
+) -> bool {
+    let mut values = straight.iter();
+    values.any(|(at, value)| *value == two && swapped.get(at).is_some_and(|other| *other == one))
 }
 
 /// What the robot reports after the last command, by tick and field.

@@ -263,6 +263,10 @@ fn played(kit: &Kit, is_disturbed: bool) -> Result<(Transcript, Findings), Broke
                     "command.sent"
                 } else if is_disturbed {
                     rule_of(tick)
+                } else if tick > CRASH_AFTER {
+                    "return.generation"
+                } else if tick > HANG_AFTER {
+                    "return.rejoin"
                 } else {
                     "tick.answer"
                 };

@@ -133,6 +133,8 @@ fn start(kit: &Kit, run: &RunName, options: &HarnessOptions) -> Result<RobotProc
 fn barrier(roster: impl IntoIterator<Item = RobotName>) -> Barrier<usize, ReportedCommand> {
     let timing = Timing {
         token: TOKEN_PATIENCE,
+        // A welcome repeats no clock here: what a robot does with one that comes again is another rule's.
+        repeat_for_newcomers: Timing::default().repeat,
         ..Timing::default()
     };
     Barrier::new(roster, patient(), timing, MAX_ENTRIES as u32)
