@@ -207,11 +207,13 @@ def test_one_crosshair_in_all_views(launch, open_page):
     left, width = page.locator("#chart").bounding_box()["x"] + 76, page.locator("#chart").bounding_box()["width"] - 100
     for view in ("#chart", "#bands"):
         assert abs(x_of(f"{view} .crosshair") - (left + width * 0.6)) < 2
-    # The key has the values of this time.
-    value = page.evaluate(
+    # The key has the values of this time, when they have been read.
+    recorded = (
         "(() => { const {times_s, variables} = window.carsConsole.history();"
-        " return variables.get('intensity').get('Butler')[times_s.indexOf(30)]; })()"
+        " return variables.get('intensity')?.get('Butler')?.[times_s.indexOf(30)] ?? null; })()"
     )
+    until(page, f"{recorded} !== null")
+    value = page.evaluate(recorded)
     page.get_by_test_id("chart-variable").select_option("intensity")
     page.mouse.move(box["x"] + box["width"] * 60 / end, box["y"] + box["height"] / 2)
     expect(page.locator(".key li", has_text="Butler").locator("b")).to_have_text(f"{value:.3f}".rstrip("0").rstrip("."))

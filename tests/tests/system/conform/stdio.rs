@@ -31,12 +31,13 @@ for line in sys.stdin:
 /// What a program does: a name that begins with the rule that it breaks, or `right`; in each tick; at the end.
 type Doing = (&'static str, &'static str, &'static str);
 
-/// Programs that keep the rules, just so.
+/// Programs that keep the rules, just so. The longest log is in few ticks: in all of them, and in all checks at once, gigabytes would
+/// pass.
 const RIGHT: [Doing; 4] = [
     ("right", "done['proposal'] = message['location']", ""),
     (
         "right:lines",
-        "[say(type='log', text='x' * 512) for _ in range(512)]",
+        "[say(type='log', text='x' * 512) for _ in range(512 * (message['tick'] % 20 == 3))]",
         "",
     ),
     ("right:text", "say(type='log', text='x' * 4096)", ""),
