@@ -155,6 +155,7 @@ class Link:
         self.welcome: Json = {}
         self.is_seated = self.has_rejoined = self.must_join = False
         self.pending: Json | None = None
+        self.later: Json | None = None
         self.news: dict[tuple[int, int], Json] = {}
         self.answered = (0, -1)
         self.answer_bytes = (b"", b"")
@@ -240,12 +241,13 @@ class Link:
         """Takes a place in an epoch, or goes on if it is the one that it has (epoch.init, return.generation)."""
         before, self.welcome = self.welcome, welcome
         self.must_join = False
+        if self.later is not None and self.later["at"][0] == welcome["epoch"]:
+            self.pending = self.later
+        self.later = None
         epoch = welcome["epoch"]
+        self.news = {at: news for at, news in self.news.items() if at[0] == epoch}
         if before and (before["epoch"], before["generation"]) == (epoch, welcome["generation"]):
             return
-        # What came before the welcome comes again behind it.
-        self.pending = None
-        self.news = {}
         self.has_rejoined = bool(before) and before["epoch"] == epoch
         self.is_seated = False
         self.answered = (0, -1)
@@ -298,6 +300,7 @@ class Link:
         epoch = self.welcome["epoch"]
         if clock["at"][0] > epoch:
             self.must_join = True
+            self.later = clock if self.later is None or clock["at"] >= self.later["at"] else self.later
         elif clock["at"][0] == epoch and clock["at"] == self.answered:
             self.put()
         elif clock["at"][0] == epoch and clock["at"] > self.answered:
