@@ -78,8 +78,8 @@ class Other:
         return answer.success, answer.message
 
 
-@pytest.fixture
-def other(monkeypatch: pytest.MonkeyPatch) -> Iterator[Other]:
+def alive(monkeypatch: pytest.MonkeyPatch) -> Iterator[Other]:
+    """Such a node in the domain of this process, as long as a test takes."""
     for name, value in ALIVE.items():
         monkeypatch.setenv(name, value)
     made = Other()
@@ -87,6 +87,11 @@ def other(monkeypatch: pytest.MonkeyPatch) -> Iterator[Other]:
     made.executor.shutdown()
     made.node.destroy_node()
     made.context.try_shutdown()
+
+
+@pytest.fixture
+def other(monkeypatch: pytest.MonkeyPatch) -> Iterator[Other]:
+    yield from alive(monkeypatch)
 
 
 def test_a_step_is_exactly_so_many_ticks(lab: Lab, other: Other) -> None:

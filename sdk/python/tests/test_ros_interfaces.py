@@ -22,7 +22,7 @@ from conftest import missing
 from lab import Lab, eventually
 from nav_msgs.msg import Odometry
 from ros_types import build, missing_tools
-from test_ros_bridge import ALIVE, SCENARIO, Other, time_ns
+from test_ros_bridge import ALIVE, SCENARIO, Other, alive, time_ns
 
 import cars
 from cars.ros import _interfaces
@@ -93,13 +93,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 @pytest.fixture
 def other(monkeypatch: pytest.MonkeyPatch) -> Iterator[Other]:
-    for name, value in ALIVE.items():
-        monkeypatch.setenv(name, value)
-    node = Other()
-    yield node
-    node.executor.shutdown()
-    node.node.destroy_node()
-    node.context.try_shutdown()
+    yield from alive(monkeypatch)
 
 
 @pytest.fixture

@@ -8,15 +8,15 @@ use std::time::Duration;
 
 use bus::{Bus, Declared, Role};
 use protocol::keys::Keys;
-use protocol::messages::{
-    Clock, Control, ControlAnswer, JoinAnswer, Report, StateVariables, TickUpdate, Welcome,
-};
+use protocol::messages::{Clock, Control, ControlAnswer, JoinAnswer, Report, TickUpdate, Welcome};
 use protocol::{Epoch, PROTOCOL_VERSION, RobotName, RunName, Tick, decode, encode};
 use serde_json::{Value, json};
 use system_tests::processes::{Running, mark};
 use system_tests::stalls::Stalls;
 use system_tests::tools::has_modules;
 use system_tests::{Lab, PATIENCE, eventually, free_port, programs, root};
+
+use super::wire::standing;
 
 /// Where the clock goes on after 0.3 s, which is much less than the 2 s after which a clock is usually repeated.
 const SCENARIO: &str = "duration = \"20 s\"\non_late = \"continue\"\ndeadline = \"0.3 s\"\nlose_after = 2\n\
@@ -27,7 +27,7 @@ const LAST_TICK: Tick = 40;
 const HANG_FROM: (Epoch, Tick) = (2, 10);
 /// A machine that stands still for so long makes robots late.
 const LONGEST_STALL: Duration = Duration::from_millis(100);
-const MOST_ATTEMPTS: usize = 5;
+const MAX_ATTEMPTS: usize = 5;
 
 /// What a robot gets, in the order in which it arrives.
 enum Arrived {
@@ -172,22 +172,11 @@ impl ForgetfulRobot {
 
         self.has_begun = true;
         let corrected = update.and_then(|update| update.correction);
-        let report = Report {
-            epoch: clock.epoch,
-            tick: clock.tick,
-            generation: self.welcome.generation,
-            proposal: corrected.map_or(self.welcome.location, |correction| correction.location),
-            speed_mps: 0.0,
-            direction_rad: 0.0,
-            emotion_state: "CALM".into(),
-            behavior_state: "IDLE".into(),
-            state_variables: StateVariables::new(),
-            commands: 0,
-            log: vec![],
-            site_actions: Vec::new(),
-            layer_actions: Vec::new(),
-            velocity: None,
-        };
+        let mut report = standing(&self.welcome, clock.tick);
+        report.epoch = clock.epoch;
+        if let Some(correction) = corrected {
+            report.proposal = correction.location;
+        }
         self.put(&report);
         self.answered = Some(report);
     }
@@ -356,7 +345,7 @@ fn assert_in_time(
             return;
         };
         let is_to_blame = stalls.longer_than(LONGEST_STALL) > 0;
-        assert!(is_to_blame && attempt < MOST_ATTEMPTS, "{reason}");
+        assert!(is_to_blame && attempt < MAX_ATTEMPTS, "{reason}");
     }
 }
 

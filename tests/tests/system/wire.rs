@@ -240,28 +240,33 @@ impl Hand {
     }
 
     fn report(&self, tick: u64) -> Report {
-        Report {
-            epoch: self.welcome.epoch,
-            tick,
-            generation: self.welcome.generation,
-            proposal: self.welcome.location,
-            speed_mps: 0.0,
-            direction_rad: 0.0,
-            emotion_state: "CALM".into(),
-            behavior_state: "IDLE".into(),
-            state_variables: StateVariables::new(),
-            commands: 0,
-            log: vec![],
-            site_actions: Vec::new(),
-            layer_actions: Vec::new(),
-            velocity: None,
-        }
+        standing(&self.welcome, tick)
     }
 
     fn put(&self, report: &Report) {
         self.bus
             .put(&self.keys.report(&self.name), encode(report))
             .unwrap();
+    }
+}
+
+/// The report of a robot that stands where its welcome has placed it.
+pub(crate) fn standing(welcome: &Welcome, tick: u64) -> Report {
+    Report {
+        epoch: welcome.epoch,
+        tick,
+        generation: welcome.generation,
+        proposal: welcome.location,
+        speed_mps: 0.0,
+        direction_rad: 0.0,
+        emotion_state: "CALM".into(),
+        behavior_state: "IDLE".into(),
+        state_variables: StateVariables::new(),
+        commands: 0,
+        log: vec![],
+        site_actions: Vec::new(),
+        layer_actions: Vec::new(),
+        velocity: None,
     }
 }
 
