@@ -18,8 +18,8 @@ use hyper::server::conn::http1;
 use hyper::service::{Service as _, service_fn};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
+use include_dir::{Dir, include_dir};
 use protocol::{Epoch, Tick};
-use rust_embed::Embed;
 use serde::{Deserialize, Serialize};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{Notify, Semaphore};
@@ -45,9 +45,7 @@ const NO_FOLDER: &str = "this console was not told the run's folder (--folder RU
 const DIAGRAM_STYLE: &str = "diagram.css";
 
 /// The files of the page.
-#[derive(Embed)]
-#[folder = "assets/"]
-struct Assets;
+static ASSETS: Dir = include_dir!("$CARGO_MANIFEST_DIR/assets");
 
 fn routes(app: Arc<App>) -> Router {
     let page = app.guard.path();
@@ -246,8 +244,8 @@ async fn enter(State(app): State<Arc<App>>) -> Response {
 }
 
 fn asset(path: &str) -> Response {
-    match Assets::get(path) {
-        Some(file) => ([(CONTENT_TYPE, content_type(path))], file.data).into_response(),
+    match ASSETS.get_file(path) {
+        Some(file) => ([(CONTENT_TYPE, content_type(path))], file.contents()).into_response(),
         None => not_found(),
     }
 }

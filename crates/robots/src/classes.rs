@@ -1,5 +1,7 @@
 //! The robots by the names of their classes.
 
+use std::process::ExitCode;
+
 use crate::bidder::Bidder;
 use crate::butler::Butler;
 use crate::leguin::Leguin;
@@ -21,4 +23,17 @@ pub fn make(class: &str) -> Option<Box<dyn robot::Robot>> {
         "Scout" => Some(Box::new(Scout::default())),
         _ => None,
     }
+}
+
+/// The program of the robots of a class; their name is that of the class if the command line has none.
+///
+/// # Panics
+///
+/// If there is no such class.
+#[must_use]
+pub fn main(class: &str) -> ExitCode {
+    // Here and not in each program, so that the code of a class is compiled once.
+    robot::main(class, |_| {
+        make(class).unwrap_or_else(|| unreachable!("{class} is a class of this crate"))
+    })
 }

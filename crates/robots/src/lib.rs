@@ -40,7 +40,7 @@ mod units;
 
 pub use bidder::Bidder;
 pub use butler::Butler;
-pub use classes::{AFFECTIVE, CLASSES, make};
+pub use classes::{AFFECTIVE, CLASSES, main, make};
 pub use commands::{ACCEPT, GO_HOME, HELP, HURRY, OFFER, REFILL};
 pub use leguin::Leguin;
 pub use scout::Scout;

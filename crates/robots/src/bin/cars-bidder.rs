@@ -1,5 +1,5 @@
 //! A robot that shares tasks with others by auction.
 
 fn main() -> std::process::ExitCode {
-    robot::main("Bidder", |_| Box::new(robots::Bidder::default()))
+    robots::main("Bidder")
 }

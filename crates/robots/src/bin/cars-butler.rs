@@ -1,5 +1,5 @@
 //! Butler, the waiter.
 
 fn main() -> std::process::ExitCode {
-    robot::main("Butler", |_| Box::new(robots::Butler::default()))
+    robots::main("Butler")
 }

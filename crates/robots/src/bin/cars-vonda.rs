@@ -1,5 +1,5 @@
 //! Vonda, a clone of Leguin under another name.
 
 fn main() -> std::process::ExitCode {
-    robot::main("Vonda", |_| Box::new(robots::Leguin::default()))
+    robots::main("Vonda")
 }
