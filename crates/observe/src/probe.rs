@@ -7,6 +7,7 @@ use protocol::pattern::path_parts;
 use protocol::time::time_s;
 use protocol::{Event, RobotName, Tick};
 use serde_json::Value;
+use timeline::{StateKind, Timeline};
 
 use crate::combine::{By, truth};
 use crate::condition::Evaluation;
@@ -444,15 +445,14 @@ impl BetweenTally {
     }
 }
 
-/// Robots in one of some states, by events: one that is lost is in none of them until it takes part again.
+/// Robots in one of some states: one that is lost is in none of them until it takes part again.
 #[derive(Debug, Clone)]
 struct ShareTally {
-    states: StateNames,
+    kind: StateKind,
+    names: Vec<String>,
     by: By,
-    /// The robots, in the order of their names.
     robots: Vec<RobotName>,
-    is_in: Vec<bool>,
-    is_lost: Vec<bool>,
+    timeline: Timeline,
     /// The number of the robots since this tick.
     value: f64,
     since: Tick,
@@ -470,13 +470,17 @@ impl ShareTally {
         else {
             unreachable!("a share is one of states");
         };
+        let (kind, names) = match states {
+            StateNames::Emotions(names) => (StateKind::Emotion, names),
+            StateNames::Behaviors(names) => (StateKind::Behavior, names),
+        };
         let robots = quantity.robots(setting);
         Self {
-            states: states.clone(),
+            kind,
+            names: names.clone(),
             // Of one robot it is the same whichever way.
             by: by.unwrap_or(By::Mean),
-            is_in: vec![false; robots.len()],
-            is_lost: vec![false; robots.len()],
+            timeline: Timeline::new(&robots),
             robots,
             value: 0.0,
             since: 0,
@@ -485,48 +489,25 @@ impl ShareTally {
     }
 
     fn observe(&mut self, observation: &Observation<'_>) {
-        let mut has_changed = false;
-        for event in observation.events {
-            has_changed |= self.note(event);
-        }
-        if !has_changed {
+        if observation.events.is_empty() {
             return;
         }
 
-        self.sum = self.sum_at(observation.tick);
-        self.since = observation.tick;
-        let states = self.is_in.iter().zip(&self.is_lost);
-        let values = states.map(|(is_in, is_lost)| truth(*is_in && !is_lost));
+        self.timeline.tick(observation.tick, observation.events);
+        let values = self.robots.iter().map(|robot| truth(self.is_in(robot)));
         // A team without a robot is refused before the run.
-        self.value = self.by.combine(values).unwrap_or(0.0);
+        let value = self.by.combine(values).unwrap_or(0.0);
+        if value.to_bits() != self.value.to_bits() {
+            self.sum = self.sum_at(observation.tick);
+            self.since = observation.tick;
+            self.value = value;
+        }
     }
 
-    /// Takes an event into account. Returns whether a robot of the team may be in another state.
-    fn note(&mut self, event: &Event) -> bool {
-        let index = |robot| self.robots.binary_search(robot).ok();
-        match (event, &self.states) {
-            (Event::Emotion { robot, to, .. }, StateNames::Emotions(names))
-            | (Event::Behavior { robot, to, .. }, StateNames::Behaviors(names)) => {
-                let Some(index) = index(robot) else {
-                    return false;
-                };
-                self.is_in[index] = names.contains(to);
-            }
-            (Event::Lost { robot }, _) => {
-                let Some(index) = index(robot) else {
-                    return false;
-                };
-                self.is_lost[index] = true;
-            }
-            (Event::Joined { robot, .. }, _) => {
-                let Some(index) = index(robot) else {
-                    return false;
-                };
-                self.is_lost[index] = false;
-            }
-            _ => return false,
-        }
-        true
+    fn is_in(&self, robot: &RobotName) -> bool {
+        let state = self.timeline.state(robot, self.kind);
+        let is_named = state.is_some_and(|state| self.names.iter().any(|name| name == state));
+        is_named && self.timeline.lost_since(robot).is_none()
     }
 
     fn sum_at(&self, now: Tick) -> f64 {
