@@ -7,8 +7,8 @@ use protocol::{Event, RunName, Tick};
 use record::difference::between;
 use record::{Entry, Record};
 use record::{EpochFiles, RunFolder, Summary};
+use recorder::Recorder;
 use scenario::{ChanceKind, Parent, Scenario};
-use simulator::Recorder;
 
 use crate::error::LabError;
 use crate::reexecution::{Reexecution, cannot_go_on};

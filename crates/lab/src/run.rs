@@ -9,10 +9,10 @@ use environment::{Simulation, TickRecord};
 use protocol::messages::{End, FaultKind, OnLate};
 use protocol::{Epoch, RobotName, RunName, Tick};
 use record::{RunFolder, Summary};
+use recorder::Recorder;
 use robot::{BadParameters, LocalHost, Robot, RobotError, Welcome};
 use scenario::FaultEnd;
 use scenario::Scenario;
-use simulator::Recorder;
 
 use crate::error::LabError;
 

@@ -10,9 +10,9 @@ use environment::Simulation;
 use protocol::RobotName;
 use protocol::messages::{StateVariables, Variable};
 use record::NewRun;
+use recorder::Recorder;
 use robot::{Action, BadParameters, Cars, Robot, SiteAction};
 use scenario::Scenario;
-use simulator::Recorder;
 
 use crate::branch::Branch;
 use crate::error::LabError;

@@ -77,10 +77,22 @@ const ALLOWED: &[(&str, &[&str])] = &[
         ],
     ),
     (
+        "recorder",
+        &[
+            "environment",
+            "record",
+            "scenario",
+            "lockstep",
+            "protocol",
+            "recording",
+        ],
+    ),
+    (
         "simulator",
         &[
             "environment",
             "record",
+            "recorder",
             "scenario",
             "world",
             "bus",
@@ -121,7 +133,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "scenario",
             "record",
             "environment",
-            "simulator",
+            "recorder",
             "robot",
             "robots",
             "config",

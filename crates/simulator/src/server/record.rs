@@ -8,10 +8,10 @@ use protocol::event::WaitedFor;
 use protocol::messages::{End, LogRecord};
 use record::summary::{Summary, WallSummary};
 use record::{RecordError, RunFolder};
+use recorder::{Observed, Recorder};
 
 use super::event::{ServerError, StopReason};
 use super::replay_log::ReplayLog;
-use crate::recorder::{Observed, Recorder};
 
 /// The record of an epoch.
 pub(super) enum EpochRecord {

@@ -14,9 +14,9 @@ use protocol::{RunName, Tick};
 use record::RunFolder;
 use record::RunLock;
 use record::names::{EVENTS, RECORDING};
+use recorder::Recorder;
 use scenario::Scenario;
 use scenario::diagnostic::Source;
-use simulator::Recorder;
 
 /// Robots that miss every tick.
 struct Absent;

@@ -1,6 +1,6 @@
-//! The record of a run. The events of every tick are written at once, so a crash of the simulator loses at most
-//! the current one, and of the recording the current chunk; `record.sync` in the scenario says when they also survive a crash
-//! of the machine.
+//! Writes the record of a run, of one process as over the bus. The events of every tick are written at once, so a crash of the
+//! simulator loses at most the current one, and of the recording the current chunk; `record.sync` in the scenario says when they
+//! also survive a crash of the machine.
 
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
