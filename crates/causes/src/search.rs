@@ -29,9 +29,9 @@ const FIRST_CONFIRMING: u64 = 1_000_000;
 /// Forks of each cause that is tried, and of each kind of chance.
 const TRYING: u64 = 200;
 /// Least change of a probability in a tick that counts as a jump.
-const LEAST_JUMP: f64 = 0.1;
+const MIN_JUMP: f64 = 0.1;
 /// The same of a number, in its largest standard deviation over the run.
-const LEAST_JUMP_SD: f64 = 0.5;
+const MIN_JUMP_SD: f64 = 0.5;
 /// Part of the least jump that a jump must surely exceed.
 const SURE_PART: f64 = 0.5;
 /// Share of the least jump that both halves of an interval together must have, so that it is looked at.
@@ -174,13 +174,13 @@ impl Search<'_> {
 
     fn least_jump(&self) -> f64 {
         if self.run.is_share {
-            return LEAST_JUMP;
+            return MIN_JUMP;
         }
         let deviations = self.points.values().map(|point| {
             let values: Vec<f64> = point.iter().filter_map(ForkOutcome::number).collect();
             deviation(&values)
         });
-        LEAST_JUMP_SD * deviations.fold(0.0, f64::max)
+        MIN_JUMP_SD * deviations.fold(0.0, f64::max)
     }
 
     /// The ticks that may have jumps: intervals that differ are halved until they are a tick.

@@ -394,13 +394,13 @@ window.setInterval(() => {
 }, 500);
 
 // The simulator publishes a frame when it answers a status request. If none comes, there is no newer one.
-const MOST_STATUS_REQUESTS = 8;
+const MAX_STATUS_REQUESTS = 8;
 let statusRequests = 0;
 store.on("frame", () => {
   if (!store.isBehind) statusRequests = 0;
 });
 window.setInterval(() => {
-  if (!store.isLive || !store.isBehind || statusRequests >= MOST_STATUS_REQUESTS) return;
+  if (!store.isLive || !store.isBehind || statusRequests >= MAX_STATUS_REQUESTS) return;
 
   statusRequests += 1;
   request({ do: "status" });

@@ -14,7 +14,7 @@ const BAND_PX = 16;
 const GAP_PX = 3;
 const ROBOT_GAP_PX = 9;
 /** Spans that end closer to one another are drawn as one. */
-const LEAST_PX = 0.25;
+const MIN_PX = 0.25;
 /** Approximate width of a letter. */
 const LETTER_PX = 6.2;
 
@@ -46,7 +46,7 @@ export class Bands {
     if (inner <= 0) return;
 
     const x = (/** @type {number} */ time_s) => GUTTER_PX + (inner * (Math.min(last_s, Math.max(first_s, time_s)) - first_s)) / (last_s - first_s);
-    const seen = (/** @type {Span[]} */ spans) => visible(spans, first_s, last_s, x, LEAST_PX);
+    const seen = (/** @type {Span[]} */ spans) => visible(spans, first_s, last_s, x, MIN_PX);
     const rows = [...states].flatMap(([robot, { emotion, behavior }], i) => {
       const y = i * (2 * BAND_PX + GAP_PX + ROBOT_GAP_PX);
       return [

@@ -4,7 +4,7 @@
 /** @typedef {{x: number, y: number}} Place */
 
 const MARGIN_PX = 26;
-const MOST_ZOOM = 60;
+const MAX_ZOOM = 60;
 
 export class Camera {
   constructor() {
@@ -88,7 +88,7 @@ export class Camera {
    */
   zoomBy(factor, x_px = this.width_px / 2, y_px = this.height_px / 2) {
     const before = this.place(x_px, y_px);
-    this.zoom = Math.min(MOST_ZOOM, Math.max(1, this.zoom * factor));
+    this.zoom = Math.min(MAX_ZOOM, Math.max(1, this.zoom * factor));
     if (this.zoom < 1.001) return this.reset();
     const after = this.place(x_px, y_px);
     this.moveTo(this.center.x + before.x - after.x, this.center.y + before.y - after.y);

@@ -18,7 +18,7 @@ export const GUTTER_PX = 76;
 export const MARGIN_PX = 24;
 
 /** Robots that are named in the list of variables; of more, their number. */
-const MOST_NAMED = 3;
+const MAX_NAMED = 3;
 /** Robots that are shown before anybody has chosen: as many as have a color of their own. */
 const FIRST_SHOWN = 8;
 
@@ -164,7 +164,7 @@ export class Charts {
     const { history } = this.store;
     const robots = (/** @type {string} */ name) => {
       const all = [...(history.variables.get(name)?.keys() ?? [])];
-      return all.length > MOST_NAMED ? `${all.length} robots` : all.join(", ");
+      return all.length > MAX_NAMED ? `${all.length} robots` : all.join(", ");
     };
 
     render(

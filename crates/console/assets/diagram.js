@@ -7,11 +7,11 @@ import { html, nothing, render } from "./vendor/lit-html.js";
 
 /** Ticks of the first window. */
 const FIRST_TICKS = 120;
-const LEAST_TICKS = 15;
+const MIN_TICKS = 15;
 /** The most that the server draws. */
-const MOST_TICKS = 4096;
-const LEAST_WIDTH_PX = 300;
-const MOST_WIDTH_PX = 4800;
+const MAX_TICKS = 4096;
+const MIN_WIDTH_PX = 300;
+const MAX_WIDTH_PX = 4800;
 /** Most width of a diagram that is saved, 180 mm, at the pixels of an inch in style sheets. */
 const PAPER_PX = 680;
 const DPI = 96;
@@ -75,7 +75,7 @@ export class DiagramView {
     if (tick !== this.followed && isOutside) this.begin(tick - Math.floor(this.ticks / 4));
     this.followed = tick;
     this.renderBar();
-    this.request(Math.min(MOST_WIDTH_PX, Math.max(LEAST_WIDTH_PX, clientWidth - 16)));
+    this.request(Math.min(MAX_WIDTH_PX, Math.max(MIN_WIDTH_PX, clientWidth - 16)));
   }
 
   /** Says why there is no diagram. */
@@ -105,7 +105,7 @@ export class DiagramView {
   zoom(factor) {
     const tick = Math.min(this.last, this.player.tick);
     const share = (tick - this.from) / this.ticks;
-    this.ticks = Math.round(Math.min(MOST_TICKS, Math.max(LEAST_TICKS, this.ticks * factor)));
+    this.ticks = Math.round(Math.min(MAX_TICKS, Math.max(MIN_TICKS, this.ticks * factor)));
     this.begin(Math.round(tick - share * this.ticks));
     this.render();
   }
@@ -122,9 +122,9 @@ export class DiagramView {
       html`
         <button type="button" data-testid="diagram-previous" ?disabled=${this.from === 0} @click=${() => this.move(-half)}>Earlier</button>
         <button type="button" data-testid="diagram-next" ?disabled=${end >= this.last} @click=${() => this.move(half)}>Later</button>
-        <button type="button" data-testid="diagram-in" aria-label="Shorter time" ?disabled=${this.ticks <= LEAST_TICKS}
+        <button type="button" data-testid="diagram-in" aria-label="Shorter time" ?disabled=${this.ticks <= MIN_TICKS}
           @click=${() => this.zoom(0.5)}>+</button>
-        <button type="button" data-testid="diagram-out" aria-label="Longer time" ?disabled=${this.ticks > this.last || this.ticks >= MOST_TICKS}
+        <button type="button" data-testid="diagram-out" aria-label="Longer time" ?disabled=${this.ticks > this.last || this.ticks >= MAX_TICKS}
           @click=${() => this.zoom(2)}>−</button>
         <label class="check"><input type="checkbox" data-testid="diagram-queries" .checked=${this.hasQueries} @change=${toggle} /><span>Lost queries</span></label>
         <button type="button" data-testid="diagram-save" title="what is shown, in light colors: a drawing of at most 180 mm" @click=${() => this.save()}>SVG</button>

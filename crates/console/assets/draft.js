@@ -8,8 +8,8 @@ import { short } from "./units.js";
 /** @typedef {{x: number, y: number}} Place */
 /** Reasons by field, as the simulator names fields. @typedef {Map<string, string>} Faults */
 
-export const MOST_SEED = Number.MAX_SAFE_INTEGER;
-const MOST_GUESTS = 4294967295;
+export const MAX_SEED = Number.MAX_SAFE_INTEGER;
+const MAX_GUESTS = 4294967295;
 /** Tolerance for rounding: bodies that touch do not overlap. */
 const SLACK_M = 1e-9;
 
@@ -53,7 +53,7 @@ export function faultsOf(setup, body_m, tick_s, length) {
   const isField = field_m.every((size) => size >= body_m && size <= 1e5);
 
   fault("field_m", !isField, `Each side must be a length of at least ${length(body_m)}, the size of a body.`);
-  fault("guests", !isWhole(guests, MOST_GUESTS), "The number of guests must be a whole number, 0 or more.");
+  fault("guests", !isWhole(guests, MAX_GUESTS), "The number of guests must be a whole number, 0 or more.");
 
   if (isField && Number.isFinite(guests)) {
     const places = Math.floor((field_m[0] * field_m[1]) / (body_m * body_m));
@@ -63,7 +63,7 @@ export function faultsOf(setup, body_m, tick_s, length) {
 
   fault("guest_speed_mps", rangeFault(setup.guest_speed_mps) !== "", rangeFault(setup.guest_speed_mps));
   fault("guest_duration_s", rangeFault(setup.guest_duration_s) !== "", rangeFault(setup.guest_duration_s));
-  fault("seed", !isWhole(seed, MOST_SEED), `The seed must be a whole number from 0 to ${MOST_SEED}.`);
+  fault("seed", !isWhole(seed, MAX_SEED), `The seed must be a whole number from 0 to ${MAX_SEED}.`);
   fault("duration_s", !(duration_s >= tick_s), `The run must last at least one tick, ${short(tick_s)} s.`);
 
   const isName = /^[A-Za-z0-9_-][A-Za-z0-9._-]{0,99}$/.test(log_file.name);

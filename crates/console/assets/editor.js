@@ -11,7 +11,7 @@ import { isWithin, overlaps } from "./draft.js";
 
 /** A drag that begins this far from a robot's body still moves the robot. */
 const GRIP_M = 0.15;
-const MOST_OBSTACLES = 5000;
+const MAX_OBSTACLES = 5000;
 
 export class Editor {
   /** @param {{changed: (what: string) => void, note: (text: string) => void, body_m: () => number, hasFault: (field: string) => boolean}} client */
@@ -217,7 +217,7 @@ export class Editor {
     const robot = Object.entries(draft.robots).find(([, at]) => overlaps(at, place, body_m));
     if (robot) return `There is no room: ${robot[0]} stands there.`;
     if (draft.obstacles.some((at) => overlaps(at, place, body_m))) return "There is no room: an obstacle is too near.";
-    if (draft.obstacles.length >= MOST_OBSTACLES) return `More than ${MOST_OBSTACLES} obstacles can only be set in a scenario file.`;
+    if (draft.obstacles.length >= MAX_OBSTACLES) return `More than ${MAX_OBSTACLES} obstacles can only be set in a scenario file.`;
 
     draft.obstacles.push(place);
 

@@ -26,7 +26,7 @@ const HALF_WAY_S = 2;
 /** Where a lost one is shown. */
 const LOST_AT = 0.5;
 /** Most commands that are known. */
-const MOST_COMMANDS = 4096;
+const MAX_COMMANDS = 4096;
 
 export class Flights {
   constructor() {
@@ -46,7 +46,7 @@ export class Flights {
     }
 
     for (const key of this.commands.keys()) {
-      if (this.commands.size <= MOST_COMMANDS) break;
+      if (this.commands.size <= MAX_COMMANDS) break;
       this.commands.delete(key);
     }
   }

@@ -8,18 +8,18 @@
 /** Places at the times of the history. @typedef {{x_m: (number | null)[], y_m: (number | null)[]}} Track */
 
 /** Most samples; beyond, older ones are dropped where they are close together, so that the whole run stays visible. */
-const MOST_SAMPLES = 6000;
+const MAX_SAMPLES = 6000;
 /** Most numbers of all series together: with many robots there are fewer samples of each, and no robot is left out. */
-const MOST_NUMBERS = 3_000_000;
-const MOST_SPANS = 4000;
+const MAX_NUMBERS = 3_000_000;
+const MAX_SPANS = 4000;
 /** Samples that are further apart than this many ticks have a gap between them: what was in between was not seen. */
 const SEEN_TICKS = 10;
 /** Most variables of all robots: a robot can publish any number of names. */
-const MOST_VARIABLES = 16_384;
+const MAX_VARIABLES = 16_384;
 /** Whose the measures of a run are, in the place of a robot: no robot has such a name. */
 export const THE_RUN = "the run";
 /** Most names of emotions that are listed: a robot can have any. */
-const MOST_EMOTIONS = 64;
+const MAX_EMOTIONS = 64;
 
 export class History {
   constructor() {
@@ -93,7 +93,7 @@ export class History {
     for (const [measure, value] of Object.entries(measures)) this.series(measure, THE_RUN)?.push(value);
 
     this.align();
-    const most = Math.min(MOST_SAMPLES, MOST_NUMBERS / (this.variableCount + 2 * this.tracks.size));
+    const most = Math.min(MAX_SAMPLES, MAX_NUMBERS / (this.variableCount + 2 * this.tracks.size));
     if (this.times_s.length > Math.max(2, most)) this.thin();
   }
 
@@ -113,8 +113,8 @@ export class History {
   series(variable, robot) {
     const robots = this.variables.get(variable) ?? new Map();
     let values = robots.get(robot);
-    if (!values && this.variableCount >= MOST_VARIABLES) this.dropped += 1;
-    if (!values && this.variableCount < MOST_VARIABLES) {
+    if (!values && this.variableCount >= MAX_VARIABLES) this.dropped += 1;
+    if (!values && this.variableCount < MAX_VARIABLES) {
       this.variableCount += 1;
       values = this.unknown();
       this.variables.set(variable, robots.set(robot, values));
@@ -136,7 +136,7 @@ export class History {
   note({ name, presence, emotion_state, behavior_state }, time_s, isBroken) {
     const states = this.states.get(name) ?? { emotion: [], behavior: [] };
     this.states.set(name, states);
-    if (this.emotions.size < MOST_EMOTIONS) this.emotions.add(emotion_state);
+    if (this.emotions.size < MAX_EMOTIONS) this.emotions.add(emotion_state);
     // A robot that takes no part is in no state.
     const isLost = presence === "lost";
     extend(states.emotion, isLost ? "" : emotion_state, time_s, isBroken);
@@ -238,5 +238,5 @@ function extend(spans, state, time_s, isBroken) {
   if (last) last.to_s = time_s;
   if (last?.state === state) return;
   spans.push({ state, from_s: time_s, to_s: time_s });
-  if (spans.length > MOST_SPANS) spans.shift();
+  if (spans.length > MAX_SPANS) spans.shift();
 }

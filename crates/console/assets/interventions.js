@@ -21,7 +21,7 @@ const KINDS = {
 const HEAL = "Heal";
 const OF_NOW = "Only the present can be changed.";
 /** Most effects that are listed one by one. */
-const MOST_EFFECTS = 12;
+const MAX_EFFECTS = 12;
 /** By how much the next command is delayed, seconds. */
 const DELAY_S = 5;
 
@@ -113,7 +113,7 @@ export class Interventions {
 
   /** @param {Effect[]} effects */
   list(effects) {
-    const shown = effects.slice(0, MOST_EFFECTS);
+    const shown = effects.slice(0, MAX_EFFECTS);
     const rest = effects.length - shown.length;
     const hasCuts = effects.filter(({ undo }) => undo === HEAL).length > 1;
     const { isBack } = this.store;

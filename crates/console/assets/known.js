@@ -37,9 +37,9 @@ const COMPONENTS = /** @type {[string, string, "" | "share" | "sign"][]} */ ([
 ]);
 const SHARES = ["very low", "low", "medium", "high", "very high"];
 const FACES = ["happy", "sad", "surprised", "disgusted", "angry", "fearful", "neutral"];
-const MOST_COMMANDS = 3;
+const MAX_COMMANDS = 3;
 /** Lines of the log that are searched for a robot's commands. */
-const MOST_SEARCHED = 400;
+const MAX_SEARCHED = 400;
 /** What a robot sends to another one, as the log has it. */
 const SENT = /^-> (.+?): (.*)$/s;
 
@@ -185,7 +185,7 @@ export function lastCommands(log, robot, epoch, tick) {
 
   /** @type {LogRecord[]} */
   const found = [];
-  for (let i = low - 1; i >= 0 && i >= low - MOST_SEARCHED && found.length < MOST_COMMANDS; i -= 1) {
+  for (let i = low - 1; i >= 0 && i >= low - MAX_SEARCHED && found.length < MAX_COMMANDS; i -= 1) {
     const line = log[i];
     const to = line.kind === "command" && line.epoch === epoch ? line.text.match(SENT)?.[1] : undefined;
     if (to !== undefined && (to === robot || line.source === robot)) found.push(line);

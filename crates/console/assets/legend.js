@@ -5,7 +5,7 @@ import { hatchingPath, stateLook } from "./palette.js";
 import { html, render, svg } from "./vendor/lit-html.js";
 
 /** Most emotions in the legend: a robot may have any. */
-const MOST_EMOTIONS = 15;
+const MAX_EMOTIONS = 15;
 
 /**
  * @param {HTMLElement} place
@@ -14,10 +14,10 @@ const MOST_EMOTIONS = 15;
 export function renderEmotions(place, store) {
   const now = (store.frame?.robots ?? []).map((robot) => robot.emotion_state);
   const names = [...new Set([...store.history.emotions, ...now])].filter(Boolean).sort();
-  const more = names.length - MOST_EMOTIONS;
+  const more = names.length - MAX_EMOTIONS;
 
   render(
-    html`${names.slice(0, MOST_EMOTIONS).map((name) => {
+    html`${names.slice(0, MAX_EMOTIONS).map((name) => {
       const { area, hatching } = stateLook("emotion", name);
       return html`<span class="emotion" data-testid="legend-emotion"><svg class="cars-diagram symbol" viewBox="0 0 16 16"
           aria-hidden="true"><rect class=${area} width="16" height="16"></rect>${

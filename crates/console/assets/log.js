@@ -9,9 +9,9 @@ import { html, render } from "./vendor/lit-html.js";
 /** @typedef {{epoch: number, tick: number}} Moment */
 
 /** Most rows in the page. */
-const MOST_ROWS = 2000;
+const MAX_ROWS = 2000;
 /** Most rows while the reader has scrolled up; then no rows are removed. */
-const MOST_ROWS_READING = 4000;
+const MAX_ROWS_READING = 4000;
 const NEAR_END_PX = 12;
 /** Every kind; the type check keeps the list complete. @type {Record<import("./types/messages.js").LogKind, true>} */
 const ALL_KINDS = { run: true, membership: true, emotion: true, behavior: true, command: true, network: true, say: true, site: true, layer: true, verdict: true, late: true };
@@ -205,13 +205,13 @@ export class LogView {
   /** @param {LogRecord[]} lines */
   append(lines) {
     const { rows } = this;
-    const room = this.isFollowing ? Infinity : MOST_ROWS_READING - rows.childElementCount;
-    const kept = lines.slice(0, Math.max(0, room)).slice(-MOST_ROWS);
+    const room = this.isFollowing ? Infinity : MAX_ROWS_READING - rows.childElementCount;
+    const kept = lines.slice(0, Math.max(0, room)).slice(-MAX_ROWS);
     this.waiting += this.isFollowing ? 0 : lines.length;
     rows.append(...kept.flatMap((line) => this.withEpoch(line)));
     if (!this.isFollowing) return;
 
-    const tooMany = rows.childElementCount - MOST_ROWS;
+    const tooMany = rows.childElementCount - MAX_ROWS;
 
     for (let i = 0; i < tooMany; i += 1) rows.firstElementChild?.remove();
     this.toEnd();

@@ -8,9 +8,9 @@ import { seconds } from "./units.js";
 /** Things at one place of the time line. @typedef {{kind: MarkKind, tick: number, at: number, words: string}} Mark */
 
 /** Most lines that are kept for marks, the newest ones. */
-const MOST_NOTED = 2000;
+const MAX_NOTED = 2000;
 /** Most lines in the words of one mark. */
-const MOST_WORDS = 6;
+const MAX_WORDS = 6;
 /** What is drawn where several things are at one place. @type {MarkKind[]} */
 const BY_WEIGHT = ["fault", "cut", "epoch", "exchange"];
 
@@ -40,10 +40,10 @@ export class Marks {
     for (const line of lines) {
       if (markOf(line) !== null) this.lines.set(JSON.stringify([line.epoch, line.tick, line.source, line.text]), line);
     }
-    if (this.lines.size <= MOST_NOTED) return;
+    if (this.lines.size <= MAX_NOTED) return;
 
     const sorted = [...this.lines].sort(([, a], [, b]) => a.epoch - b.epoch || a.tick - b.tick);
-    this.lines = new Map(sorted.slice(-MOST_NOTED));
+    this.lines = new Map(sorted.slice(-MAX_NOTED));
     this.isCut = true;
   }
 
@@ -89,7 +89,7 @@ export class Marks {
 
 /** @param {LogRecord[]} lines */
 function wordsOf(lines) {
-  const words = lines.slice(0, MOST_WORDS).map(({ tick, time_s, tick_s, source, text, kind, epoch }) => {
+  const words = lines.slice(0, MAX_WORDS).map(({ tick, time_s, tick_s, source, text, kind, epoch }) => {
     const who = source === "simulator" ? "" : `${source} `;
     const what = kind === "run" ? `epoch ${epoch} ${text.replace(/, digest .*/, "")}` : `${who}${text}`;
     return `${seconds(time_s, tick_s)}, tick ${tick}: ${what}`;

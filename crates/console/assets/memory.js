@@ -12,9 +12,9 @@ import { cellsIn } from "./layers.js";
  * @typedef {{frame: WorldFrame, guests_m: Float64Array, panels: Map<string, Panel>, flights: Flights}} Seen */
 
 /** Most frames; beyond, older ones are dropped where they are close together, so that the whole time stays in reach. */
-const MOST_FRAMES = 3000;
+const MAX_FRAMES = 3000;
 /** Most guests and robots in all frames. */
-const MOST_BODIES = 500_000;
+const MAX_BODIES = 500_000;
 /** A robot has as much as this many guests. */
 const ROBOT_WEIGHT = 10;
 /** As many cells of a layer have as much as a guest. */
@@ -45,7 +45,7 @@ export class Memory {
     const seen = { frame: { ...frame, guests: [] }, guests_m, panels, flights };
     this.seen.push(seen);
     this.bodies += weight(seen);
-    if (this.seen.length > MOST_FRAMES || this.bodies > MOST_BODIES) this.thin();
+    if (this.seen.length > MAX_FRAMES || this.bodies > MAX_BODIES) this.thin();
   }
 
   /** Drops about half of the frames, and not the newest ones. */

@@ -9,7 +9,7 @@ const LONGEST_MS = 1000;
 /** Longest glide of a run without a set speed, where a longer one would look like lag. */
 const LONGEST_UNPACED_MS = 150;
 /** With more ticks between two frames there is no glide. */
-const MOST_TICKS = 200;
+const MAX_TICKS = 200;
 
 export class Motion {
   constructor() {
@@ -43,7 +43,7 @@ export class Motion {
 
     const hasNumbers = Boolean(frame.guest_numbers?.length || last?.guest_numbers?.length);
     const areSame = hasNumbers || last?.guests.length === frame.guests.length;
-    const isGlide = !isCalm && leap > 0 && leap <= MOST_TICKS && areSame;
+    const isGlide = !isCalm && leap > 0 && leap <= MAX_TICKS && areSame;
     this.from_m = isGlide && !hasNumbers ? this.now_m.slice() : flat(frame.guests);
     if (isGlide && last && hasNumbers) this.takePlaces(this.from_m, last, frame);
     this.robotsFrom = isGlide ? new Map(this.robotsNow) : new Map();

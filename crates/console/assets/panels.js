@@ -16,11 +16,11 @@ import { drawWidget } from "./widgets.js";
 /** @typedef {import("./types/messages.js").RobotFrame} RobotFrame */
 /** @typedef {import("./types/messages.js").Widget} Widget */
 
-const MOST_WIDGETS = 64;
+const MAX_WIDGETS = 64;
 /** Emotions of a robot that are kept for its tree. */
-const MOST_FELT = 32;
+const MAX_FELT = 32;
 /** More robots than this are a list. */
-const MOST_PANELS = 4;
+const MAX_PANELS = 4;
 /** Widgets that are folded, unless a panel has nothing else. */
 const DETAILS = ["table", "sparkline"];
 
@@ -61,7 +61,7 @@ export class Panels {
     for (const { name, blocked, emotion_state, state_variables } of frame?.robots ?? []) {
       const felt = this.felt.get(name) ?? new Map();
       const { valence } = state_variables;
-      if (typeof valence === "number" && felt.size < MOST_FELT) this.felt.set(name, felt.set(emotion_state, valence));
+      if (typeof valence === "number" && felt.size < MAX_FELT) this.felt.set(name, felt.set(emotion_state, valence));
       const since_s = this.blockedSince_s.get(name) ?? Infinity;
       if (!blocked) this.blockedSince_s.delete(name);
       else if (frame) this.blockedSince_s.set(name, Math.min(since_s, frame.time_s));
@@ -71,7 +71,7 @@ export class Panels {
   render() {
     const robots = this.store.frame?.robots ?? [];
     const awaiting = this.store.awaiting();
-    const isMany = robots.length > MOST_PANELS;
+    const isMany = robots.length > MAX_PANELS;
     const shown = isMany ? robots.filter(({ name }) => name === this.chosen) : robots;
     this.place.classList.toggle("many", isMany);
     this.place.classList.toggle("one-open", isMany && shown.length > 0);
@@ -110,7 +110,7 @@ export class Panels {
    */
   content(robot) {
     const own = this.store.panels.get(robot.name)?.widgets;
-    const all = (Array.isArray(own) ? own : []).slice(0, MOST_WIDGETS);
+    const all = (Array.isArray(own) ? own : []).slice(0, MAX_WIDGETS);
     const buttons = all.filter((widget) => widget?.widget === "button");
     const others = all.filter((widget) => widget?.widget !== "button");
     const { frame, log } = this.store;

@@ -37,8 +37,8 @@ const ROBOT_PX = 74;
 const SIGN_PX = 22;
 const FACE_PX = 52;
 /** Robots with a face beside the plan; of more, it is told how many there are. */
-const MOST_ROBOTS = 6;
-const MOST_EMOTIONS = 8;
+const MAX_ROBOTS = 6;
+const MAX_EMOTIONS = 8;
 
 /**
  * @param {import("./plan.js").Plan} plan
@@ -62,12 +62,12 @@ export function picture(plan, panels) {
     words.muted(`seed ${seed}`, PAD_PX, 62);
   }
   let y = 78;
-  for (const robot of robots.slice(0, MOST_ROBOTS)) {
+  for (const robot of robots.slice(0, MAX_ROBOTS)) {
     person(side, words, theme, robot, panels.get(robot.name), y);
     y += ROBOT_PX;
   }
-  if (robots.length > MOST_ROBOTS) {
-    words.muted(`and ${robots.length - MOST_ROBOTS} robots more`, PAD_PX, y + 10);
+  if (robots.length > MAX_ROBOTS) {
+    words.muted(`and ${robots.length - MAX_ROBOTS} robots more`, PAD_PX, y + 10);
     y += 28;
   }
 
@@ -111,8 +111,8 @@ export async function inPixels(svg) {
 
 /** What is to be seen, for those who do not see it. @param {RobotFrame[]} robots */
 function sentence(robots) {
-  const some = robots.slice(0, MOST_ROBOTS).map(({ name, emotion_state, behavior_state }) => [name, emotion_state, behavior_state].filter(Boolean).join(" "));
-  return `The plan; ${some.join("; ")}${robots.length > MOST_ROBOTS ? ` and ${robots.length - MOST_ROBOTS} robots more` : ""}`;
+  const some = robots.slice(0, MAX_ROBOTS).map(({ name, emotion_state, behavior_state }) => [name, emotion_state, behavior_state].filter(Boolean).join(" "));
+  return `The plan; ${some.join("; ")}${robots.length > MAX_ROBOTS ? ` and ${robots.length - MAX_ROBOTS} robots more` : ""}`;
 }
 
 /** Text in the styles of the picture. */
@@ -214,10 +214,10 @@ function legend(paper, words, theme, frame, { hasTrails, chosen, chosenLayer }, 
   const look = /** @type {const} */ ({ letters: "", radius: 6, presence: "here", hatching: 0, isLate: false, isChosen: false });
   y += 6;
   row((at) => draw.body({ context: paper, theme }, { ...look, emotion: first }, x, at), first ? "robot, and its emotion" : "robot");
-  for (const emotion of emotions.slice(0, MOST_EMOTIONS)) {
+  for (const emotion of emotions.slice(0, MAX_EMOTIONS)) {
     const count = robots.filter((robot) => robot.emotion_state === emotion).length;
     row((at) => draw.emotionSign({ context: paper, theme }, emotion, x + 26, at, 5.5), "");
-    words.muted(`${emotion.slice(0, 22)}${robots.length > MOST_ROBOTS ? ` (${count})` : ""}`, x + 40, y - SIGN_PX);
+    words.muted(`${emotion.slice(0, 22)}${robots.length > MAX_ROBOTS ? ` (${count})` : ""}`, x + 40, y - SIGN_PX);
   }
   row((at) => draw.guestCircles({ context: paper, theme }, [x, at], 6), "guest");
   for (const [mood, label] of /** @type {["waiting" | "annoyed", string][]} */ ([["waiting", "guest that waits"], ["annoyed", "annoyed guest"]])) {

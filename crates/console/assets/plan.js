@@ -25,7 +25,7 @@ import { onThemeChange, readTheme } from "./theme.js";
 const TRAIL_SAMPLES = 240;
 const CALM = matchMedia("(prefers-reduced-motion: reduce)");
 /** What has moved less far is not painted anew. */
-const LEAST_TRAVEL_PX = 0.25;
+const MIN_TRAVEL_PX = 0.25;
 /** The window of the frame rate. */
 const RATE_WINDOW_MS = 1000;
 
@@ -132,7 +132,7 @@ export class Plan {
   /** Whether anybody would see a difference. @param {number} now_ms */
   isDue(now_ms) {
     const travel_px = this.motion.travel_m(this.lastDraw_ms, now_ms) * this.camera.scale;
-    return this.isStale || travel_px >= LEAST_TRAVEL_PX;
+    return this.isStale || travel_px >= MIN_TRAVEL_PX;
   }
 
   /** Animation frames in the last second, including those that needed no painting. */

@@ -35,9 +35,9 @@ import { hasGuessedNames, orderNames } from "./palette.js";
 /** Ticks in a chunk: few, because a seek waits for a whole one. */
 const CHUNK = 32;
 /** Most numbers of guests' places and cells of layers that are kept; the least recently used chunks are dropped first. */
-const MOST_NUMBERS = 12_000_000;
+const MAX_NUMBERS = 12_000_000;
 /** Most chunks that are kept. */
-const MOST_CHUNKS = 2000;
+const MAX_CHUNKS = 2000;
 /** Ticks of which charts and log are read at once. */
 const READ_AT_ONCE = 4096;
 /** About as many ticks of an epoch are in charts, beside those in which a robot's state changed. */
@@ -444,7 +444,7 @@ export class Player {
   /** @param {number} kept */
   async makeRoom(kept) {
     for (const [number, chunk] of this.chunks) {
-      if (this.numbers <= MOST_NUMBERS && this.chunks.size <= MOST_CHUNKS) return;
+      if (this.numbers <= MAX_NUMBERS && this.chunks.size <= MAX_CHUNKS) return;
       if (number !== kept) this.drop(number, await chunk);
     }
   }

@@ -9,7 +9,7 @@ import { html, render } from "./vendor/lit-html.js";
 /** Colors of kinds, in their alphabetical order. */
 const COLORS = ["#b5651d", "#2a7f9e", "#7a4fa3", "#4f8a3c", "#b23a5e", "#6b6f2a"];
 /** Most kinds in a legend: a scenario may have any. */
-const MOST_KINDS = 8;
+const MAX_KINDS = 8;
 /** Half of a diamond's width, in bodies' sides, and at least in pixels. */
 const HALF = 0.4;
 const SMALLEST_PX = 4;
@@ -95,7 +95,7 @@ export function siteWords(site) {
 /** The kinds with their colors, for a legend. @param {SiteFrame[]} sites */
 export function kindsInLegend(sites) {
   const kinds = kindsOf(sites);
-  return kinds.slice(0, MOST_KINDS).map((kind) => ({ kind, color: colorOf(kinds, kind) }));
+  return kinds.slice(0, MAX_KINDS).map((kind) => ({ kind, color: colorOf(kinds, kind) }));
 }
 
 /**

@@ -16,9 +16,9 @@ import { Memory } from "./memory.js";
  * @typedef {"connection" | "frame" | "panel" | "log" | "epoch" | "live" | "live-epoch"} Topic */
 
 /** Most log lines that are kept for scrolling back and filtering. */
-const MOST_LINES = 10000;
+const MAX_LINES = 10000;
 /** Most panels; a bound on names that are not in the roster. */
-const MOST_PANELS = 512;
+const MAX_PANELS = 512;
 /** Time without a report after which the simulator, too, calls a robot late. */
 const LATE_S = 0.5;
 
@@ -199,7 +199,7 @@ export class Store {
    * @param {TickPanel} panel
    */
   receivePanel(robot, panel) {
-    if (!this.earlyPanels.has(robot) && this.earlyPanels.size >= MOST_PANELS) return;
+    if (!this.earlyPanels.has(robot) && this.earlyPanels.size >= MAX_PANELS) return;
     this.earlyPanels.set(robot, panel);
     if (panel.widgets.length > 0) this.displaying.add(robot);
     if (!this.live || !isOfTick(panel, this.live)) return;
@@ -352,7 +352,7 @@ export class Store {
   counted(lines) {
     this.logCount += lines.length;
     this.marks.add(lines);
-    if (this.log.length > MOST_LINES) this.log.splice(0, this.log.length - MOST_LINES);
+    if (this.log.length > MAX_LINES) this.log.splice(0, this.log.length - MAX_LINES);
     this.emit("log");
   }
 

@@ -22,7 +22,7 @@ const ZOOMS = { "+": 0.5, "=": 0.5, "-": 2, 0: 1e9 };
 /** Least distance between two marks. */
 const MARK_PX = 7;
 /** Most strips. Of more robots, the chosen ones have a strip. */
-const MOST_STRIPS = 8;
+const MAX_STRIPS = 8;
 /** Height of all strips together where there are many, and of one where there are few. */
 const STRIPS_PX = 40;
 const STRIP_PX = 12;
@@ -190,10 +190,10 @@ export class TimelineView {
   /** The robots that have strips: if there are many, the chosen one and those of the charts. */
   robots() {
     const all = (this.player.store.frame?.robots ?? []).map(({ name }) => name);
-    if (all.length <= MOST_STRIPS) return all;
+    if (all.length <= MAX_STRIPS) return all;
     const chosen = this.choice.chosen();
     const others = all.filter((robot) => robot !== chosen && this.choice.isShown(robot));
-    return [...(chosen ? [chosen] : []), ...others].slice(0, MOST_STRIPS);
+    return [...(chosen ? [chosen] : []), ...others].slice(0, MAX_STRIPS);
   }
 
   /** Draws the emotions of the robots; less often than the rest. */

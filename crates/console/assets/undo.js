@@ -2,7 +2,7 @@
 // What was edited, to go back and forward. Every state is kept as its text.
 
 /** Most steps that are kept. */
-const MOST_STEPS = 200;
+const MAX_STEPS = 200;
 /** Edits of the same thing within this time are one step. */
 const SAME_STEP_MS = 1000;
 
@@ -36,7 +36,7 @@ export class Undo {
     if (text === this.now) return;
     const isSameStep = what !== "" && what === this.what && at_ms - this.at_ms < SAME_STEP_MS;
     if (!isSameStep || this.past.length === 0) this.past.push(this.now);
-    if (this.past.length > MOST_STEPS) this.past.shift();
+    if (this.past.length > MAX_STEPS) this.past.shift();
     this.future = [];
     this.now = text;
     this.what = what;

@@ -13,11 +13,11 @@ import { html, nothing, svg } from "./vendor/lit-html.js";
 
 const TONES = ["good", "neutral", "warning", "bad"];
 /** Limits of a table. */
-const MOST_ROWS = 60;
-const MOST_CELLS = 12;
+const MAX_ROWS = 60;
+const MAX_CELLS = 12;
 /** Rows that are shown without scrolling. */
 const SHORT_TABLE = 10;
-const MOST_POINTS = 1000;
+const MAX_POINTS = 1000;
 /** Characters of a text that is scrolled. */
 const LONG_TEXT = 420;
 /** Characters. */
@@ -94,7 +94,7 @@ function bar({ label, value, min, max }) {
 
 /** @param {Extract<Widget, {widget: "sparkline"}>} widget */
 function sparkline({ label, values }) {
-  const points = (Array.isArray(values) ? values : []).filter(Number.isFinite).slice(-MOST_POINTS);
+  const points = (Array.isArray(values) ? values : []).filter(Number.isFinite).slice(-MAX_POINTS);
   const low = Math.min(...points);
   const high = Math.max(...points);
   // Halves, because the difference of two large numbers may overflow.
@@ -114,16 +114,16 @@ function sparkline({ label, values }) {
 
 /** @param {string[][]} rows */
 function table(rows) {
-  const cells = (/** @type {string[]} */ row) => (Array.isArray(row) ? row : []).slice(0, MOST_CELLS);
+  const cells = (/** @type {string[]} */ row) => (Array.isArray(row) ? row : []).slice(0, MAX_CELLS);
   const isPairs = rows.every((row) => row?.length === 2);
 
   const isLong = rows.length > SHORT_TABLE;
 
   return html`
     <div class="widget table" tabindex=${isLong ? "0" : nothing}><table class=${isPairs ? "pairs" : ""}><tbody>
-      ${rows.slice(0, MOST_ROWS).map((row) => html`<tr>${cells(row).map((cell) => html`<td>${cell}</td>`)}</tr>`)}
+      ${rows.slice(0, MAX_ROWS).map((row) => html`<tr>${cells(row).map((cell) => html`<td>${cell}</td>`)}</tr>`)}
     </tbody></table>
-    ${rows.length > MOST_ROWS ? html`<p class="muted">and ${rows.length - MOST_ROWS} rows more</p>` : nothing}</div>`;
+    ${rows.length > MAX_ROWS ? html`<p class="muted">and ${rows.length - MAX_ROWS} rows more</p>` : nothing}</div>`;
 }
 
 /**

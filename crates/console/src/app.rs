@@ -7,7 +7,7 @@ use tokio::sync::{Notify, OwnedSemaphorePermit, Semaphore, SemaphorePermit, watc
 use crate::failed::Failed;
 use crate::guard::Guard;
 use crate::live::Live;
-use crate::past::Past;
+use crate::past::RecordedEpochs;
 
 /// Most browsers at a time.
 pub(crate) const MAX_BROWSERS: usize = 32;
@@ -31,7 +31,7 @@ pub(crate) struct App {
     /// What is shown.
     pub(crate) mode: Mode,
     /// What is recorded of it; none if its folder is not known.
-    pub(crate) past: Option<Past>,
+    pub(crate) past: Option<RecordedEpochs>,
     /// Whether pages explain their first steps.
     pub(crate) has_guide: bool,
     /// Whether a browser has been connected so far.
@@ -47,7 +47,12 @@ pub(crate) struct App {
 
 impl App {
     /// A console that shows `mode` to clients that `guard` admits.
-    pub(crate) fn new(guard: Guard, mode: Mode, past: Option<Past>, has_guide: bool) -> Self {
+    pub(crate) fn new(
+        guard: Guard,
+        mode: Mode,
+        past: Option<RecordedEpochs>,
+        has_guide: bool,
+    ) -> Self {
         Self {
             guard,
             mode,

@@ -39,7 +39,7 @@ use app::{App, Mode};
 use failing::AfterFailure;
 use guard::{AllowedHost, Guard};
 use live::Live;
-use past::Past;
+use past::RecordedEpochs;
 use saved_session::SavedSession;
 
 /// The address to serve at without `--bind`.
@@ -144,7 +144,9 @@ fn run(args: ConsoleArgs) -> Result<AfterFailure, String> {
         Some(path) => open_recording(&path)?,
         None => {
             let run = args.run.clone();
-            let past = args.folder.map(|folder| Past::growing(folder, run));
+            let past = args
+                .folder
+                .map(|folder| RecordedEpochs::growing(folder, run));
             let config = args.zenoh_config;
             let live = Live::start(args.run, args.connect, config, args.reply_timeout)?;
             (Mode::Live(live), past)
@@ -175,8 +177,8 @@ fn seconds(text: &str) -> Result<Duration, String> {
     Duration::try_from_secs_f64(seconds).map_err(|error| error.to_string())
 }
 
-fn open_recording(path: &std::path::Path) -> Result<(Mode, Option<Past>), String> {
-    let past = Past::finished(path).map_err(|error| error.to_string())?;
+fn open_recording(path: &std::path::Path) -> Result<(Mode, Option<RecordedEpochs>), String> {
+    let past = RecordedEpochs::finished(path).map_err(|error| error.to_string())?;
     let last = past.last().map_err(|error| error.to_string())?;
     let run = last.run().to_owned();
     Ok((Mode::Recording(run), Some(past)))
@@ -193,7 +195,11 @@ fn build_runtime() -> Result<Runtime, String> {
 }
 
 /// Serves until the process receives SIGTERM or SIGINT, or until a run that has failed is not looked at any more.
-async fn serve(mode: Mode, past: Option<Past>, how: Serving) -> Result<AfterFailure, String> {
+async fn serve(
+    mode: Mode,
+    past: Option<RecordedEpochs>,
+    how: Serving,
+) -> Result<AfterFailure, String> {
     let kept = how.keep.as_deref().and_then(SavedSession::read);
     if let Some(file) = how.keep.as_deref().filter(|_| kept.is_none()) {
         SavedSession::check_replaceable(file)?;

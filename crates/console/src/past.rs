@@ -16,7 +16,7 @@ const MAX_EPOCHS: usize = 100;
 
 /// The recorded epochs of a run.
 #[derive(Debug)]
-pub(crate) struct Past {
+pub(crate) struct RecordedEpochs {
     place: RecordingSource,
     open: Mutex<Open>,
 }
@@ -46,7 +46,7 @@ struct Open {
     number: u64,
 }
 
-impl Past {
+impl RecordedEpochs {
     /// The recording in a run's folder and those of its earlier epochs, or a recording alone: `RUN/run-epoch1.mcap`.
     ///
     /// # Errors

@@ -150,7 +150,7 @@ impl Reexecution {
         self.check_script(recorded)?;
 
         let mut reports = BTreeMap::new();
-        let mut exchange = Repeated {
+        let mut exchange = ReexecutedRobots {
             robots: &mut self.local.robots,
             recorded,
             scripted: &self.scripted,
@@ -357,7 +357,7 @@ pub(crate) fn cannot_copy(robot: &RobotName) -> LabError {
 }
 
 /// The robots of this process, in the place of those that were recorded.
-struct Repeated<'a> {
+struct ReexecutedRobots<'a> {
     robots: &'a mut LocalHost,
     recorded: &'a Entry,
     scripted: &'a BTreeSet<RobotName>,
@@ -365,7 +365,7 @@ struct Repeated<'a> {
     reports: &'a mut BTreeMap<RobotName, Report>,
 }
 
-impl Exchange<TickUpdate, Arc<Report>, CommandText> for Repeated<'_> {
+impl Exchange<TickUpdate, Arc<Report>, CommandText> for ReexecutedRobots<'_> {
     type Error = RobotError;
 
     fn exchange(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from cars import Action, Cars, Point, Robot, main
 
-ATTRACTS_FROM, ATTRACTION, LEAST_FORCE, LEAST_DISTANCE_M = 0.6, 2.0, 0.05, 1e-6
+ATTRACTS_FROM, ATTRACTION, MIN_FORCE, MIN_DISTANCE_M = 0.6, 2.0, 0.05, 1e-6
 
 
 @dataclass
@@ -36,7 +36,7 @@ class Scout(Robot):
         places = [self.heard[name][1] for name in sorted(self.heard)]
         force = self.force(here, sorted(places, key=here.distance_m), cars.welcome.field_m)
         strength = min(force.distance_m(Point(0.0, 0.0)), 1.0)
-        if strength < LEAST_FORCE:
+        if strength < MIN_FORCE:
             action = Action.stay(cars, behavior_state="REST")
         else:
             goal = Point(here.x + force.x, here.y + force.y)
@@ -62,7 +62,7 @@ class Scout(Robot):
         pushes = []
         apart_m, attracts_from_m = 2.0 * own.covers, ATTRACTS_FROM * own.radio
         for rank, neighbor in enumerate(neighbors):
-            distance_m = max(here.distance_m(neighbor), LEAST_DISTANCE_M)
+            distance_m = max(here.distance_m(neighbor), MIN_DISTANCE_M)
             x, y = (here.x - neighbor.x) / distance_m, (here.y - neighbor.y) / distance_m
             if distance_m < apart_m:
                 pushes.append((x, y, (apart_m - distance_m) / apart_m))

@@ -214,10 +214,10 @@ pub(super) fn waiting(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFail
 /// Its news name its own generation again and again: nothing begins.
 pub(super) fn own_joined(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     /// News that place the robot where it stands, and may name it.
-    struct Naming {
+    struct NamingNews {
         names_it: bool,
     }
-    impl Disturbance for Naming {
+    impl Disturbance for NamingNews {
         fn news(&mut self, harness: &Harness<'_>, news: &mut TickUpdate) {
             if harness.next_tick().is_multiple_of(3) {
                 return;
@@ -232,7 +232,7 @@ pub(super) fn own_joined(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure>
 
     let play_named = |names_it| {
         let mut harness = with_robot(kit, HarnessOptions::default())?;
-        play(&mut harness, &shorter(kit), &mut Naming { names_it })
+        play(&mut harness, &shorter(kit), &mut NamingNews { names_it })
     };
     let expected = play_named(false)?;
     let played = play_named(true)?;
