@@ -67,6 +67,7 @@ pub(super) fn outcomes_of(outcomes: &[ForkOutcome], is_share: bool) -> ForkOutco
         .iter()
         .filter(|outcome| matches!(outcome, ForkOutcome::Failed(_)))
         .count();
+
     let values: Vec<f64> = outcomes.iter().filter_map(ForkOutcome::number).collect();
     let estimate = if is_share {
         let ones = values.iter().filter(|value| **value == 1.0).count();
@@ -75,6 +76,7 @@ pub(super) fn outcomes_of(outcomes: &[ForkOutcome], is_share: bool) -> ForkOutco
         Estimate::mean(&values)
     };
     let bounds = estimate.bounds();
+
     ForkOutcomes {
         n: values.len() as u64,
         value: estimate.value.is_finite().then_some(estimate.value),

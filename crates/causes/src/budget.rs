@@ -25,12 +25,15 @@ impl FromStr for WhyBudget {
                 forks => Ok(Self::Forks(forks)),
             };
         }
+
         let time: Time = text.parse().map_err(|_| {
             format!("{text:?} is neither a number of forks nor a time such as \"5 min\"")
         })?;
         if time.0 <= 0.0 {
             return Err("a budget is more than 0 s".to_owned());
         }
+
+        // A number of seconds that no duration can hold is refused, not cut off: the answer would end at another time than asked.
         Duration::try_from_secs_f64(time.0)
             .map(Self::Time)
             .map_err(|_| {

@@ -32,6 +32,7 @@ pub(super) fn kinds(scenario: &Scenario) -> Vec<ChanceKind> {
     if scenario.sensing.misses > 0.0 || scenario.sensing.noise_m > 0.0 {
         kinds.push(ChanceKind::Sensing);
     }
+
     let names: Vec<&str> = if scenario.robots.len() > MAX_ROBOTS {
         vec!["*"]
     } else {
@@ -49,6 +50,7 @@ pub(super) fn kinds(scenario: &Scenario) -> Vec<ChanceKind> {
 fn has_chance(scenario: &Scenario) -> bool {
     let later = scenario.changes.iter().map(|change| &change.network);
     let mut networks = later.chain([&scenario.network]);
+
     networks.any(|network| {
         let mut channels = network.channels();
         channels.any(|channel| *channel != Channel::default())
@@ -61,6 +63,7 @@ pub(super) fn events(trunk: &Trunk, tick: Tick) -> Vec<String> {
     for (what, _) in all(trunk, tick) {
         words.push(what);
     }
+
     let tick_s = trunk.simulation().scenario().tick_s;
     for event in trunk.events(tick) {
         // Those are among the causes, with more words.
@@ -76,6 +79,7 @@ pub(super) fn events(trunk: &Trunk, tick: Tick) -> Vec<String> {
             words.push(format!("{}: {}", line.source, line.text));
         }
     }
+
     words.dedup();
     words.truncate(MAX_EVENTS);
     words
@@ -92,12 +96,15 @@ pub(super) fn candidates(trunk: &Trunk, tick: Tick) -> Vec<(String, Counterfactu
 fn all(trunk: &Trunk, tick: Tick) -> Vec<(String, Counterfactual)> {
     let mut found: Vec<(u8, String, Counterfactual)> = Vec::new();
     for event in trunk.events(tick) {
+        // A command that was delayed and doubled is two events, and without both it just arrives: that is tried once.
         if let Some((rank, what, instead)) = left_out(trunk, tick, event)
             && !found.iter().any(|(_, _, other)| *other == instead)
         {
             found.push((rank, what, instead));
         }
     }
+
+    // Stable: of the same rank, those that come first in the record, so the ones beyond the limit are always the same.
     found.sort_by_key(|(rank, ..)| *rank);
     found
         .into_iter()
@@ -113,6 +120,7 @@ fn left_out(trunk: &Trunk, tick: Tick, event: &Event) -> Option<(u8, String, Cou
         seq,
     };
     let command = |from, to, seq| named(trunk, tick, from, to, seq);
+
     match event {
         Event::Changed { set, by_hand: true } => Some((
             0,
@@ -181,6 +189,8 @@ fn left_out(trunk: &Trunk, tick: Tick, event: &Event) -> Option<(u8, String, Cou
 /// A command in words, with its text.
 fn named(trunk: &Trunk, tick: Tick, by: &RobotName, target: &RobotName, number: Seq) -> String {
     let first = tick.saturating_sub(MAX_UNDER_WAY);
+
+    // Backwards: without delay a command is sent in the tick before.
     for tick in (first..=tick).rev() {
         for event in trunk.events(tick) {
             if let Event::CommandSent {
@@ -216,6 +226,8 @@ fn is_named(event: &Event) -> bool {
 pub(super) fn planned(trunk: &Trunk, scenario: &Scenario) -> Vec<(Tick, String, Counterfactual)> {
     let last = trunk.last();
     let mut planned = Vec::new();
+
+    // Forks go on after tick 0 at the earliest. What a change takes away or moves before it begins never took place.
     for (index, partition) in scenario.network.partitions.iter().enumerate() {
         let known = &scenario.network_at(partition.from).partitions;
         if (1..=last).contains(&partition.from) && known.get(index) == Some(partition) {
@@ -224,6 +236,7 @@ pub(super) fn planned(trunk: &Trunk, scenario: &Scenario) -> Vec<(Tick, String, 
             planned.push((partition.from, what, Counterfactual::NoPartition { index }));
         }
     }
+
     for (index, fault) in scenario.faults.iter().enumerate() {
         let known = scenario.faults_at(fault.at);
         if (1..=last).contains(&fault.at) && known.get(index) == Some(fault) {
@@ -238,6 +251,8 @@ pub(super) fn planned(trunk: &Trunk, scenario: &Scenario) -> Vec<(Tick, String, 
             planned.push((fault.at, what, Counterfactual::NoFault { index }));
         }
     }
+
+    // Only the run tells in which tick a command has the number that is named.
     if !scenario.network.named.is_empty() {
         for tick in 1..=last {
             for event in trunk.events(tick) {
@@ -249,6 +264,7 @@ pub(super) fn planned(trunk: &Trunk, scenario: &Scenario) -> Vec<(Tick, String, 
             }
         }
     }
+
     planned.sort_by_key(|(tick, ..)| *tick);
     planned.truncate(MAX_PLANNED);
     planned

@@ -81,13 +81,14 @@ pub fn why(
     let mut trunk = Trunk::open(files, asked.scenario.clone(), make, asked.sums_up())?;
     let mut rungs = BTreeMap::from([(0, trunk.snapshot()?)]);
 
-    // As it is, or, if it was stopped, as it would have gone on.
+    // To its end, as it is, or, if it was stopped, as it would have gone on. Tick by tick, so that the caller can end it.
     while trunk.tick() < trunk.last() {
         if options.stop.load(Ordering::Relaxed) {
             return Err(LabError::Interrupted);
         }
         trunk.go_to(trunk.tick() + 1)?;
     }
+    // Before the run becomes a branch, which cannot be executed from its record any more.
     let whole = trunk.snapshot()?;
     let digest = trunk.simulation().digest();
     let is_share = asked.question.is_share();
@@ -101,6 +102,7 @@ pub fn why(
     })?;
     rungs.insert(whole.last(), whole);
 
+    // The file is that of the question; the key in it tells whether what it has holds for this run and this program.
     let name = file_name(&asked.question);
     let key = key(&asked, &digest)?;
     let place = folder.file(WHY);
@@ -169,8 +171,10 @@ fn file_name(question: &super::question::Question) -> String {
             name.push('-');
         }
     }
+    // All of it is ASCII, so it can be cut anywhere.
     name.truncate(MAX_NAME);
     let name = name.trim_end_matches('-');
+
     // Different questions may have the same letters.
     let digest = xxh3_128(words.as_bytes()) as u32;
     format!("{name}-{digest:08x}")
@@ -238,6 +242,7 @@ impl OutcomeFile {
                 of_plan.insert(kept.number, outcome);
             }
         }
+        // Cuts off a line without an end: the next one would be appended to it, and neither could be read.
         if whole != text {
             std::fs::write(&path, &whole).map_err(|error| unwritable(&path, &error))?;
         }
@@ -251,6 +256,7 @@ impl OutcomeFile {
             ForkOutcome::Failed(because) => Some(because.to_string()),
             ForkOutcome::Number(_) | ForkOutcome::Nothing => None,
         };
+
         let kept = PlayedFork {
             plan: plan.clone(),
             number,
@@ -258,6 +264,7 @@ impl OutcomeFile {
             failed,
         };
         let line = serde_json::to_string(&kept).map_err(LabError::failed)?;
+        // In one piece: a process that is killed leaves at most the last line without its end.
         let written = self.file.write_all(format!("{line}\n").as_bytes());
         written.map_err(|error| unwritable(&self.path, &error))
     }
@@ -287,6 +294,7 @@ impl Forks for Sampler<'_> {
             .clone()
             .filter(|number| !known.contains_key(number))
             .collect();
+        // Also those that were played before: with a budget in forks the answer does not depend on what was kept.
         self.used += numbers.end - numbers.start;
         if !missing.is_empty() {
             self.play_all(plan, &missing)?;
@@ -332,15 +340,18 @@ impl Sampler<'_> {
 
         let WhyOptions { jobs, stop, .. } = self.options;
         let played = parallel::all(numbers, *jobs, stop, |&number| {
+            // After the first error no further fork is begun; those under way are still kept.
             if has_failed.load(Ordering::Relaxed) {
                 return Ok(());
             }
+            // Only the copy is made under the lock. Where robots cannot be copied it is after tick 0, and comes to the tick here.
             let copy = locked(&base).snapshot();
             let outcome = copy.and_then(|mut trunk| {
                 trunk.go_to(tick)?;
                 fork(asked, trunk.into_branch()?, plan, number)
             });
 
+            // In the order in which forks end: the file has the number of each, and outcomes are read by their numbers.
             let (known, kept, progress) = &mut *locked(&keeping);
             progress(WhyProgress { forks, tick });
             let is_kept = outcome.and_then(|outcome| {
@@ -366,6 +377,8 @@ impl Sampler<'_> {
         let before = self.rungs.range(..=tick).next_back();
         let (_, rung) = before.ok_or_else(|| LabError::failed("a run begins with tick 0"))?;
         let mut trunk = rung.snapshot()?;
+
+        // Without room for further copies only time is lost: the run is played from an earlier one each time.
         if trunk.tick() < tick {
             trunk.go_to(tick)?;
             if self.rungs.len() < MAX_RUNGS {
@@ -394,6 +407,8 @@ fn fork(
             Ok(None)
         }
     });
+
+    // A robot that fails is an outcome of its own; that the fork cannot be played at all ends the answer.
     match played {
         Ok(outcome) => Ok(outcome.into()),
         Err(LabError::Robot(error)) => {
@@ -412,6 +427,7 @@ fn begin(branch: &mut Branch, plan: &ForkPlan, seed: u64) -> Result<bool, LabErr
     match plan {
         ForkPlan::After { .. } => branch.reseed(seed, &[]),
         ForkPlan::KindAfter { kind, .. } => branch.reseed(seed, std::slice::from_ref(kind)),
+        // In this tick only the one kind is drawn anew, and after it all of chance, as in forks after the tick.
         ForkPlan::KindAt { kind, .. } => {
             branch.reseed(seed, std::slice::from_ref(kind));
             branch.step()?;
@@ -421,6 +437,7 @@ fn begin(branch: &mut Branch, plan: &ForkPlan, seed: u64) -> Result<bool, LabErr
             leave_out(branch, event, seed)?;
             let record = branch.step()?;
             let events = record.iter().flat_map(|record| record.events.iter());
+            // That guests are drawn anew does not make sure that none is in the way.
             for happened in events {
                 if let (Event::Blocked { robot, .. }, Counterfactual::WayIsFree { robot: free }) =
                     (happened, event)
@@ -443,6 +460,7 @@ fn leave_out(branch: &mut Branch, event: &Counterfactual, seed: u64) -> Result<(
         to: to.clone(),
         verdict,
     };
+
     let scenario = branch.simulation().scenario();
     match event {
         Counterfactual::Arrives { from, to, seq } => {

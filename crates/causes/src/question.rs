@@ -104,7 +104,7 @@ impl AskedRun {
             .any(|(judged, _, verdict)| judged == name && *verdict == Verdict::Undecided);
         let mut asked = scenario.clone();
         asked.measures.clear();
-        // What ends the run may depend on verdicts.
+        // What ends the run may depend on verdicts, so all stay then.
         if scenario.end_when.is_none() {
             asked.expectations.retain(|one| one.name == name);
         }
@@ -125,6 +125,7 @@ impl AskedRun {
             text: format!("expect = [{{ name = \"{ASKED}\", never = {condition} }}]\n"),
         };
         let mut expected: Vec<Expectation> = scenario::expectations(&source, &scenario.setting())?;
+
         let mut asked = scenario.clone();
         asked.measures.clear();
         if scenario.end_when.is_none() {
@@ -146,6 +147,7 @@ impl AskedRun {
         // A ratio may be of other measures, and a count of verdicts.
         let until = asked.measures.iter().position(|one| one.name == name);
         asked.measures.truncate(until.map_or(0, |index| index + 1));
+
         Self {
             question: Question::Measure { name },
             scenario: asked,
@@ -160,10 +162,12 @@ impl AskedRun {
                 "{path} is wall clock: it says nothing about the run, and is another number whenever it is executed"
             )));
         }
+
         let mut table = toml::Table::new();
         table.insert("name".to_owned(), ASKED.into());
         table.insert("summary".to_owned(), path.into());
         let measure = ScenarioMeasure::try_from(table).map_err(LabError::refused)?;
+
         let mut asked = scenario.clone();
         asked.measures.clear();
         if scenario.end_when.is_none() {
@@ -189,6 +193,7 @@ impl AskedRun {
     /// If the branch cannot be played.
     pub(super) fn outcome(&self, branch: &mut Branch) -> Result<Option<f64>, LabError> {
         let is_one = |is_one: bool| Some(f64::from(u8::from(is_one)));
+
         match &self.question {
             Question::Expectation { name, or_undecided } => {
                 let verdict = branch.judge(name)?;

@@ -100,11 +100,14 @@ pub(super) fn search(run: &SearchedRun<'_>, forks: &mut dyn Forks) -> Result<Fou
     // What the scenario plans is few and may be all of the answer, so a small budget goes there.
     search.reach(0, SCOUTS)?;
     let planned = search.planned()?;
+
     search.scout()?;
     let least_jump = search.least_jump();
     let ticks = search.narrow(least_jump)?;
     let jumps = search.confirm(&ticks, least_jump)?;
     let kinds = search.kinds()?;
+
+    // Only here: the least jump, which an effect that matters must reach, is known after the curve.
     let planned = planned.into_iter().map(|(mut effect, change)| {
         effect.matters = effect.p <= LEVEL && change.abs() >= least_jump;
         effect
@@ -155,6 +158,8 @@ impl Search<'_> {
         if tick >= self.run.last || have >= forks {
             return Ok(());
         }
+
+        // Numbered from 0 without gaps: the place of an outcome is the number of its fork, by which points are compared in pairs.
         let more = self.forks.play(&ForkPlan::After { tick }, have..forks)?;
         self.points.entry(tick).or_default().extend(more);
         Ok(())
@@ -166,6 +171,8 @@ impl Search<'_> {
         let of = |tick| self.points.get(&tick).map(Vec::as_slice);
         let before = of(from).unwrap_or_default();
         let after = of(to).unwrap_or_default();
+
+        // After its last tick a run has one outcome, whatever is drawn then.
         if to >= self.run.last {
             return differences(before, known.iter().cycle());
         }
@@ -189,6 +196,7 @@ impl Search<'_> {
         if least_jump == 0.0 {
             return Ok(Vec::new());
         }
+
         let worth = least_jump * WORTH_A_LOOK;
         let mut intervals = self.screen(worth);
         let mut ticks = Vec::new();
@@ -196,8 +204,10 @@ impl Search<'_> {
             // The largest first, and of equal ones the earlier.
             intervals.sort_by(|one, other| other.0.total_cmp(&one.0).then(one.1.cmp(&other.1)));
             intervals.truncate(MAX_INTERVALS);
+
             let mut halves = Vec::new();
             for (size, from, to) in intervals {
+                // Before the budget is asked for: what is narrowed down already costs no fork.
                 if to - from <= 1 {
                     ticks.push((size, to));
                     continue;
@@ -205,10 +215,12 @@ impl Search<'_> {
                 if !self.goes_on() {
                     continue;
                 }
+
                 let middle = from + (to - from) / 2;
                 for tick in [from, middle, to] {
                     self.reach(tick, FORKS)?;
                 }
+                // Both may stay: an interval can have several jumps, also such as cancel each other in it.
                 for (from, to) in [(from, middle), (middle, to)] {
                     let size = mean(&self.differences(from, to)).abs();
                     if size >= worth {
@@ -219,6 +231,7 @@ impl Search<'_> {
             intervals = halves;
         }
 
+        // Each test costs forks, and by Holm's correction makes the others harder to pass: only the largest are tested.
         ticks.sort_by(|one, other| other.0.total_cmp(&one.0).then(one.1.cmp(&other.1)));
         ticks.truncate(MAX_JUMPS);
         let mut ticks: Vec<Tick> = ticks.into_iter().map(|(_, tick)| tick).collect();
@@ -231,6 +244,7 @@ impl Search<'_> {
     fn screen(&self, worth: f64) -> Vec<(f64, Tick, Tick)> {
         let mut ends: Vec<Tick> = self.points.keys().copied().collect();
         ends.push(self.run.last);
+
         let mut contrasts = Vec::new();
         for index in 1..ends.len() {
             let before = &ends[index.saturating_sub(WINDOW)..index];
@@ -247,6 +261,7 @@ impl Search<'_> {
                 intervals.push((alone, from, to));
             }
 
+            // A jump shows in the contrasts beside its own as well, less clearly: only the clearest of them is taken.
             let (size, z) = contrasts[index];
             let near = &contrasts[index.saturating_sub(2)..(index + 3).min(contrasts.len())];
             let is_peak = near.iter().all(|(_, other)| *other <= z);
@@ -270,9 +285,11 @@ impl Search<'_> {
         if before.is_empty() || after.is_empty() {
             return (0.0, 0.0);
         }
+
         let size = (mean(&after) - mean(&before)).abs();
         let error = |values: &[f64]| deviation(values) * deviation(values) / values.len() as f64;
         let variance = error(&before) + error(&after);
+        // Where neither side varies, any difference is clear.
         let z = if variance > 0.0 {
             size / variance.sqrt()
         } else if size > 0.0 {
@@ -288,9 +305,11 @@ impl Search<'_> {
         let mut sides = Vec::new();
         let mut p_values = Vec::new();
         for &tick in ticks {
+            // What is left out here is not tested, so the correction below does not count it.
             if !self.goes_on() {
                 break;
             }
+            // It is the later end of an interval, so there is a tick before it.
             let before = self.fresh(tick - 1, CONFIRMING)?;
             let after = self.fresh(tick, CONFIRMING)?;
             let mut beyond = differences(&before, after.iter());
@@ -306,9 +325,11 @@ impl Search<'_> {
         let mut jumps = Vec::new();
         for ((tick, before, after), p) in sides.into_iter().zip(holm(&p_values)) {
             let change = mean(&differences(&before, after.iter()));
+            // Surely more than a part of the least jump, by the test, and by the estimate at least all of it.
             if p > LEVEL || change.abs() < least_jump {
                 continue;
             }
+
             let is_share = self.run.is_share;
             let mut jump = Jump {
                 shown: DecisionJump {
@@ -332,6 +353,7 @@ impl Search<'_> {
         if tick >= self.run.last {
             return Ok(vec![self.run.recorded.into(); forks as usize]);
         }
+
         let numbers = FIRST_CONFIRMING..FIRST_CONFIRMING + forks;
         self.forks.play(&ForkPlan::After { tick }, numbers)
     }
@@ -359,10 +381,12 @@ impl Search<'_> {
             if !self.goes_on() {
                 break;
             }
+            // These numbers are the first of those of `after`, so both are compared fork by fork; the further ones have no pair.
             let numbers = FIRST_CONFIRMING..FIRST_CONFIRMING + TRYING;
             let without = self.forks.play(&plan, numbers)?;
             let restored = differences(after, without.iter());
             p_values.push(SignFlip::of(&restored).p);
+            // 1 where the outcome is as it was before the tick, 0 where it is as after it.
             let gone = -mean(&restored) / change;
             tried.push((what, plan, without, gone));
         }
@@ -377,6 +401,8 @@ impl Search<'_> {
             if restores && is_better {
                 best = Some(rank);
             }
+
+            // All of them, so that the place in this list is the one that `rank` keeps.
             jump.tried.push(TriedCause {
                 what,
                 plan,
@@ -400,11 +426,13 @@ impl Search<'_> {
             if !self.goes_on() {
                 break;
             }
+
             let plan = ForkPlan::KindAfter {
                 tick: 0,
                 kind: kind.clone(),
             };
             let outcomes = self.forks.play(&plan, 0..SCOUTS)?;
+            // Whether the outcome is another one, not by how much: changes in both directions do not cancel.
             let recorded = ForkOutcome::from(self.run.recorded);
             let changed: Vec<ForkOutcome> = outcomes
                 .into_iter()
@@ -413,6 +441,7 @@ impl Search<'_> {
                     outcome => ForkOutcome::Number(f64::from(u8::from(outcome != recorded))),
                 })
                 .collect();
+
             effects.push(KindEffect {
                 kind: kind.to_string(),
                 changed: outcomes_of(&changed, true),
@@ -429,6 +458,7 @@ impl Search<'_> {
             if !self.goes_on() {
                 break;
             }
+
             let with = self.fresh(tick.saturating_sub(1), TRYING)?;
             let plan = ForkPlan::Without {
                 tick: *tick,
@@ -438,6 +468,8 @@ impl Search<'_> {
             let without = self.forks.play(&plan, numbers)?;
             let change = differences(&with, without.iter());
             p_values.push(SignFlip::of(&change).p);
+
+            // Its p value is corrected below, when all are known.
             let effect = PlannedEffect {
                 what: what.clone(),
                 tick: *tick,
@@ -448,6 +480,7 @@ impl Search<'_> {
             };
             effects.push((effect, mean(&change)));
         }
+
         for ((effect, _), p) in effects.iter_mut().zip(holm(&p_values)) {
             effect.p = p;
         }
@@ -464,6 +497,7 @@ impl Search<'_> {
                 outcome: outcomes_of(outcomes, is_share),
             })
             .collect();
+
         curve.push(DecisionPoint {
             tick: self.run.last,
             outcome: ForkOutcomes {
@@ -480,7 +514,9 @@ impl Search<'_> {
 
 /// Intervals that overlap as one.
 fn merged(mut intervals: Vec<(f64, Tick, Tick)>) -> Vec<(f64, Tick, Tick)> {
+    // By their beginnings, so that each can overlap only the last of those that were merged.
     intervals.sort_by_key(|(_, from, to)| (*from, *to));
+
     let mut merged: Vec<(f64, Tick, Tick)> = Vec::new();
     for (size, from, to) in intervals {
         match merged.last_mut() {

@@ -56,6 +56,7 @@ impl WhyAnswer {
         let Some(start) = start.filter(|start| start.value.is_some()) else {
             return "No fork was played. ".to_owned();
         };
+
         let is_near = match (start.value, self.recorded) {
             (Some(value), Some(recorded)) if self.is_share => (value - recorded).abs() <= NEAR,
             _ => self.least_jump == 0.0,
@@ -66,6 +67,7 @@ impl WhyAnswer {
                 self.amount(&start)
             );
         }
+
         let least = if self.is_share {
             format!("{:.0} points", self.least_jump * 100.0)
         } else {
@@ -79,6 +81,7 @@ impl WhyAnswer {
 
     fn outcome_in_words(&self) -> String {
         let is_one = self.recorded == Some(1.0);
+
         match &self.question {
             Question::Expectation {
                 name, or_undecided, ..
@@ -135,6 +138,7 @@ impl WhyAnswer {
             self.amount(&jump.before),
             self.amount(&jump.after)
         );
+
         match &jump.cause {
             Some(cause) if cause.is_event => {
                 text += &format!(

@@ -102,8 +102,10 @@ struct Shrinker<'a> {
 impl Shrinker<'_> {
     /// Shrinks until no step makes the case smaller; returns whether that was reached.
     fn shrink(&mut self) -> bool {
+        // First of all: every run that follows is as short as the one in which the expectation failed.
         self.shorten();
 
+        // Around again, because each step may make room for an earlier one: without a robot, a fault may not be needed any more.
         loop {
             let before = self.best.clone();
             self.make_concrete();
@@ -113,6 +115,7 @@ impl Shrinker<'_> {
             self.remove_guests();
             self.shorten();
 
+            // Asked for first: steps that were cut off change nothing either, and that does not make the case minimal.
             if self.is_over() {
                 return false;
             }
@@ -130,6 +133,7 @@ impl Shrinker<'_> {
     /// ends first.
     fn take_first(&mut self, cases: Vec<FaultCase>) -> Option<usize> {
         let mut cases = cases;
+        // To take the same case again would look like progress, for ever.
         cases.retain(|case| *case != self.best);
         let left = self.bounds.runs.saturating_sub(self.runs);
         cases.truncate(usize::try_from(left).unwrap_or(usize::MAX));
@@ -137,10 +141,13 @@ impl Shrinker<'_> {
         let found = first(&cases, self.bounds.jobs, self.bounds.stop, |case| {
             self.failing(case)
         });
+        // Those in their order up to the one that is taken, not those that other threads have begun after it: so the bound ends the
+        // shrinking at the same place however many run at the same time.
         self.runs += match &found {
             Some((place, _)) => *place as u64 + 1,
             None => cases.len() as u64,
         };
+
         let (place, played) = found?;
         self.best = cases.swap_remove(place);
         self.played = played;
@@ -153,6 +160,7 @@ impl Shrinker<'_> {
         if !played.failed.contains_key(self.name) {
             return None;
         }
+        // In the world of the best case the faults are known to be the cause: this was looked at when that world was taken.
         if case.has_world_of(&self.best) {
             return Some(played);
         }
@@ -190,6 +198,7 @@ impl Shrinker<'_> {
             return;
         }
 
+        // All faults that are not of single commands at once, and then each of them alone.
         let mut named = Vec::new();
         for fault in &self.best.faults {
             if fault.command().is_some() {
@@ -197,6 +206,7 @@ impl Shrinker<'_> {
             }
         }
         named.extend(concrete.iter().cloned());
+
         let mut cases = vec![self.best.with_faults(named)];
         for (index, fault) in self.best.faults.iter().enumerate() {
             if fault.command().is_some() {
@@ -211,16 +221,19 @@ impl Shrinker<'_> {
 
     /// Delta debugging: leaves out faults until each that is left is needed.
     fn remove_faults(&mut self) {
+        // Each piece by itself, then all but each piece; where the expectation fails in none of these, smaller pieces.
         let mut pieces = 2;
         while self.best.faults.len() > 1 && !self.is_over() {
             let count = self.best.faults.len();
             pieces = pieces.min(count);
+
             let mut cases = Vec::new();
             for piece in 0..pieces {
                 let begin = piece * count / pieces;
                 let end = (piece + 1) * count / pieces;
                 cases.push(self.best.with_faults(self.best.faults[begin..end].to_vec()));
             }
+            // Of two pieces, all but the one is the other.
             if pieces > 2 {
                 for piece in 0..pieces {
                     let begin = piece * count / pieces;
@@ -232,8 +245,11 @@ impl Shrinker<'_> {
             }
 
             match self.take_first(cases) {
+                // A piece by itself is enough: begin anew with it.
                 Some(place) if place < pieces => pieces = 2,
+                // One was not needed: the others are as large as before.
                 Some(_) => pieces = (pieces - 1).max(2),
+                // Pieces were single faults: each is needed.
                 None if pieces == count => return,
                 None => pieces = (2 * pieces).min(count),
             }
@@ -244,16 +260,20 @@ impl Shrinker<'_> {
     fn weaken_faults(&mut self) {
         let mut index = 0;
         while index < self.best.faults.len() && !self.is_over() {
-            let mut cases = Vec::new();
             let fault = &self.best.faults[index];
             let mut instead = weaker(fault, self.world);
             instead.extend(earlier(fault));
+            // A fault that is there already would be there twice.
             instead.retain(|other| !self.best.faults.contains(other));
+
+            let mut cases = Vec::new();
             for weaker in instead {
                 let mut faults = self.best.faults.clone();
                 faults[index] = weaker;
                 cases.push(self.best.with_faults(faults));
             }
+
+            // A fault that was weakened is looked at again; each step is smaller, so this ends.
             if self.take_first(cases).is_none() {
                 index += 1;
             }
@@ -273,6 +293,7 @@ impl Shrinker<'_> {
                 case.faults.extend(fault.without(robot));
             }
 
+            // Without faults no expectation can fail because of them.
             if !case.faults.is_empty() {
                 self.take_first(vec![case]);
             }
@@ -306,6 +327,8 @@ impl Shrinker<'_> {
 fn fates_as_faults(message: &SentMessage) -> Vec<PlannedFault> {
     let link = || message.link.clone();
     let number = message.number;
+
+    // What does not arrive is neither late nor doubled: one fault says it all.
     let mut faults = Vec::new();
     if message.is_lost {
         let link = link();
@@ -414,6 +437,7 @@ fn earlier(fault: &PlannedFault) -> Vec<PlannedFault> {
             all.push(fault.of_command(number));
         }
     }
+
     match fault {
         PlannedFault::Channel { span, .. }
         | PlannedFault::Partition { span, .. }

@@ -248,6 +248,7 @@ impl Subject {
         // A robot that panics or ends the run is what a hunt looks for.
         let played = match &self.robots {
             HuntRobots::InProcess(source) => {
+                // With the run, what was noted of it is copied: a feature or a failure of before is part of the result.
                 let saved = plan.saved.as_deref();
                 if let Some(saved) = saved {
                     notes = saved.notes.clone();
@@ -255,6 +256,7 @@ impl Subject {
                 let robots = source.begin();
                 let mut local = self.local(scenario, robots.as_ref(), saved)?;
                 let is_begun = saved.is_some();
+                // After a panic the run is thrown away; the notes are changed only between two steps of it, so they are whole.
                 let run = AssertUnwindSafe(|| {
                     play_here(
                         &mut local,
@@ -276,6 +278,7 @@ impl Subject {
             }
         };
         if let Some(because) = played {
+            // In the tick after the last one that was noted.
             let tick = notes.played.ticks + 1;
             let failure = FailedExpectation { tick, because };
             notes.played.failed.insert(RUNS.to_owned(), failure);
@@ -328,12 +331,15 @@ fn play_here(
     copies: &mut Copies<'_>,
 ) -> Result<(), LabError> {
     let run = RunName::unknown();
+
     if !is_begun {
         let record = local.simulation.init(&mut local.robots)?;
         notes.note(record.tick, &record.events);
         copies.note(local, notes);
     }
+
     while !local.simulation.is_over() {
+        // Before the step: a copy that goes on may have failed already.
         if notes.has_failed(wanted) {
             return Ok(());
         }
@@ -358,8 +364,10 @@ fn play_by_processes(
 ) -> Result<Option<String>, LabError> {
     // What cannot be set up says nothing against the robots.
     Simulation::new(scenario.clone(), 1).map_err(LabError::refused)?;
+
     let mut notes = NotesUntilFailure { notes, wanted };
     let played = launches.follow(scenario, launch, &mut notes);
+    // A failed expectation is noted already: that the launch then ends with an error adds nothing.
     let is_over = notes.notes.has_failed(wanted);
     Ok(played.err().filter(|_| !is_over).map(|error| {
         let text = error.to_string();
@@ -490,10 +498,12 @@ impl TrialNotes {
 
     fn note_verdict(&mut self, tick: Tick, expectation: &str, verdict: Verdict, because: &str) {
         let expectation = expectation.to_owned();
+
         match verdict {
             Verdict::NotAsked => _ = self.played.not_asked.insert(expectation),
             Verdict::Fail => {
                 let because = because.to_owned();
+                // The first failure counts: to it the run is shortened.
                 let failed = self.played.failed.entry(expectation);
                 failed.or_insert(FailedExpectation { tick, because });
             }
@@ -532,6 +542,7 @@ impl TrialNotes {
             self.note_span(last, span);
         }
 
+        // Spans come when they end. Commands are numbered in the order in which they were sent, as a scenario names them.
         let mut numbers: BTreeMap<Link, u64> = BTreeMap::new();
         let mut commands = self.commands;
         commands.sort_by(|a, b| (a.sent, &a.from, a.seq).cmp(&(b.sent, &b.from, b.seq)));
