@@ -529,6 +529,7 @@ impl Medium {
         let pair = (command.from.clone(), command.to.clone());
         let number = self.number_judged(&pair);
         let forced = self.forced_verdict(&command);
+        // Where the fate is certain nothing is drawn. No other command notices: each has a stream of its own.
         let is_lost = named.is_lost && forced.is_none();
         if is_lost || forced == Some(NetworkVerdict::IsLost(command.seq)) {
             events.push(command.dropped(Cause::Scripted));
@@ -552,6 +553,7 @@ impl Medium {
             Some(delay_s) => delay_s.sample(&mut chance),
             None => 0.0,
         };
+        // A loss by rule comes first. The radio, which is asked for the others only, has a stream of its own, and its number is taken.
         let by_rule = self.loss(MessageKind::Commands, &channel, &pair, loss, around);
         let lost = by_rule.or_else(|| {
             let name = format!("radio/{}/{from}/{to}/{number}", tick - 1);

@@ -265,7 +265,7 @@ impl<R, C> Barrier<R, C> {
             && self.attendance.is_none()
             && self.lateness.of(name) == OnLate::Continue
         {
-            // It will not report in time.
+            // It will not report in time. Under the other policies the tick stays open for it, until it is back or its deadline is over.
             self.give_up(name, self.lateness.lose_after);
             self.stand_in(name, out);
             self.settle(out);
@@ -354,6 +354,7 @@ impl<R, C> Barrier<R, C> {
             return;
         };
 
+        // Of whichever incarnation: it says for whom the clock waits in the end, and completes nothing.
         member.wait_for(on);
         // The robot that is asked may be one without which the clock goes on: then its state is put
         // now, and again with each repetition of the clock.
@@ -389,6 +390,8 @@ impl<R, C> Barrier<R, C> {
             // now.
             Timer::Deadline if is_open && self.attendance.is_none() => self.judge_late(out),
             Timer::Repeat | Timer::Deadline => {}
+            // Set anew for each process that is admitted, so it is that of the last one. Where its token came in time, nothing is
+            // reserved any more.
             Timer::Token(name) => {
                 if let Some(member) = self.members.get_mut(name) {
                     member.end_reservation();
@@ -632,6 +635,7 @@ impl<R, C> Barrier<R, C> {
 
     fn check_all_joined(&mut self, out: &mut Vec<BarrierOutput<R, C>>) {
         if self.members.values().all(Member::is_ready) {
+            // A robot that leaves from here on does not undo it: tick 0 is opened with all, and waits for it.
             self.phase = BarrierPhase::Gathered;
             // People are told that the clock goes on only if they were told that it did not.
             if std::mem::take(&mut self.is_announced) {
@@ -781,6 +785,7 @@ impl<R, C> Barrier<R, C> {
             let mut from_last = self.members.range::<RobotName, _>(from_last);
             from_last.find(|(_, member)| member.is_awaited())
         });
+        // Only this shows that none is left: one before may be awaited since, because a successor of a lost robot was taken in.
         let mut all = self.members.iter();
         let found = later.or_else(|| all.find(|(_, member)| member.is_awaited()));
 

@@ -383,6 +383,7 @@ impl<R, C> Member<R, C> {
 
     /// Whether it cannot report for this tick: the scenario keeps its process from running, or it is not connected.
     pub(crate) fn is_out(&self, tick: Tick) -> bool {
+        // All take part in tick 0: every robot was connected when it was asked for.
         tick > 0 && (self.is_stopped() || !self.has_token)
     }
 

@@ -300,6 +300,7 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
     pub fn done(&mut self, commands: Vec<Sent<C>>, state: S, report: R, out: &mut Out<N, S, C, R>) {
         let is_discarded = matches!(self.tick, TickState::Discarding);
         if is_discarded || self.has_left() {
+            // Until now no other tick could begin: a clock may have come meanwhile.
             self.tick = TickState::NotBegun;
             self.run_if_possible(out);
             return;
@@ -548,7 +549,7 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         } else if is_named {
             Begin::TakeOver
         } else {
-            return; // Its turn comes with the news that name it.
+            return; // Its turn comes with the news that name it, and with their clock: this one is not kept.
         };
 
         self.tick = TickState::Running { at, asking: None };

@@ -192,14 +192,17 @@ fn make_links(
     start: &Start,
     report: &mut dyn FnMut(String),
 ) -> Result<Box<dyn Links>, LaunchError> {
+    // What these links cannot do is refused before anything of them is made.
     match via {
         Via::Proxy => Ok(Box::new(Proxies::new(file)?)),
+
         Via::Namespaces => {
             plan.check_cuts_only("the link of a namespace")?;
             check_not_secured(file)?;
             namespaces::remove_abandoned(report);
             Ok(Box::new(Namespaces::new(&file.processes)?))
         }
+
         Via::Compose => {
             plan.check_cuts_only("the link of a container")?;
             check_not_secured(file)?;

@@ -149,6 +149,7 @@ fn accept(listener: &TcpListener, to: SocketAddr, gate: &Arc<Gate>, open: &Arc<C
             }
         };
 
+        // Only this thread adds connections, so there is still room below.
         let is_full = open.with(|open| open.len() >= MAX_CONNECTIONS);
         if is_full || gate.shape().flow == Flow::Closed {
             continue; // Dropping the socket closes it.

@@ -297,6 +297,8 @@ impl RunFolder {
     }
 
     fn put_aside(&self) -> std::io::Result<()> {
+        // File by file, under a name that does not claim that all are there. What a process that is killed here has moved is put back
+        // by the next one that takes the folder.
         let moved = self.file(MOVED);
         for file in self.files() {
             let Ok(name) = file.strip_prefix(&self.path) else {
@@ -340,6 +342,8 @@ impl RunFolder {
             _ => {}
         }
 
+        // The inner folders first: a folder can be removed only when it is empty. A process that is killed in between leaves the rest
+        // under this name, and the next one goes on.
         for folder in [moved.join(LOGS), moved.join(WHY), moved.clone()] {
             let Ok(entries) = std::fs::read_dir(&folder) else {
                 continue; // A run without logs of processes, or without answers.

@@ -313,6 +313,7 @@ impl Recorder {
         simulation: &Simulation,
         record: &TickRecord,
     ) -> Result<Vec<LogRecord>, RecordError> {
+        // One tick is noted at most, so they are written in their order.
         self.write_noted()?;
 
         let mut lines = Vec::new();

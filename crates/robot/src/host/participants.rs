@@ -195,6 +195,7 @@ impl Participants {
 
     /// The simulator's token was declared or undeclared.
     pub(super) fn simulator(&self, is_present: bool) {
+        // Noted first: a robot whose patience ends in between leaves or goes on by what is true now.
         self.lock().has_simulator = is_present;
         self.each(|participant, actions| participant.simulator(is_present, actions));
     }
