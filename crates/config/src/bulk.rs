@@ -20,7 +20,7 @@ pub(crate) fn name(element: &toml::Value) -> Option<&str> {
     })
 }
 
-/// The numbers of the robots that an element is; `None` for one that is a single robot, and for a count that is none.
+/// The numbers of the robots that an element is; `None` for one that is a single robot, and for a count that is not valid.
 fn numbers(element: &toml::Value) -> Option<RangeInclusive<usize>> {
     let written = element.get("name").and_then(toml::Value::as_str);
     if let Some(Ok(Some((_, numbers)))) = written.map(split_range) {

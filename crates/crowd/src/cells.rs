@@ -1,4 +1,4 @@
-//! The plane in cells, at least as wide as people see: who is near somebody is in the same cell or one beside it.
+//! The plane in cells, at least as wide as people see: who is near a person is in the same cell or one beside it.
 
 use crate::premises::{Disc, WallLine};
 use crate::vector::Vector;

@@ -8,7 +8,7 @@ use crate::vector::Vector;
 ///
 /// Direction: e = unit(e0 - sum a exp((l - s)/D) n), with the distance s to each neighbor in direction n, and l the sum of both
 /// radii. Speed: V = min(v0, max(0, (s - l)/T)), with the distance s to the closest neighbor in front. No step is longer than the
-/// gap, so in continuous time nobody touches anybody.
+/// gap, so in continuous time no two bodies touch.
 ///
 /// The default parameters are calibrated, all of them at once, to the line of Weidmann (1993) between 0.5 and 3 persons per m² in a
 /// corridor of 2 m, with Weidmann's spread of desired speeds, and to the flow through a gate of 0.5 m. Three rules are added:
@@ -58,7 +58,7 @@ const TURNS: [(f64, f64); 6] = [
     (0.0, 1.0),
 ];
 
-/// Cosine of the widest angle to the first direction at which somebody may be in front in one of the turned ones, and a bit less, by the
+/// Cosine of the widest angle to the first direction at which a person may be in front in one of the turned ones, and a bit less, by the
 /// number of turns: 30, 45, …, 120 degrees.
 const CONES: [f64; 7] = [0.86, 0.70, 0.49, 0.25, -0.01, -0.26, -0.51];
 
@@ -163,7 +163,7 @@ impl CollisionFree {
         ahead
     }
 
-    /// How fast a person may walk in a direction, m/s: at the desired speed if nobody is in front.
+    /// How fast a person may walk in a direction, m/s: at the desired speed if no one is in front.
     fn speed_mps(&self, seen: &Surroundings<'_>, ahead: &Ahead<'_>, direction: Vector) -> f64 {
         let mut speed_mps = seen.desired_mps;
         for other in ahead.iter() {
@@ -183,7 +183,7 @@ impl CollisionFree {
         speed_mps.max(0.0)
     }
 
-    /// How fast somebody is followed at a gap, who walks away at a speed, m/s. No step is longer than the gap.
+    /// How fast a person is followed at a gap, while the one in front walks away at a speed, m/s. No step is longer than the gap.
     fn following_mps(&self, gap_m: f64, away_mps: f64, step_s: f64) -> f64 {
         let steady_mps = gap_m / self.time_gap_s;
         if away_mps <= steady_mps {

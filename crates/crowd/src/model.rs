@@ -44,7 +44,7 @@ pub struct Surroundings<'a> {
 
 /// A model of walking: the velocity of one person in the next step.
 ///
-/// A model cannot lead anybody through a wall, because [`crate::Pedestrians`] holds everybody at walls, but
+/// A model cannot lead a person through a wall, because [`crate::Pedestrians`] holds all of them at walls, but
 /// [`crate::Pedestrians::through_walls`] counts how often it wanted to.
 pub trait WalkingModel: Sync {
     /// How far people see others and walls, m.

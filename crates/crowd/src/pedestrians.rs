@@ -284,7 +284,7 @@ impl<M: WalkingModel> Pedestrians<M> {
         self.present
     }
 
-    /// Whether nobody is there.
+    /// Whether no pedestrian is there.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.present == 0
@@ -296,7 +296,7 @@ impl<M: WalkingModel> Pedestrians<M> {
         self.now_s
     }
 
-    /// How often the model proposed a step of somebody through a wall. Nobody took it.
+    /// How many steps through a wall the model proposed. None of them was taken.
     #[must_use]
     pub fn through_walls(&self) -> u64 {
         self.through_walls

@@ -84,7 +84,7 @@ pub struct Premises {
 
 /// The place that a person comes to who would like to go from one place to another, and whether a wall was on the way.
 ///
-/// The rule, for every model: nobody's middle crosses a wall, and nobody comes closer to a wall or a disc than their own radius,
+/// The rule, for every model: no person's middle crosses a wall, and no person comes closer to a wall or a disc than their own radius,
 /// or than they are already. The proposed place is moved away from what it is too close to; where that leads nowhere, the person
 /// stays. \[I\]
 pub(crate) fn permitted<'a>(

@@ -24,7 +24,7 @@ pub struct SocialForce {
     pub stiffness_per_s2: f64,
     /// κ, sliding friction of bodies, 1/(m s). \[I\] 240,000 kg/(m s) / 80 kg = 3000.
     pub friction_per_m_s: f64,
-    /// λ, weight of what is behind. \[I\] 1 in 2000, that is none; 0.1 in 2005.
+    /// λ, weight of what is behind. \[I\] 1 in 2000, as much as what is in front; 0.1 in 2005.
     pub behind: f64,
     /// Space that a person needs beyond their radius for each m/s that they walk, s. \[I\] Seyfried, Steffen, Lippert 2006, 0.53 s
     /// for d = 0.36 m + 0.53 s v; 0 in the sources above.

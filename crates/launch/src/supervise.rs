@@ -25,7 +25,7 @@ use super::tail::Tail;
 /// Longest description of an end for the simulator, characters.
 const MAX_REASON: usize = 1000;
 
-/// A console at which nobody looks has ended after this long.
+/// A console that no browser shows has ended after this long.
 const UNSEEN: Duration = Duration::from_secs(1);
 
 /// An event of the supervisor's loop. Processes are named by their indices.

@@ -238,7 +238,7 @@ fn ratio(of: Vec<Measured>, by: Vec<Measured>) -> Measured {
     }
 }
 
-/// The sum of numbers, or the first that is none.
+/// The sum of numbers, or the first that is not a number.
 fn total(measured: Vec<Measured>) -> Result<f64, Measured> {
     let mut total = 0.0;
     for one in measured {

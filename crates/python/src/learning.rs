@@ -162,7 +162,7 @@ impl Environments {
         let record: Option<&RecordMaker> = out.is_some().then_some(&record);
 
         let step = seeds.len() as u64;
-        // Locked only while Python is let go: whoever waits for the lock must not keep a robot of Python from running.
+        // Locked only while Python is let go: a thread that waits for the lock must not keep a robot of Python from running.
         let begun = py.detach(|| {
             let mut copies = self.lock();
             self.each(&mut copies, &|index, copy| {

@@ -319,7 +319,7 @@ impl Recording {
             if !(from..to).contains(&tick) {
                 continue;
             }
-            // Without its topic a message would be missing, and nobody would know.
+            // Without its topic a message would be missing, and nothing would show it.
             let topic = self.topics.get(&message.channel).ok_or_else(|| {
                 let channel = message.channel;
                 self.damaged(

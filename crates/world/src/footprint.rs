@@ -258,7 +258,7 @@ fn squared(length_m: f64) -> f64 {
     length_m.max(0.0) * length_m.max(0.0)
 }
 
-/// The direction at a right angle to a displacement, of length 1; `None` for a displacement that is none.
+/// The direction at a right angle to a displacement, of length 1; `None` for a displacement of length 0.
 fn normal(displacement: Point) -> Option<Point> {
     let length_m = displacement.length();
     (length_m > 0.0).then(|| Point::new(-displacement.y, displacement.x) * (1.0 / length_m))

@@ -99,7 +99,7 @@ impl Response {
     }
 }
 
-/// The vector of length 1 in a direction; `None` for a displacement that is none.
+/// The vector of length 1 in a direction; `None` for a displacement that is too short to have one.
 fn unit(displacement: Point) -> Option<Point> {
     let length_m = displacement.length();
     (length_m > TOLERANCE_M).then(|| displacement * (1.0 / length_m))

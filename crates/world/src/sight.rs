@@ -79,7 +79,7 @@ fn crossed_wall(from: Point, to: Point, wall: &Wall) -> Option<f64> {
     let apart = one_side - other_side;
     let is_between = one_side.min(other_side) <= 0.0 && one_side.max(other_side) >= 0.0;
     if !is_between || apart == 0.0 {
-        // A wall has no thickness: nobody sees it from its end.
+        // A wall has no thickness: it cannot be seen from its end.
         return None;
     }
 

@@ -1,5 +1,5 @@
 //! The second part of the kit, "in a run": a run of at least three robots, whose clock goes on without robots that do not
-//! report, with all that befalls a robot there.
+//! report, with all that happens to a robot there.
 //!
 //! The run is played twice, and once without what must make no difference: the other robots then answer at once, nothing
 //! is early and nothing is lost. Each tick has at most one disturbance, and each belongs to a rule: the first tick in which
@@ -284,7 +284,7 @@ fn played(kit: &Kit, is_disturbed: bool) -> Result<(Transcript, Findings), Broke
     Ok((transcript, findings))
 }
 
-/// Plays the next tick, and before it what befalls the process.
+/// Plays the next tick, and before it what happens to the process.
 fn played_tick(
     harness: &mut Harness<'_>,
     script: &PlayScript,

@@ -102,7 +102,7 @@ pub(crate) fn corridor<M: WalkingModel + Clone>(model: &M, chance: &mut RunChanc
     values
 }
 
-/// Single file: a corridor of 24 m that repeats itself, 0.2 m broader than a body, so that nobody walks beside anybody. \[I\] The
+/// Single file: a corridor of 24 m that repeats itself, 0.2 m broader than a body, so that no two walk side by side. \[I\] The
 /// mean speeds at the densities of [`SINGLE_FILE`].
 pub(crate) fn single_file<M: WalkingModel + Clone>(model: &M, chance: &mut RunChance) -> Vec<f64> {
     let breadth_m = 2.0 * model.body_radius_m() + 0.2;

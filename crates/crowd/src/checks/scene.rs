@@ -42,7 +42,7 @@ impl RunChance {
         }
     }
 
-    /// Places in a rectangle, at random on a lattice that has room for everybody.
+    /// Places in a rectangle, at random on a lattice that has room for all of them.
     pub(crate) fn places(
         &mut self,
         low: Vector,

@@ -236,7 +236,7 @@ fn recorded(table: &GuestsTable, setting: RecordSetting<'_>) -> Result<RecordedG
     Ok(recorded)
 }
 
-/// Checks that somebody is on the field at some time.
+/// Checks that a guest is on the field at some time.
 fn check_seen(recorded: &RecordedGuests, field: &Field) -> Result<(), String> {
     let start_us = recorded.start_ms.unwrap_or(0).saturating_mul(1000);
     let tracks = recorded.tracks.iter();
