@@ -536,7 +536,7 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         // not pending.
         self.pending = None;
         let arrived = self.news.remove(&at);
-        self.news.retain(|of, _| *of > at);
+        self.news = self.news.split_off(&at);
         let joined = arrived.as_ref().and_then(|arrived| arrived.joined);
         // A clock of tick 0 may be from before this incarnation: only the first one takes part in it without being
         // named.

@@ -91,12 +91,12 @@ impl<S: Clone> RecentStates<S> {
         };
         let wanted = tick.checked_sub(1).ok_or(NoState::OutOfRange)?;
         let found = self.kept.iter().find(|(_, of_tick, _)| *of_tick == wanted);
-        match found {
-            Some((_, _, state)) => Ok(state.clone()),
+        match (found, wanted.checked_sub(*newest_tick)) {
+            (Some((_, _, state)), _) => Ok(state.clone()),
             // The robot is still at the tick whose state is asked for: the query is repeated.
-            None if wanted == newest_tick + 1 => Err(NoState::NotYet),
-            None if wanted > *newest_tick => Err(NoState::OutOfRange),
-            None => Err(NoState::Over),
+            (None, Some(1)) => Err(NoState::NotYet),
+            (None, Some(_)) => Err(NoState::OutOfRange),
+            (None, None) => Err(NoState::Over),
         }
     }
 }

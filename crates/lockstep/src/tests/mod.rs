@@ -1,6 +1,7 @@
 //! Rules that are local to one of the two types.
 
 mod barrier;
+mod edges;
 mod missing;
 mod participant;
 mod queries;

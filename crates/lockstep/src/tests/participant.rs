@@ -11,8 +11,8 @@ use crate::{
     ParticipantOutput, RobotTimer, Stamp, StateQuery, Timeouts, Turn,
 };
 
-type Robot = Participant<(), &'static str, (), ()>;
-fn robot() -> Robot {
+pub(super) type Robot = Participant<(), &'static str, (), ()>;
+pub(super) fn robot() -> Robot {
     let timeouts = Timeouts {
         join: Duration::from_secs(1),
         gone: Duration::from_secs(1),
@@ -97,7 +97,7 @@ fn a_simulator_that_is_back_in_time_is_not_gone() {
 }
 
 /// A robot that runs tick 1 of epoch 1, after it has answered tick 0.
-fn running() -> Robot {
+pub(super) fn running() -> Robot {
     let mut robot = robot();
     robot.admitted(ADMISSION, [], &mut Vec::new());
     robot.clock(clock(1, 0), &mut Vec::new());
@@ -121,7 +121,7 @@ fn a_state_of_a_later_tick_does_not_take_the_place_of_the_one_that_is_asked_for(
     assert_eq!(robot.ask(&name("B"), &mut Vec::new()), Some("of tick 1"));
 }
 
-fn run(epoch: u32, tick: u64, begin: Begin) -> ParticipantOutput<(), &'static str, (), ()> {
+pub(super) fn run(epoch: u32, tick: u64, begin: Begin) -> ParticipantOutput<(), &'static str, (), ()> {
     let has_news = begin == Begin::TakeOver;
 
     ParticipantOutput::Run(Turn {
