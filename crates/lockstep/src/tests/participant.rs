@@ -121,7 +121,11 @@ fn a_state_of_a_later_tick_does_not_take_the_place_of_the_one_that_is_asked_for(
     assert_eq!(robot.ask(&name("B"), &mut Vec::new()), Some("of tick 1"));
 }
 
-pub(super) fn run(epoch: u32, tick: u64, begin: Begin) -> ParticipantOutput<(), &'static str, (), ()> {
+pub(super) fn run(
+    epoch: u32,
+    tick: u64,
+    begin: Begin,
+) -> ParticipantOutput<(), &'static str, (), ()> {
     let has_news = begin == Begin::TakeOver;
 
     ParticipantOutput::Run(Turn {
