@@ -1,18 +1,20 @@
 """Words and numbers on the page are true of the tick that is shown."""
 
+import json
 import re
+import subprocess
 
 import pytest
 from playwright.sync_api import expect
 
-from lab import eventually, scrub, until
+from lab import BIN, PATIENCE_S, ROOT, eventually, scrub, until
 
 pytestmark = pytest.mark.thorough
 
 
-def ended(launch, open_page, speed="max"):
+def ended(launch, open_page):
     """A page of a run of 300 ticks that has ended."""
-    run = launch(options=("--set", "seed=7", "--set", 'duration="150 s"', "--speed", speed, "--stay"))
+    run = launch(options=("--set", "seed=7", "--set", 'duration="150 s"', "--speed", "max", "--stay"))
     page = open_page(run.address)
     run.control("start")
     eventually("the end", lambda: run.status()["phase"] == "ended")
@@ -20,19 +22,37 @@ def ended(launch, open_page, speed="max"):
     return run, page
 
 
-def test_a_reason_says_of_which_time_it_is(launch, open_page):
+def test_a_reason_says_of_which_time_it_is(launch, open_page, tmp_path):
     """It has numbers, such as of treats, of the tick in which its episode began."""
-    # Slow enough for panels of all ticks.
-    run, page = ended(launch, open_page, speed="9")
-    changes = [event for event in run.events() if event["event"] == "emotion" and event["robot"] == "Butler"]
+    options = ("--set", "seed=7", "--set", 'duration="150 s"')
+    command = [BIN / "cars", "run", "configs/hors_doeuvres.toml", "--run", "known", "--out", tmp_path, "--quiet", *options]
+    subprocess.run(command, check=True, timeout=PATIENCE_S, cwd=ROOT)
+    known = [json.loads(line) for line in (tmp_path / "known/events.jsonl").read_text().splitlines()]
+    changes = [event for event in known if event["event"] == "emotion" and event["robot"] == "Butler"]
     assert len(changes) > 1
+    began = {}
     for change, following in zip(changes, [*changes[1:], {"tick": 301}]):
-        for tick in {change["tick"], following["tick"] - 1}:
-            scrub(page, tick)
-            expect(page.get_by_test_id("tick")).to_have_text(str(tick))
-            panel = page.get_by_test_id("panel-Butler")
-            expect(panel.get_by_test_id("no-panel")).to_have_count(0)
-            expect(panel).to_contain_text(f"At {change['tick'] * 0.5:.1f} s, when this began: ")
+        for tick in (change["tick"], following["tick"] - 1):
+            began[tick] = change["tick"]
+
+    # The clock is held after each tick that is looked at: of others a busy machine may leave out the panels.
+    run = launch(options=(*options, "--speed", "max", "--stay"))
+    page = open_page(run.address)
+    at = 0
+    for tick in filter(None, sorted(began)):
+        run.control("step", str(tick - at))
+        eventually(f"tick {tick}", lambda: (run.settled() or {}).get("tick") == tick)
+        at = tick
+    eventually("the end", lambda: run.status()["phase"] == "ended")
+    expect(page.get_by_test_id("tick")).to_have_text("300")
+    of_butler = [event for event in run.events() if event["event"] == "emotion" and event["robot"] == "Butler"]
+    assert of_butler == changes
+    for tick, since in began.items():
+        scrub(page, tick)
+        expect(page.get_by_test_id("tick")).to_have_text(str(tick))
+        panel = page.get_by_test_id("panel-Butler")
+        expect(panel.get_by_test_id("no-panel")).to_have_count(0)
+        expect(panel).to_contain_text(f"At {since * 0.5:.1f} s, when this began: ")
 
 
 def test_the_paper_s_free_activation_is_named_as_in_english(launch, open_page):
