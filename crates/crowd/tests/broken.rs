@@ -68,26 +68,29 @@ fn options(case: &str) -> CheckOptions {
 
 #[test]
 fn each_defect_fails_a_case_that_the_calibrated_model_passes() {
-    for (defect, case) in [
-        (Defect::TooFast, "RiMEA 1,"),
-        (Defect::IgnoresWalls, "RiMEA 6"),
-        (Defect::IgnoresOthers, "RiMEA 4"),
-        (Defect::NeverStops, "RiMEA 1,"),
-        (Defect::HasNoReactionTime, "RiMEA 5"),
-        (Defect::Oscillates, "RiMEA 4"),
-        (Defect::WalksBackward, "RiMEA 1,"),
+    for (case, defects) in [
+        (
+            "RiMEA 1,",
+            &[Defect::TooFast, Defect::NeverStops, Defect::WalksBackward][..],
+        ),
+        ("RiMEA 4", &[Defect::IgnoresOthers, Defect::Oscillates]),
+        ("RiMEA 5", &[Defect::HasNoReactionTime]),
+        ("RiMEA 6", &[Defect::IgnoresWalls]),
     ] {
+        let options = options(case);
         let model = CollisionFree::default();
-        let right = check(&model, &options(case));
+        let right = check(&model, &options);
         assert!(!right.is_empty());
         let failed: Vec<_> = right.iter().filter(|row| !row.is_passed).collect();
         assert!(failed.is_empty(), "{case}: {failed:#?}");
 
-        let broken = check(&Broken(defect, model), &options(case));
-        assert!(
-            broken.iter().any(|row| !row.is_passed),
-            "{defect:?}: {broken:#?}"
-        );
+        for defect in defects {
+            let broken = check(&Broken(*defect, model.clone()), &options);
+            assert!(
+                broken.iter().any(|row| !row.is_passed),
+                "{defect:?}: {broken:#?}"
+            );
+        }
     }
 }
 
@@ -105,6 +108,7 @@ fn no_row_depends_on_the_number_of_threads() {
 
 /// The parameters were chosen with seed 1.
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn one_set_of_parameters_keeps_to_the_line_of_weidmann_and_to_the_flow_of_the_gate_out_of_sample() {
     for (case, runs, width) in [("RiMEA 4", 4, 0.10), ("gate", 20, 0.10 * GATE_FLOW_PER_S)] {
         let options = CheckOptions {
