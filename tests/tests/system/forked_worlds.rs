@@ -155,8 +155,13 @@ impl Parent {
 
 #[test]
 fn forks_without_a_change_at_any_tick_are_the_run() {
-    for (file, more) in [
-        ("auction", &["--seed", "3"][..]),
+    forks_are_the_run(&[("auction", &["--seed", "3"]), (WORLD, &[])]);
+}
+
+#[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
+fn forks_without_a_change_in_further_scenarios_are_the_run() {
+    forks_are_the_run(&[
         (
             "auction",
             &[
@@ -167,10 +172,13 @@ fn forks_without_a_change_at_any_tick_are_the_run() {
             ],
         ),
         ("swarm", &["--duration", "40 s"]),
-        (WORLD, &[]),
         (PEOPLE, &[]),
         (PEOPLE, &["--set", "guests.model=social-force"]),
-    ] {
+    ]);
+}
+
+fn forks_are_the_run(scenarios: &[(&str, &[&str])]) {
+    for (file, more) in scenarios {
         let parent = Parent::of(file, more);
         let Parent { ticks, .. } = parent;
         assert!(ticks > 20, "{ticks}");
