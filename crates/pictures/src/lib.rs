@@ -32,7 +32,7 @@ pub use labels::width_px;
 pub use number::{decimals_for, fixed};
 pub use page::{ChartPanel, Figure, Page, Text};
 pub use palette::{StateLook, state_look};
-pub use print::{LEAST_LETTERS_PT, PrintedFigure, PrintedPicture, WIDTHS_MM};
+pub use print::{MIN_LETTERS_PT, PrintedFigure, PrintedPicture, WIDTHS_MM};
 pub use scale::round_range;
 pub use style::style;
 pub use table::{Cell, Table};

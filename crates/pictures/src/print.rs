@@ -28,7 +28,7 @@ const DOUBLE_MM: f64 = 180.0;
 /// Most height of a printed figure: that of a page, millimeters. What is higher is several files.
 const MAX_HEIGHT_MM: f64 = 235.0;
 /// Least size of letters, points.
-pub const LEAST_LETTERS_PT: f64 = 7.0;
+pub const MIN_LETTERS_PT: f64 = 7.0;
 /// Widths that a figure can be given, millimeters.
 pub const WIDTHS_MM: std::ops::RangeInclusive<f64> = 86.0..=400.0;
 /// Space between panels, pixels.
@@ -68,7 +68,7 @@ impl Figure {
     pub fn print(&self, name: &str, width_mm: Option<f64>) -> Option<PrintedFigure> {
         let is_wide = self.panels.iter().any(|panel| panel.is_wide);
         let fits =
-            |width_px: f64, mm: f64| SMALL_PX / width_px * mm * POINTS_PER_MM >= LEAST_LETTERS_PT;
+            |width_px: f64, mm: f64| SMALL_PX / width_px * mm * POINTS_PER_MM >= MIN_LETTERS_PT;
         let (width_px, width_mm) = match width_mm {
             _ if self.panels.is_empty() => return None,
             Some(mm) if fits(WIDE_PX, mm) && (is_wide || self.panels.len() > 1) => (WIDE_PX, mm),

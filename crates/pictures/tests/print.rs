@@ -11,7 +11,7 @@ use miniz_oxide::inflate::decompress_to_vec_zlib;
 use pictures::diagram::{Diagram, DiagramOptions};
 use pictures::{
     Band, BandRow, Bands, Chart, ChartPanel, CourseLine, Curve, CurveStep, Figure, Floor,
-    IntervalRow, Intervals, LEAST_LETTERS_PT, Matrix, MatrixCell, MatrixLabel, PlottedEstimate,
+    IntervalRow, Intervals, MIN_LETTERS_PT, Matrix, MatrixCell, MatrixLabel, PlottedEstimate,
     PrintedFigure, Steps, TimeCourse, Trend, TrendLine, TrendPoint, width_px,
 };
 use protocol::{Event, RobotName};
@@ -204,7 +204,7 @@ fn every_figure_has_the_width_of_a_column_and_letters_that_can_be_read() {
                 .filter(|node| node.has_tag_name("text"))
             {
                 let px: f64 = node.attribute("font-size").unwrap().parse().unwrap();
-                assert!(px * points_per_px >= LEAST_LETTERS_PT, "{kind}: {px} px");
+                assert!(px * points_per_px >= MIN_LETTERS_PT, "{kind}: {px} px");
                 texts += 1;
             }
             assert!(texts > 2, "{kind}");

@@ -15,7 +15,7 @@ const KEPT_TICKS: Tick = 512;
 /// For how long before a tick the fates of commands are told: the page of the console shows them as long (`flights.js`).
 const TOLD_S: f64 = 2.0;
 /// Most ticks of it.
-const MOST_TOLD_TICKS: u64 = 4096;
+const MAX_TOLD_TICKS: u64 = 4096;
 
 /// The timelines of a recording: before tick 0, before tick 512 and so on, as far as was needed.
 #[derive(Debug)]
@@ -80,11 +80,11 @@ impl Timelines {
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    reason = "a float becomes the nearest tick, at most MOST_TOLD_TICKS"
+    reason = "a float becomes the nearest tick, at most MAX_TOLD_TICKS"
 )]
 fn told_ticks(tick_s: f64) -> Tick {
     let ticks = (TOLD_S / tick_s).ceil();
-    (ticks as Tick).min(MOST_TOLD_TICKS)
+    (ticks as Tick).min(MAX_TOLD_TICKS)
 }
 
 /// A command under way, as the tick in which it was sent shows it.

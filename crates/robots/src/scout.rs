@@ -17,9 +17,9 @@ const ATTRACTS_FROM: f64 = 0.6;
 /// Strength of that attraction at the end of the radio's range: twice the greatest repulsion \[I\].
 const ATTRACTION: f64 = 2.0;
 /// Force below which a robot stays where it is \[I\].
-const LEAST_FORCE: f64 = 0.05;
+const MIN_FORCE: f64 = 0.05;
 /// Distance below which two places count as one, meters \[I\].
-const LEAST_DISTANCE_M: f64 = 1e-6;
+const MIN_DISTANCE_M: f64 = 1e-6;
 
 /// The parameters of a scout, as in the scenario.
 #[derive(Debug, Clone, Copy, Deserialize)]
@@ -83,7 +83,7 @@ impl Robot for Scout {
             .force(here, &neighbors, cars.welcome().field_m);
 
         let strength = force.distance_m(Point::default()).min(1.0);
-        let action = if strength < LEAST_FORCE {
+        let action = if strength < MIN_FORCE {
             Action::stay(cars).behavior("REST")
         } else {
             let goal = Point::new(here.x + force.x, here.y + force.y);
@@ -142,7 +142,7 @@ impl ScoutParameters {
         let apart_m = 2.0 * self.covers;
         let attracts_from_m = ATTRACTS_FROM * self.radio;
         for (rank, neighbor) in neighbors.iter().enumerate() {
-            let distance_m = here.distance_m(*neighbor).max(LEAST_DISTANCE_M);
+            let distance_m = here.distance_m(*neighbor).max(MIN_DISTANCE_M);
             let x = (here.x - neighbor.x) / distance_m;
             let y = (here.y - neighbor.y) / distance_m;
             if distance_m < apart_m {

@@ -40,7 +40,7 @@ const OVERHEADS_BYTES: RangeInclusive<f64> = 1.0..=65_535.0;
 /// Most distances at which the shape of fading changes.
 const MAX_STEPS: usize = 16;
 /// A range at which a larger share of the messages is lost is worth a remark.
-const MOST_LOST: f64 = 0.999;
+const MAX_LOST: f64 = 0.999;
 
 #[derive(Debug, Default, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, expecting = "the keys of [network.radio]")]
@@ -267,7 +267,7 @@ impl RadioTable {
         let model = radio.model?;
         let nominal_m = model.nominal_range_m();
         if let (Some(range), Some(range_m)) = (&self.range, radio.range_m)
-            && outage::at_distance(&model, range_m) > MOST_LOST
+            && outage::at_distance(&model, range_m) > MAX_LOST
         {
             let text = format!(
                 "less than one message in 1000 is received from {range_m} m: the power reaches the sensitivity up to {nominal_m:.3} m"
@@ -278,7 +278,7 @@ impl RadioTable {
         let path_loss = self.path_loss.as_ref()?;
         // Robots do not come closer than this to each other.
         const CLOSE_M: f64 = 0.1;
-        if outage::at_distance(&model, CLOSE_M) > MOST_LOST {
+        if outage::at_distance(&model, CLOSE_M) > MAX_LOST {
             let text = "nothing is received, however close the robots are: the loss is above `transmit_dbm` less `sensitivity_dbm`";
             return Some(FileError::warning(source, Some(path_loss.span()), text));
         }
