@@ -241,6 +241,22 @@ impl Bus {
         Ok(Declared::new(declared))
     }
 
+    /// Whether another session subscribes to a key.
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed or the key is not legal.
+    pub fn is_subscribed_by_others(&self, key: &str) -> Result<bool, BusError> {
+        let declared = self
+            .session
+            .declare_publisher(key.to_owned())
+            .allowed_destination(Locality::Remote)
+            .wait();
+        let publisher = used("look for subscribers of", key, declared)?;
+        let status = publisher.matching_status().wait();
+
+        Ok(used("look for subscribers of", key, status)?.matching())
+    }
+
     /// Like [`Self::subscribe`], with the quality of service of each message.
     ///
     /// # Errors

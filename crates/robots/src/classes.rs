@@ -1,6 +1,6 @@
 //! The robots by the names of their classes.
 
-use std::process::ExitCode;
+use robot::Robot;
 
 use crate::bidder::Bidder;
 use crate::butler::Butler;
@@ -14,26 +14,39 @@ pub const AFFECTIVE: &[&str] = &["Butler", "Leguin", "Vonda"];
 
 /// A robot of this class; `None` if there is no such class.
 #[must_use]
-pub fn make(class: &str) -> Option<Box<dyn robot::Robot>> {
+pub fn make(class: &str) -> Option<Box<dyn Robot>> {
     match class {
-        "Butler" => Some(Box::new(Butler::default())),
+        "Butler" => Some(make_butler()),
         // Vonda is a clone of Leguin's code under another name [D].
-        "Leguin" | "Vonda" => Some(Box::new(Leguin::default())),
-        "Bidder" => Some(Box::new(Bidder::default())),
-        "Scout" => Some(Box::new(Scout::default())),
+        "Leguin" | "Vonda" => Some(make_leguin()),
+        "Bidder" => Some(make_bidder()),
+        "Scout" => Some(make_scout()),
         _ => None,
     }
 }
 
-/// The program of the robots of a class; their name is that of the class if the command line has none.
-///
-/// # Panics
-///
-/// If there is no such class.
+// A program that made its robot by itself would compile the robot's code once more.
+
+/// A robot as [`Butler`].
 #[must_use]
-pub fn main(class: &str) -> ExitCode {
-    // Here and not in each program, so that the code of a class is compiled once.
-    robot::main(class, |_| {
-        make(class).unwrap_or_else(|| unreachable!("{class} is a class of this crate"))
-    })
+pub fn make_butler() -> Box<dyn Robot> {
+    Box::new(Butler::default())
+}
+
+/// A robot as [`Leguin`].
+#[must_use]
+pub fn make_leguin() -> Box<dyn Robot> {
+    Box::new(Leguin::default())
+}
+
+/// A robot as [`Bidder`].
+#[must_use]
+pub fn make_bidder() -> Box<dyn Robot> {
+    Box::new(Bidder::default())
+}
+
+/// A robot as [`Scout`].
+#[must_use]
+pub fn make_scout() -> Box<dyn Robot> {
+    Box::new(Scout::default())
 }

@@ -40,7 +40,7 @@ mod units;
 
 pub use bidder::Bidder;
 pub use butler::Butler;
-pub use classes::{AFFECTIVE, CLASSES, main, make};
+pub use classes::{AFFECTIVE, CLASSES, make, make_bidder, make_butler, make_leguin, make_scout};
 pub use commands::{ACCEPT, GO_HOME, HELP, HURRY, OFFER, REFILL};
 pub use leguin::Leguin;
 pub use scout::Scout;

@@ -1,5 +1,5 @@
 //! A robot that shares tasks with others by auction.
 
 fn main() -> std::process::ExitCode {
-    robots::main("Bidder")
+    robot::main("Bidder", |_| robots::make_bidder())
 }

@@ -1,5 +1,5 @@
 //! Butler, the waiter.
 
 fn main() -> std::process::ExitCode {
-    robots::main("Butler")
+    robot::main("Butler", |_| robots::make_butler())
 }

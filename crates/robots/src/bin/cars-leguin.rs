@@ -1,5 +1,5 @@
 //! Leguin, the refiller.
 
 fn main() -> std::process::ExitCode {
-    robots::main("Leguin")
+    robot::main("Leguin", |_| robots::make_leguin())
 }

@@ -1,5 +1,5 @@
 //! A robot that covers a field with others.
 
 fn main() -> std::process::ExitCode {
-    robots::main("Scout")
+    robot::main("Scout", |_| robots::make_scout())
 }

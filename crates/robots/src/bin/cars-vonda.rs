@@ -1,5 +1,5 @@
 //! Vonda, a clone of Leguin under another name.
 
 fn main() -> std::process::ExitCode {
-    robots::main("Vonda")
+    robot::main("Vonda", |_| robots::make_leguin())
 }
