@@ -85,7 +85,7 @@ fn each_defect_fails_a_case_that_the_calibrated_model_passes() {
         assert!(failed.is_empty(), "{case}: {failed:#?}");
 
         for defect in defects {
-            let broken = check(&Broken(*defect, model.clone()), &options);
+            let broken = check(&Broken(*defect, model), &options);
             assert!(
                 broken.iter().any(|row| !row.is_passed),
                 "{defect:?}: {broken:#?}"
