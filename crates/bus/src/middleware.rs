@@ -12,7 +12,7 @@ use zenoh::handlers::FifoChannelHandler;
 use zenoh::key_expr::KeyExpr;
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::query::{ConsolidationMode, QueryTarget};
-use zenoh::sample::{Sample, SampleKind};
+use zenoh::sample::{Locality, Sample, SampleKind};
 use zenoh::{Config, Wait};
 
 use crate::declared::Declared;
@@ -219,6 +219,42 @@ impl Bus {
         handle: impl Fn(&str, &[u8]) + Send + Sync + 'static,
     ) -> Result<Declared, BusError> {
         self.subscribe_with_qos(keys, move |key, bytes, _| handle(key, bytes))
+    }
+
+    /// Like [`Self::subscribe`], without what this session puts itself.
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed or the key expression is not legal.
+    pub fn subscribe_to_others(
+        &self,
+        keys: &str,
+        handle: impl Fn(&str) + Send + Sync + 'static,
+    ) -> Result<Declared, BusError> {
+        let declared = self
+            .session
+            .declare_subscriber(keys)
+            .allowed_origin(Locality::Remote)
+            .callback(move |sample: Sample| handle(sample.key_expr().as_str()))
+            .wait();
+
+        let declared = used("subscribe to", keys, declared)?;
+        Ok(Declared::new(declared))
+    }
+
+    /// Whether another session subscribes to a key.
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed or the key is not legal.
+    pub fn is_subscribed_by_others(&self, key: &str) -> Result<bool, BusError> {
+        let declared = self
+            .session
+            .declare_publisher(key.to_owned())
+            .allowed_destination(Locality::Remote)
+            .wait();
+        let publisher = used("look for subscribers of", key, declared)?;
+        let status = publisher.matching_status().wait();
+
+        Ok(used("look for subscribers of", key, status)?.matching())
     }
 
     /// Like [`Self::subscribe`], with the quality of service of each message.

@@ -31,7 +31,7 @@ const fn rule(name: &'static str, section: &'static str) -> ProtocolRule {
 }
 
 /// The rules of robots that put and get over zenoh, in the order of the page.
-pub const RULES: [ProtocolRule; 41] = [
+pub const RULES: [ProtocolRule; 42] = [
     rule("join.request", "joining"),
     rule("join.ready-last", "joining"),
     rule("join.refused", "joining"),
@@ -73,6 +73,7 @@ pub const RULES: [ProtocolRule; 41] = [
     rule("number.finite", "numbers-and-chance"),
     rule("number.integers", "numbers-and-chance"),
     rule("wire.qos", "words-and-transport"),
+    rule("wire.keys", "keys"),
 ];
 
 /// Rule: lines have known fields only.

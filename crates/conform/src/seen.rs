@@ -62,6 +62,8 @@ pub(crate) struct Seen {
     pub(crate) replies: BTreeMap<usize, (usize, Option<Reply>)>,
     /// Messages that were put in a way that may lose or reorder them.
     pub(crate) wrong_qos: Vec<String>,
+    /// Keys of others on which it put something.
+    pub(crate) foreign: Vec<String>,
     /// What it put on `waiting`.
     pub(crate) waiting: Vec<Waiting>,
     /// How many messages, tokens and replies came: the place of the next one.

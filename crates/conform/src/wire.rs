@@ -42,6 +42,8 @@ pub(crate) enum WireEvent {
         robot: String,
         is_present: bool,
     },
+    /// Something was put on, or a token declared at, a key that is not the robot's.
+    Foreign(String),
     /// A query of the kit, by its number, has its reply.
     Reply(usize, Option<Reply>),
 }
@@ -103,9 +105,17 @@ impl Wire {
         })
     }
 
-    /// Keeps further declarations until the run is over.
-    pub(crate) fn keep(&mut self, declared: impl IntoIterator<Item = Declared>) {
-        self.declared.extend(declared);
+    /// Watches what a robot may not put: the states of these others, whom the kit plays.
+    pub(crate) fn guard<'n>(
+        &mut self,
+        others: impl IntoIterator<Item = &'n RobotName>,
+    ) -> Result<(), BusError> {
+        for other in others {
+            let key = self.keys.query(other, STATE);
+            let declared = watch(&self.bus, &key, &self.queue)?;
+            self.declared.push(declared);
+        }
+        Ok(())
     }
 
     /// The next that arrives.
@@ -175,6 +185,14 @@ impl Wire {
     }
 }
 
+/// Notices what is put on keys of others. What the kit puts there itself is of its own session.
+fn watch(bus: &Bus, keys: &str, queue: &SyncSender<WireEvent>) -> Result<Declared, BusError> {
+    let sender = queue.clone();
+    bus.subscribe_to_others(keys, move |key| {
+        let _over = sender.send(WireEvent::Foreign(key.to_owned()));
+    })
+}
+
 /// Subscribes to all that the robots of a run put, and receives their requests. A send fails only when the harness is over.
 fn listen(
     bus: &Bus,
@@ -226,6 +244,20 @@ fn listen(
         });
     })?;
 
-    commands.extend([reports, waiting, joins, tokens]);
+    let sender = queue.clone();
+    let viewers = bus.liveliness(&keys.alive_viewer(), move |key, _| {
+        let _over = sender.send(WireEvent::Foreign(key.to_owned()));
+    })?;
+    for foreign in [
+        keys.clock(),
+        keys.all_news(),
+        keys.world(),
+        keys.log(),
+        keys.faults(),
+    ] {
+        commands.push(watch(bus, &foreign, queue)?);
+    }
+
+    commands.extend([reports, waiting, joins, tokens, viewers]);
     Ok(commands)
 }

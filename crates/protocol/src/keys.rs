@@ -146,6 +146,12 @@ impl Keys {
         self.robot(robot.as_str(), "news")
     }
 
+    /// The news of all robots.
+    #[must_use]
+    pub fn all_news(&self) -> String {
+        self.robot("*", "news")
+    }
+
     /// A key about one robot, or about all of them where its name is `*`.
     pub(crate) fn robot(&self, robot: &str, what: &str) -> String {
         format!("{}/robot/{robot}/{what}", self.root)

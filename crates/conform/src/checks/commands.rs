@@ -17,10 +17,12 @@ use crate::transcript::Transcript;
 const LAST: Tick = 6;
 const TICKS: Tick = 12;
 /// More commands in the news of a tick than a robot that counts on few of them has room for.
-const MANY: usize = 42;
+const MANY: usize = 300;
 /// A long text, bytes. A robot may quote it in a line of its log, which has the same limit.
 const LONG_TEXT: usize = 2000;
 const SHORT_TEXT: usize = 90;
+/// All kinds of characters that JSON escapes, and such as have two, three and four bytes.
+const ESCAPED_TEXT: &str = " \"a\\b/\t\r\n{\"tick\":9}\u{1}äßﬁ猫🤖 ";
 
 /// Plays ticks in whose news these commands arrive, each from the sender of the kit's commands.
 fn commanded(kit: &Kit, commands: &[(&str, Tick)]) -> Result<Transcript, RuleFailure> {
@@ -278,7 +280,7 @@ pub(super) fn payload(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         json!(largest),
     ];
 
-    demand_long(kit)?;
+    demand_any(kit)?;
 
     for (payload, tick) in payloads.into_iter().zip([LAST - 1, LAST]) {
         let arrival = ArrivingCommand {
@@ -290,32 +292,36 @@ pub(super) fn payload(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     Ok(())
 }
 
-/// A long text is read, and counted like a short one where a variable counts commands that the robot does not know.
-fn demand_long(kit: &Kit) -> Result<(), RuleFailure> {
+/// A long text, and one with all that JSON escapes, is read, and counted like a short one where a variable counts commands that the
+/// robot does not know.
+fn demand_any(kit: &Kit) -> Result<(), RuleFailure> {
     let short = "x".repeat(SHORT_TEXT);
-    let long = "x".repeat(LONG_TEXT);
-    let came = numbers(&commanded(kit, &[(&long, LAST)])?);
+    let long = commanded(kit, &[(&"x".repeat(LONG_TEXT), LAST)])?;
+    let escaped = commanded(kit, &[(ESCAPED_TEXT, LAST)])?;
     if kit.is_deterministic.get() == Some(&false) {
         return Ok(());
     }
+    let any = [
+        (format!("a text of {LONG_TEXT} bytes"), numbers(&long)),
+        (format!("the text {ESCAPED_TEXT:?}"), numbers(&escaped)),
+    ];
 
     let none = numbers(&commanded(kit, &[])?);
     let once = numbers(&commanded(kit, &[(&short, LAST)])?);
     let apart = numbers(&commanded(kit, &[(&short, LAST - 1), (&short, LAST)])?);
     for (name, first) in &once {
-        let (Some(before), Some(second), Some(came)) =
-            (none.get(name), apart.get(name), came.get(name))
-        else {
+        let (Some(before), Some(second)) = (none.get(name), apart.get(name)) else {
             continue;
         };
         let is_counter = first != before && first - before == second - first;
-        if is_counter && came == before {
-            return Err(RuleFailure::new(
-                format!(
-                    "a text of {LONG_TEXT} bytes counts as one of {SHORT_TEXT}: {name} = {first}"
-                ),
-                format!("{name} = {came}"),
-            ));
+        for (text, came) in &any {
+            let came = came.get(name);
+            if is_counter && came == Some(before) {
+                return Err(RuleFailure::new(
+                    format!("{text} counts as one of {SHORT_TEXT} bytes: {name} = {first}"),
+                    format!("{name} = {before}"),
+                ));
+            }
         }
     }
     Ok(())

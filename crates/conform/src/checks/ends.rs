@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use nix::sys::signal::Signal;
-use protocol::messages::End;
+use protocol::messages::{Clock, End};
 
 use super::waiting;
 use crate::comparison::demand_same;
@@ -34,6 +34,16 @@ pub(super) fn clock(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         demand_end(&mut harness, end, "between two ticks")?;
     }
 
+    // The robot may have missed that another epoch began.
+    let mut harness = with_robot(kit, HarnessOptions::default())?;
+    play(&mut harness, &PlayScript::quiet(3), &mut Straight)?;
+    harness.put_clock(&Clock {
+        epoch: harness.epoch() + 1,
+        end: Some(End::Stopped),
+        ..Clock::default()
+    })?;
+    demand_ended(&mut harness, End::Stopped, "of a later epoch, at tick 0")?;
+
     // The end must also reach a robot that waits: nothing else would ever end its wait.
     let mut harness = waiting::for_news(kit)?;
     demand_end(&mut harness, End::Stopped, "while it waits for its news")?;
@@ -48,6 +58,10 @@ pub(super) fn clock(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
 
 fn demand_end(harness: &mut Harness<'_>, end: End, when: &str) -> Result<(), RuleFailure> {
     harness.put_end(end)?;
+    demand_ended(harness, end, when)
+}
+
+fn demand_ended(harness: &mut Harness<'_>, end: End, when: &str) -> Result<(), RuleFailure> {
     let expected = format!("its process ends after a clock with end {end:?} {when}");
     let status = harness.until_ended(&expected, PATIENCE)?;
     if status.code() != Some(0) {
@@ -70,10 +84,10 @@ pub(super) fn sigterm(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
 }
 
 /// The simulator's token goes: the robot waits for it, goes on if it comes back, and ends when its patience is over.
-pub(super) fn gone(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
+pub(super) fn gone(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
     gone_for_a_while(kit)?;
     in_each_attempt(|scale| back_in_time(kit, GONE_S * scale))?;
-    gone_forever(kit)
+    gone_forever(kit, findings)
 }
 
 /// A robot that lost its simulator, and is to wait so long for it.
@@ -136,8 +150,14 @@ fn back_in_time(kit: &Kit, gone_patience_s: u32) -> Result<(), RuleFailure> {
 }
 
 /// The simulator does not come back.
-fn gone_forever(kit: &Kit) -> Result<(), RuleFailure> {
+fn gone_forever(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
     let mut harness = without_simulator(kit, GONE_S)?;
+    // Tokens that are left now are the robot's: it has one.
+    let left = harness.tokens_of_others()?;
+    if let Some(key) = left.first() {
+        let expected = "the robot's own token, and none of the simulator or of another robot";
+        findings.fail("wire.keys", RuleFailure::new(expected, key));
+    }
     let expected = format!("its process ends when the simulator was gone for {GONE_S} s");
     let patience = PATIENCE + Duration::from_secs(GONE_S.into());
     let status = harness.until_ended(&expected, patience)?;

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use protocol::messages::{Clock, PublicState, TickUpdate};
+use protocol::messages::{Clock, Correction, PublicState, TickUpdate};
 use protocol::{Generation, Tick};
 
 use crate::comparison::demand_same;
@@ -74,19 +74,25 @@ pub(super) fn generation(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure>
         tick: LAST + 1,
         ..Clock::default()
     })?;
-    // Nor is it the turn of an incarnation whose predecessor is named.
-    harness.put_news(&TickUpdate {
-        epoch: 1,
-        tick: LAST + 1,
-        joined: Some(GENERATION - 1),
-        ..TickUpdate::default()
-    })?;
-    harness.put_clock(&Clock {
-        epoch: 1,
-        tick: LAST + 1,
-        news: harness.flag(),
-        ..Clock::default()
-    })?;
+    // Nor is it the turn of an incarnation that is placed and not named, or whose predecessor is named.
+    for joined in [None, Some(GENERATION - 1)] {
+        harness.put_news(&TickUpdate {
+            epoch: 1,
+            tick: LAST + 1,
+            joined,
+            correction: Some(Correction {
+                location: harness.template.location,
+                blocked: false,
+            }),
+            ..TickUpdate::default()
+        })?;
+        harness.put_clock(&Clock {
+            epoch: 1,
+            tick: LAST + 1,
+            news: harness.flag(),
+            ..Clock::default()
+        })?;
+    }
     harness.settle(QUIET);
     if let Some(answer) = harness.seen.answers.first() {
         let came = format!("a report for tick {}", answer.reading.report.tick);

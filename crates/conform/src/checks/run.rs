@@ -25,7 +25,7 @@ use crate::script::{Disturbance, PlayScript, step, with_robot};
 use crate::transcript::{PlayedTick, Transcript};
 
 /// The rules that the part in a run can find broken.
-pub(super) const RULES: [&str; 12] = [
+pub(super) const RULES: [&str; 13] = [
     "command.sent",
     "news.wait",
     "query.reply",
@@ -37,6 +37,7 @@ pub(super) const RULES: [&str; 12] = [
     "determinism.seed",
     "number.angles",
     "wire.qos",
+    "wire.keys",
     "tick.answer",
 ];
 
@@ -92,8 +93,9 @@ impl TickDisturbance {
             1 => Self::Unhelpful(Unhelpful::Refusal),
             2 => Self::Joined,
             3 => Self::Unhelpful(Unhelpful::EarlierState),
-            4 => Self::AllFlags,
-            5 => Self::LateAnswers,
+            // In tick 18, in which all others can be queried; in tick 40, an even one of the others, none can.
+            4 => Self::LateAnswers,
+            5 => Self::AllFlags,
             _ => Self::Unhelpful(Unhelpful::Silence),
         }
     }
@@ -207,9 +209,12 @@ impl Disturbance for RunPlay {
                 harness.until("a report or a query", PATIENCE, |harness| {
                     (harness.fake_peers.has_held() || !harness.is_open()).then_some(())
                 })?;
+                // The simulator is gone meanwhile: nothing else tells a robot that it may stop asking.
+                harness.show_simulator(false)?;
                 if harness.is_open() {
                     harness.pass(LATE);
                 }
+                harness.show_simulator(true)?;
                 harness.fake_peers.release();
                 Ok(())
             }
@@ -248,6 +253,7 @@ fn played(kit: &Kit, is_disturbed: bool) -> Result<(Transcript, Findings), Broke
         ..HarnessOptions::default()
     };
     let mut harness = with_robot(kit, options).map_err(|failure| ("tick.answer", failure))?;
+    harness.asks_early = is_disturbed;
     let mut play = RunPlay { is_disturbed };
     let script = script(kit);
 

@@ -19,7 +19,7 @@ use crate::transcript::{PlayedTick, Transcript};
 use crate::wire::Joining;
 
 /// The rules that the usual ticks show.
-pub(super) const USUAL: [&str; 8] = [
+pub(super) const USUAL: [&str; 9] = [
     "tick.answer",
     "tick.velocity",
     "join.request",
@@ -28,6 +28,7 @@ pub(super) const USUAL: [&str; 8] = [
     "number.finite",
     "number.integers",
     "wire.qos",
+    "wire.keys",
 ];
 
 /// What a robot put beside its reports has arrived after this time.

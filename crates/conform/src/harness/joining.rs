@@ -1,5 +1,7 @@
 //! How robots come to take part: the one that is checked, and those that the kit plays.
 
+use std::collections::BTreeSet;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use lockstep::{Admission, Refused, Stamp};
@@ -17,6 +19,8 @@ use crate::wire::Joining;
 const OWN_INSTANCE: &str = "conformance kit";
 /// How often news that ask a robot to join again are put, as the clock of a run would.
 const REPEAT: Duration = Duration::from_secs(2);
+/// Tokens that are declared are known within this time.
+const ARRIVED: Duration = Duration::from_millis(200);
 /// How often it is looked whether a process is stopped.
 const SOON: Duration = Duration::from_millis(5);
 
@@ -31,7 +35,8 @@ impl Harness<'_> {
             self.options.has_extras,
             self.options.writes_integers,
         );
-        self.wire.keep(self.fake_peers.serve(&kit.bus, &self.keys)?);
+        self.played = self.fake_peers.serve(&kit.bus, &self.keys)?;
+        self.wire.guard(self.fake_peers.names())?;
         if self.options.is_followed {
             self.wire.follow(&subject)?;
         }
@@ -152,6 +157,11 @@ impl Harness<'_> {
         welcome.generation = admission.generation;
         welcome.news_flag = admission.news_flag;
         welcome.tick = self.next.saturating_sub(1);
+        // Real time decides when a process asks, and where the body stands then.
+        if self.asks_early && admission.generation > 1 {
+            welcome.tick = welcome.tick.saturating_sub(1);
+            welcome.location.x += 0.0625;
+        }
         self.answer_join(joining, &JoinAnswer::Welcome(Box::new(welcome)));
     }
 
@@ -227,6 +237,32 @@ impl Harness<'_> {
     /// The generation of the process that was admitted last.
     pub(crate) fn generation(&self) -> Generation {
         self.barrier.presence(&self.kit.subject()).0
+    }
+
+    /// The other robots are gone, and so are their queryables and tokens. Returns tokens that are declared all the same, but for
+    /// that of the robot.
+    pub(crate) fn tokens_of_others(&mut self) -> Result<BTreeSet<String>, RuleFailure> {
+        self.played.clear();
+        let tokens = Arc::new(Mutex::new(BTreeSet::new()));
+        let known = Arc::clone(&tokens);
+        let watched = self
+            .kit
+            .bus
+            .liveliness(&self.keys.alive(), move |key, is_present| {
+                let mut known = known.lock().unwrap_or_else(PoisonError::into_inner);
+                if is_present {
+                    known.insert(key.to_owned());
+                } else {
+                    known.remove(key);
+                }
+            })?;
+        self.pass(ARRIVED);
+        drop(watched);
+
+        let mut tokens =
+            std::mem::take(&mut *tokens.lock().unwrap_or_else(PoisonError::into_inner));
+        tokens.remove(&self.keys.alive_robot(&self.kit.subject()));
+        Ok(tokens)
     }
 
     /// Waits until the robot, whose news ask it to, has joined again.

@@ -9,6 +9,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::process::ExitStatus;
 use std::time::{Duration, Instant};
 
+use bus::Declared;
 use lockstep::{
     Barrier, BarrierOutput, IncarnationNotice, LatePolicy, Sent as Put, Stamp, TickOutcome, Timer,
     Timing,
@@ -101,7 +102,11 @@ pub(crate) struct Harness<'k> {
     pub(crate) withholds_news: bool,
     /// Clocks have the flags of all other robots, too.
     pub(crate) flags_all: bool,
+    /// Further incarnations are welcomed as if they had asked a tick earlier, when the body stood elsewhere.
+    pub(crate) asks_early: bool,
     wire: Wire,
+    /// Queryables and tokens of the robots that the kit plays.
+    played: Vec<Declared>,
     barrier: Barrier<usize, ReportedCommand>,
     timers: BTreeMap<Timer, Instant>,
     epoch: Epoch,
@@ -171,7 +176,9 @@ impl<'k> Harness<'k> {
             is_cut_off: false,
             withholds_news: false,
             flags_all: false,
+            asks_early: false,
             wire,
+            played: Vec::new(),
             barrier: barrier([]),
             timers: BTreeMap::new(),
             epoch: 1,
@@ -248,6 +255,7 @@ impl<'k> Harness<'k> {
                 self.on_waiting(&key, &bytes);
             }
             WireEvent::Token { robot, is_present } => self.on_token(&robot, is_present),
+            WireEvent::Foreign(key) => self.seen.foreign.push(key),
             WireEvent::Reply(number, reply) => {
                 self.seen.replies.insert(number, (order, reply));
             }
@@ -264,6 +272,11 @@ impl<'k> Harness<'k> {
     }
 
     fn on_report(&mut self, key: &str, bytes: Vec<u8>, at: Instant, order: usize) {
+        let robot = Keys::robot_of(key);
+        let is_of_other = |name: &RobotName| robot == Some(name.as_str());
+        if self.fake_peers.names().any(is_of_other) {
+            return self.seen.foreign.push(key.to_owned());
+        }
         let Some(index) = self.seen.file_report(key, bytes, at, order) else {
             return;
         };

@@ -31,8 +31,8 @@ impl Harness<'_> {
         self.wire.begin_query(&self.kit.control_key(), "")
     }
 
-    /// Whether there is a subscriber to what is put on a key.
+    /// Whether the robot subscribes to a key; what the kit subscribes to itself does not count.
     pub(crate) fn has_subscriber(&self, key: &str) -> Result<bool, RuleFailure> {
-        Ok(self.kit.bus.watched_publisher(key)?.has_subscribers())
+        Ok(self.kit.bus.is_subscribed_by_others(key)?)
     }
 }

@@ -22,7 +22,8 @@ impl Host {
             .map_or(0, |welcome| welcome.generation);
         let flag = self.welcome.as_ref().map_or(0, |welcome| welcome.news_flag);
         let is_later = clock.epoch > own && own > 0;
-        if self.ignores(clock.end) {
+        let is_of_other_epoch = clock.epoch != own && self.wrong.is("end.clock:epoch");
+        if self.ignores(clock.end) || clock.end.is_some() && is_of_other_epoch {
             return Ok(());
         }
         let is_waiting = self.shared.is_in(Phase::AwaitingNews);
@@ -129,6 +130,8 @@ impl Host {
         let is_other = news.joined.is_some_and(|joined| joined != generation);
         let takes_it = is_lower && self.wrong.is("return.generation:lower")
             || is_other && self.wrong.is("return.generation:any");
+        let takes_it =
+            takes_it || news.correction.is_some() && self.wrong.is("return.generation:placed");
         if takes_it && !self.has_begun && generation > 1 {
             news.joined = Some(generation);
         }

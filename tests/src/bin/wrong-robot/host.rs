@@ -346,6 +346,8 @@ impl Host {
                 if !is_present && self.wrong.is("end.gone:hasty") {
                     self.leave.get_or_insert(Leave::SimulatorGone);
                 }
+                let is_asking = self.shared.is_in(Phase::Asking);
+                self.has_given_up |= !is_present && is_asking && self.wrong.is("query.again:gone");
                 self.on_simulator(is_present);
                 self.drive(|machine, out| machine.simulator(is_present, out))
             }

@@ -23,6 +23,8 @@ const LATE_TICK: Tick = 36;
 /// What a robot counts on that has little room: commands, and bytes of a text.
 const TEN: usize = 10;
 const SHORT_TEXT: usize = 100;
+/// The same for a robot that has more.
+const HUNDRED: usize = 100;
 
 /// The results of a tick.
 pub(crate) type Outcome = (Vec<Sent<CommandText>>, PublicState, Report);
@@ -98,6 +100,12 @@ impl Host {
         }
         if wrong.is("command.twice:ten") {
             deliveries.truncate(TEN);
+        }
+        if wrong.is("command.twice:hundred") {
+            deliveries.truncate(HUNDRED);
+        }
+        if wrong.is("command.payload:ascii") {
+            deliveries.retain(|delivery| delivery.command.is_ascii());
         }
         if wrong.is("command.payload:long") {
             deliveries.retain(|delivery| delivery.command.len() <= SHORT_TEXT);

@@ -24,6 +24,11 @@ impl Walker {
         } else {
             welcome.seed
         };
+        let seed = if wrong.is("return.rejoin:asked") && welcome.generation > 1 {
+            seed ^ welcome.tick
+        } else {
+            seed
+        };
         let name = if wrong.is("determinism.seed:stream") {
             welcome.name.as_str()
         } else {
