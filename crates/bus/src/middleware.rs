@@ -24,7 +24,7 @@ use crate::reason::reason;
 use crate::reply::{Pending, QUERY_TIMEOUT, Reply};
 use crate::role::Role;
 use crate::runtime::{block, check_threads};
-use crate::settings::{CLIENT_MODE, MiddlewareSetting, ROUTER_MODE, SETTINGS};
+use crate::settings::{CLIENT_MODE, MiddlewareSetting, PATIENT_SETTINGS, ROUTER_MODE, SETTINGS};
 
 /// What else may be the matter with an encrypted endpoint.
 const TLS_HINT: &str = " (are both certificates of the same `cars secure init`, valid, and the simulator's for this host?)";
@@ -64,6 +64,23 @@ impl Bus {
     /// # Errors
     /// [`BusError::Open`] names the address that was tried and what went wrong; other errors were found before it was tried.
     pub fn open(role: &Role, overrides: Option<&PathBuf>) -> Result<Self, BusError> {
+        Self::open_with(role, overrides, &[])
+    }
+
+    /// Opens a session with the built-in settings between processes of one machine, none of whose links is ever cut: however
+    /// loaded the machine is, none breaks because a process is slow.
+    ///
+    /// # Errors
+    /// The same as those of [`Self::open`].
+    pub fn open_patient(role: &Role) -> Result<Self, BusError> {
+        Self::open_with(role, None, &PATIENT_SETTINGS)
+    }
+
+    fn open_with(
+        role: &Role,
+        overrides: Option<&PathBuf>,
+        further: &[MiddlewareSetting],
+    ) -> Result<Self, BusError> {
         for endpoint in role.endpoints() {
             endpoint::check(endpoint).map_err(BusError::BadEndpoint)?;
         }
@@ -108,7 +125,7 @@ impl Bus {
         };
         // What can be refused is refused before there is a session. Threads are checked, too, because the
         // middleware panics where it cannot start one.
-        let config = configuration(role, overrides).map_err(&failed)?;
+        let config = configuration(role, overrides, further).map_err(&failed)?;
         check_threads().map_err(BusError::NoThreads)?;
         // The middleware tries again without a word when certificates do not fit.
         let hint = if is_tls(&endpoint) { TLS_HINT } else { "" };
@@ -618,7 +635,11 @@ impl Query {
 const HANDSHAKE_TIMEOUT: &str = "tls_handshake_timeout_ms=2000";
 
 /// The built-in settings, or those of a file, and what the role says, which is never the file's affair.
-fn configuration(role: &Role, overrides: Option<&PathBuf>) -> Result<Config, String> {
+fn configuration(
+    role: &Role,
+    overrides: Option<&PathBuf>,
+    further: &[MiddlewareSetting],
+) -> Result<Config, String> {
     let mut config = match overrides {
         Some(file) => from_file(file)?,
         None => Config::default(),
@@ -656,7 +677,8 @@ fn configuration(role: &Role, overrides: Option<&PathBuf>) -> Result<Config, Str
         }
     };
     let common = SETTINGS.iter().filter(|_| overrides.is_none());
-    for MiddlewareSetting { key, value, .. } in [&mode].into_iter().chain(common) {
+    let all = [&mode].into_iter().chain(common).chain(further);
+    for MiddlewareSetting { key, value, .. } in all {
         set(key, value)?;
     }
 
@@ -939,7 +961,7 @@ mod tests {
                 connect: connect.to_owned(),
                 patience: QUERY_TIMEOUT,
             };
-            let config = configuration(&role, None).unwrap();
+            let config = configuration(&role, None, &[]).unwrap();
             assert_eq!(
                 config.get_json("connect/endpoints").unwrap(),
                 format!("[{endpoint:?}]")
@@ -1047,8 +1069,8 @@ mod tests {
                 },
             ),
         ] {
-            let built_in = configuration(&role, None).unwrap();
-            let from_file = configuration(&role, Some(&folder.join(file))).unwrap();
+            let built_in = configuration(&role, None, &[]).unwrap();
+            let from_file = configuration(&role, Some(&folder.join(file)), &[]).unwrap();
             for MiddlewareSetting { key, .. } in SETTINGS.iter().chain(&[ROUTER_MODE]) {
                 assert_eq!(
                     from_file.get_json(key).ok(),

@@ -98,3 +98,27 @@ pub(crate) const SETTINGS: [MiddlewareSetting; 13] = [
         "So a link that is whole again is found within about a second: the rest of an attempt and the longest wait.",
     ),
 ];
+
+/// Settings in addition, where no link is ever cut, and processes may be slow.
+pub(crate) const PATIENT_SETTINGS: [MiddlewareSetting; 4] = [
+    setting(
+        "transport/link/tx/lease",
+        "60000",
+        "Whoever is stopped or has no processor is still there.",
+    ),
+    setting(
+        "transport/link/tx/queue/congestion_control/block/wait_before_close",
+        "20000000",
+        "So is a receiver that does not read.",
+    ),
+    setting(
+        "transport/unicast/accept_timeout",
+        "60000",
+        "And one that is slow to connect.",
+    ),
+    setting(
+        "transport/unicast/open_timeout",
+        "60000",
+        "The same for the side that connects.",
+    ),
+];

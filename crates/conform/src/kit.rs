@@ -274,7 +274,7 @@ fn open_router() -> Result<(Bus, String), CannotRun> {
             trusts_network: false,
         };
 
-        match Bus::open(&role, None) {
+        match Bus::open_patient(&role) {
             Ok(bus) => return Ok((bus, endpoint)),
             Err(error) if attempt == ATTEMPTS => return Err(error.into()),
             Err(_) => attempt += 1,
@@ -292,7 +292,7 @@ fn declare_control(endpoint: &str) -> Result<Declared, BusError> {
         connect: endpoint.to_owned(),
         patience: OWN_PATIENCE,
     };
-    let bus = Bus::open(&role, None)?;
+    let bus = Bus::open_patient(&role)?;
 
     bus.clone().queryable(&control_key(), move |query| {
         query.reply(query.key(), b"{}".to_vec());

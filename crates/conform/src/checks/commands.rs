@@ -16,8 +16,11 @@ use crate::transcript::Transcript;
 /// The tick in whose news the last commands of these checks arrive, and the last tick.
 const LAST: Tick = 6;
 const TICKS: Tick = 12;
-/// More commands in the news of a tick than a robot that counts on few of them has room for.
+/// More commands in the news of a tick than a robot that counts on few of them has room for, and so few that each has.
 const MANY: usize = 300;
+const FEW: usize = 7;
+/// The last tick where as many come in few in each tick.
+const LAST_OF_MANY: Tick = (MANY / FEW) as Tick + 1;
 /// A long text, bytes. A robot may quote it in a line of its log, which has the same limit.
 const LONG_TEXT: usize = 2000;
 const SHORT_TEXT: usize = 90;
@@ -34,11 +37,21 @@ fn commanded_by(
     kit: &Kit,
     commands: &[(&str, Tick)],
 ) -> Result<Transcript, RuleFailure> {
-    let arrivals = commands
-        .iter()
-        .map(|(text, tick)| ArrivingCommand::new(from, text, *tick))
-        .collect();
-    played(kit, &PlayScript::with(TICKS, arrivals))
+    played(
+        kit,
+        &PlayScript::with(TICKS, arrivals(from, commands.iter().copied())),
+    )
+}
+
+fn arrivals<'t>(
+    from: &RobotName,
+    commands: impl IntoIterator<Item = (&'t str, Tick)>,
+) -> Vec<ArrivingCommand> {
+    let mut arrivals = Vec::new();
+    for (text, tick) in commands {
+        arrivals.push(ArrivingCommand::new(from, text, tick));
+    }
+    arrivals
 }
 
 /// For and against something that is seen in several places of a report.
@@ -161,18 +174,49 @@ fn shown(kit: &Kit) -> String {
         .join(", ")
 }
 
+/// The same command not at all, once, often in several ticks, and as often in the news of one.
+struct ManyPlays {
+    text: String,
+    none: Transcript,
+    once: Transcript,
+    apart: Transcript,
+    together: Transcript,
+}
+
+impl ManyPlays {
+    fn play(kit: &Kit, text: &str) -> Result<Self, RuleFailure> {
+        let sender = kit.sender();
+        let played = |commands: &mut dyn Iterator<Item = Tick>| {
+            let arrivals = arrivals(&sender, commands.map(|tick| (text, tick)));
+            played(kit, &PlayScript::with(LAST_OF_MANY, arrivals))
+        };
+        Ok(Self {
+            text: text.to_owned(),
+            none: played(&mut std::iter::empty())?,
+            once: played(&mut std::iter::once(LAST))?,
+            apart: played(&mut (0..MANY).map(|at| 1 + (at / FEW) as Tick))?,
+            together: played(&mut std::iter::repeat_n(LAST, MANY))?,
+        })
+    }
+}
+
 /// Commands are executed as often as the news list them, and then each is answered by a robot that answers each.
 pub(super) fn many(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
-    twice(kit, findings)?;
-    let answered = many_sent(kit, findings);
+    let mut plays = None;
+    let counted = twice(kit, &mut plays, findings);
+    let answered = many_sent(kit, &mut plays, findings);
     if let Err(failure) = answered {
         findings.fail("command.sent", failure);
     }
-    Ok(())
+    counted
 }
 
 /// A command that is listed twice is executed twice.
-fn twice(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
+fn twice(
+    kit: &Kit,
+    plays: &mut Option<ManyPlays>,
+    findings: &mut Findings,
+) -> Result<(), RuleFailure> {
     if kit.is_deterministic.get() == Some(&false) {
         findings.skip(
             "command.twice",
@@ -213,7 +257,7 @@ fn twice(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
             ));
         }
         if votes.right > 0 {
-            return demand_many(kit, &text, &none, &once);
+            return demand_many(plays.insert(ManyPlays::play(kit, &text)?));
         }
     }
 
@@ -226,15 +270,11 @@ fn twice(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
 }
 
 /// As many executions as the news list, also where that is more than a few. A counter that stops early is not one of commands.
-fn demand_many(
-    kit: &Kit,
-    text: &str,
-    none: &BTreeMap<String, f64>,
-    once: &BTreeMap<String, f64>,
-) -> Result<(), RuleFailure> {
-    let apart = numbers(&commanded(kit, &over_ticks(text))?);
-    let together = numbers(&commanded(kit, &[(text, LAST); MANY])?);
-    for (name, first) in once {
+fn demand_many(plays: &ManyPlays) -> Result<(), RuleFailure> {
+    let none = numbers(&plays.none);
+    let apart = numbers(&plays.apart);
+    let together = numbers(&plays.together);
+    for (name, first) in &numbers(&plays.once) {
         let (Some(before), Some(wanted), Some(came)) =
             (none.get(name), apart.get(name), together.get(name))
         else {
@@ -328,20 +368,30 @@ fn demand_any(kit: &Kit) -> Result<(), RuleFailure> {
 }
 
 /// A robot that answers each of many commands also answers each of them where they are in the news of one tick.
-fn many_sent(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
-    let none = sent(kit, &[])?;
+fn many_sent(
+    kit: &Kit,
+    plays: &mut Option<ManyPlays>,
+    findings: &mut Findings,
+) -> Result<(), RuleFailure> {
+    let none = sent(&commanded(kit, &[])?);
     for [text, _] in kit.pairs() {
-        let once = sent(kit, &[(&text, LAST)])?;
+        let once = sent(&commanded(kit, &[(&text, LAST)])?);
         if once <= none {
             continue;
         }
 
-        let apart = sent(kit, &over_ticks(&text))?;
-        // Only one that has an answer to each in a few ticks shows that it answers them all.
-        if apart != none + MANY * (once - none) {
+        let plays = match plays.take_if(|plays| plays.text == text) {
+            Some(plays) => plays,
+            None => ManyPlays::play(kit, &text)?,
+        };
+        let none = sent(&plays.none);
+        let apart = sent(&plays.apart);
+        let together = sent(&plays.together);
+        // Only one that has an answer to each in several ticks shows that it answers them all.
+        let answers = sent(&plays.once).saturating_sub(none);
+        if answers == 0 || apart != none + MANY * answers {
             continue;
         }
-        let together = sent(kit, &[(text.as_str(), LAST); MANY])?;
         if together < apart {
             return Err(RuleFailure::new(
                 format!(
@@ -357,15 +407,9 @@ fn many_sent(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
     Ok(())
 }
 
-/// How many commands the robot sends while these arrive.
-fn sent(kit: &Kit, commands: &[(&str, Tick)]) -> Result<usize, RuleFailure> {
-    let played = commanded(kit, commands)?;
-    Ok(played.iter().map(|entry| entry.commands.len()).sum())
-}
-
-/// As many commands, in all ticks up to the last one.
-fn over_ticks(text: &str) -> Vec<(&str, Tick)> {
-    (0..MANY as Tick).map(|at| (text, 1 + at % LAST)).collect()
+/// How many commands the robot sent.
+fn sent(transcript: &Transcript) -> usize {
+    transcript.iter().map(|entry| entry.commands.len()).sum()
 }
 
 /// A command from the operator, who is not a robot of the roster, is executed like any other, and not answered.

@@ -37,12 +37,12 @@ pub(super) fn clock(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     // The robot may have missed that another epoch began.
     let mut harness = with_robot(kit, HarnessOptions::default())?;
     play(&mut harness, &PlayScript::quiet(3), &mut Straight)?;
-    harness.put_clock(&Clock {
+    let later = Clock {
         epoch: harness.epoch() + 1,
         end: Some(End::Stopped),
         ..Clock::default()
-    })?;
-    demand_ended(&mut harness, End::Stopped, "of a later epoch, at tick 0")?;
+    };
+    demand_ended(&mut harness, &later, "of a later epoch, at tick 0")?;
 
     // The end must also reach a robot that waits: nothing else would ever end its wait.
     let mut harness = waiting::for_news(kit)?;
@@ -57,13 +57,20 @@ pub(super) fn clock(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
 }
 
 fn demand_end(harness: &mut Harness<'_>, end: End, when: &str) -> Result<(), RuleFailure> {
-    harness.put_end(end)?;
-    demand_ended(harness, end, when)
+    let clock = harness.end(end);
+    demand_ended(harness, &clock, when)
 }
 
-fn demand_ended(harness: &mut Harness<'_>, end: End, when: &str) -> Result<(), RuleFailure> {
+/// It ends after this clock.
+fn demand_ended(harness: &mut Harness<'_>, clock: &Clock, when: &str) -> Result<(), RuleFailure> {
+    let end = clock.end.unwrap_or(End::Stopped);
     let expected = format!("its process ends after a clock with end {end:?} {when}");
-    let status = harness.until_ended(&expected, PATIENCE)?;
+    let status = harness.until_put(
+        &expected,
+        PATIENCE,
+        |harness| harness.put_clock(clock),
+        |harness| harness.process.ended(),
+    )?;
     if status.code() != Some(0) {
         return Err(RuleFailure::new(
             format!("exit status 0 after a clock with end {end:?} {when}"),

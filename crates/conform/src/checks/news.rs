@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use protocol::Tick;
-use protocol::messages::{Clock, Correction, Point, TickUpdate};
+use protocol::messages::{Correction, Point, TickUpdate};
 
 use crate::comparison::demand_same;
 use crate::findings::Findings;
@@ -48,7 +48,7 @@ pub(super) fn wait(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
                     "a report",
                 ));
             }
-            harness.put_news(&news)
+            harness.release_news()
         }
     }
     let mut harness = with_robot(kit, HarnessOptions::default())?;
@@ -68,20 +68,14 @@ pub(super) fn wait(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
 fn all_flags(kit: &Kit) -> Result<(), RuleFailure> {
     let mut harness = with_robot(kit, HarnessOptions::default())?;
     play(&mut harness, &PlayScript::quiet(2), &mut Straight)?;
-    // The barrier's own clock, which has one flag, does not reach the robot.
-    harness.is_cut_off = true;
+    harness.more_flags = u32::MAX;
+    harness.withholds_news = true;
     harness.open(&TickUpdate {
         correction: Some(Correction {
             location: harness.body.stands,
             blocked: false,
         }),
         ..TickUpdate::default()
-    })?;
-    harness.put_clock(&Clock {
-        epoch: 1,
-        tick: 3,
-        news: u32::MAX,
-        ..Clock::default()
     })?;
     harness.settle(QUIET);
     if harness.has_answered(3) {
@@ -90,7 +84,7 @@ fn all_flags(kit: &Kit) -> Result<(), RuleFailure> {
             "a report",
         ));
     }
-    harness.put_news(&harness.open_news())?;
+    harness.release_news()?;
     harness.complete().map(drop)
 }
 
@@ -122,16 +116,8 @@ fn others_flags(kit: &Kit) -> Result<(), RuleFailure> {
         return Ok(());
     }
 
-    // The barrier's own clock, which has no flag, does not reach the robot.
-    harness.is_cut_off = true;
+    harness.more_flags = !harness.flag();
     harness.open(&TickUpdate::default())?;
-    harness.put_clock(&Clock {
-        epoch: 1,
-        tick: 3,
-        news: !harness.flag(),
-        ..Clock::default()
-    })?;
-
     harness.complete().map(drop).map_err(|failure| {
         RuleFailure::new(
             "a report for a clock that has the flags of other robots only, without any news",

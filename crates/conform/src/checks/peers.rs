@@ -41,33 +41,39 @@ pub(super) fn newest(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     let newest = held + 2;
     // The others are in that tick, too.
     harness.fake_peers.begin(1, newest);
-    let flag = harness.flag();
-    for tick in [held + 1, newest] {
-        harness.put_clock(&Clock {
-            epoch: 1,
-            tick,
-            news: flag,
-            ..Clock::default()
-        })?;
-    }
-    // News of the ticks before come last, and late.
-    for tick in [newest, held + 1, held] {
-        harness.put_news(&TickUpdate {
-            epoch: 1,
-            tick,
-            correction: Some(Correction {
-                location: harness.body.stands,
-                blocked: false,
-            }),
-            ..TickUpdate::default()
-        })?;
-    }
-
+    let clock = Clock {
+        epoch: 1,
+        news: harness.flag(),
+        ..Clock::default()
+    };
+    let news = TickUpdate {
+        epoch: 1,
+        correction: Some(Correction {
+            location: harness.body.stands,
+            blocked: false,
+        }),
+        ..TickUpdate::default()
+    };
     let expected =
         format!("a report for tick {newest}, the newest of three clocks, when its news are here");
-    harness.until(&expected, PATIENCE, |harness| {
-        harness.has_answered(newest).then_some(())
-    })?;
+    harness.until_put(
+        &expected,
+        PATIENCE,
+        |harness| {
+            for tick in [held + 1, newest] {
+                harness.put_clock(&Clock { tick, ..clock })?;
+            }
+            // News of the ticks before come last, and late.
+            for tick in [newest, held + 1, held] {
+                harness.put_news(&TickUpdate {
+                    tick,
+                    ..news.clone()
+                })?;
+            }
+            Ok(())
+        },
+        |harness| harness.has_answered(newest).then_some(()),
+    )?;
     harness.settle(ARRIVED);
     for tick in [held, held + 1] {
         if harness.has_answered(tick) {
@@ -111,7 +117,7 @@ pub(super) fn reply(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailur
             }
             harness.put_early_states()?;
             harness.pass(ARRIVED);
-            harness.put_news(&harness.open_news())
+            harness.release_news()
         }
     }
 

@@ -167,7 +167,11 @@ impl Disturbance for RunPlay {
             kind,
             TickDisturbance::EarlyStates | TickDisturbance::AllFlags
         );
-        harness.flags_all = kind == TickDisturbance::AllFlags;
+        harness.more_flags = if kind == TickDisturbance::AllFlags {
+            u32::MAX
+        } else {
+            0
+        };
         // Where states are put, a robot that follows the others need not query them.
         harness.set_puts_states(!matches!(
             kind,
@@ -191,7 +195,7 @@ impl Disturbance for RunPlay {
             TickDisturbance::EarlyStates => {
                 harness.put_early_states()?;
                 harness.pass(ARRIVED);
-                harness.put_news(&harness.open_news())
+                harness.release_news()
             }
             TickDisturbance::AllFlags => {
                 harness.settle(ARRIVED);
@@ -203,7 +207,7 @@ impl Disturbance for RunPlay {
                         "a report",
                     ));
                 }
-                harness.put_news(&harness.open_news())
+                harness.release_news()
             }
             TickDisturbance::LateAnswers => {
                 harness.until("a report or a query", PATIENCE, |harness| {

@@ -51,8 +51,13 @@ fn ends_in_order(kit: &Kit, end: End, script: &PlayScript) -> Result<(), RuleFai
     let mut harness = with_robot(kit, HarnessOptions::default())?;
     play(&mut harness, script, &mut Straight)?;
 
-    harness.put_end(end)?;
+    let clock = harness.end(end);
     let expected = format!("`cars exec` ends after a clock with end {end:?}");
-    harness.until_ended(&expected, PATIENCE)?;
+    harness.until_put(
+        &expected,
+        PATIENCE,
+        |harness| harness.put_clock(&clock),
+        |harness| harness.process.ended(),
+    )?;
     fault_in(&harness.process.output(), STDIO_END).map_or(Ok(()), Err)
 }

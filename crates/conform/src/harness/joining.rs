@@ -17,8 +17,6 @@ use crate::wire::Joining;
 
 /// The instance of robots that the kit plays.
 const OWN_INSTANCE: &str = "conformance kit";
-/// How often news that ask a robot to join again are put, as the clock of a run would.
-const REPEAT: Duration = Duration::from_secs(2);
 /// Tokens that are declared are known within this time.
 const ARRIVED: Duration = Duration::from_millis(200);
 /// How often it is looked whether a process is stopped.
@@ -271,18 +269,11 @@ impl Harness<'_> {
             rejoin: Some(before),
             ..self.open_news()
         };
-        let mut put = Instant::now();
-        self.until(
+        self.until_put(
             "another request to join when its news have its generation as `rejoin`",
             PATIENCE,
-            |harness| {
-                // A link that broke meanwhile has lost them: they say the same in each tick.
-                if put.elapsed() > REPEAT {
-                    put = Instant::now();
-                    let _repeated_until_the_limit = harness.put_news(&news);
-                }
-                (harness.generation() > before && harness.is_present()).then_some(())
-            },
+            |harness| harness.put_news(&news),
+            |harness| (harness.generation() > before && harness.is_present()).then_some(()),
         )
     }
 

@@ -34,6 +34,8 @@ use crate::wire::{Joining, Wire, WireEvent};
 const LOOK_AGAIN: Duration = Duration::from_millis(20);
 /// What a process put just before its end arrives within this time.
 const LAST_WORDS: Duration = Duration::from_millis(200);
+/// How often something is put again that may have been lost, as the clock of a run would.
+const REPEAT: Duration = Duration::from_secs(2);
 /// A robot that still does not rest after this time never does.
 const RESTLESS: Duration = Duration::from_secs(1);
 /// How long a robot that was admitted has to declare its token. The checks demand that it does.
@@ -100,8 +102,8 @@ pub(crate) struct Harness<'k> {
     pub(crate) is_cut_off: bool,
     /// News are not put.
     pub(crate) withholds_news: bool,
-    /// Clocks have the flags of all other robots, too.
-    pub(crate) flags_all: bool,
+    /// Flags that clocks have in addition to the barrier's.
+    pub(crate) more_flags: u32,
     /// Further incarnations are welcomed as if they had asked a tick earlier, when the body stood elsewhere.
     pub(crate) asks_early: bool,
     wire: Wire,
@@ -175,7 +177,7 @@ impl<'k> Harness<'k> {
             keeps_requests: true,
             is_cut_off: false,
             withholds_news: false,
-            flags_all: false,
+            more_flags: 0,
             asks_early: false,
             wire,
             played: Vec::new(),
@@ -424,11 +426,10 @@ impl<'k> Harness<'k> {
             })?;
         }
 
-        let mut clock = *clock;
-        if self.flags_all {
-            clock.news |= self.flags_of_others();
-        }
-        self.put_clock(&clock)
+        self.put_clock(&Clock {
+            news: clock.news | self.more_flags,
+            ..*clock
+        })
     }
 
     /// Files what comes until `found` finds something.
@@ -460,6 +461,26 @@ impl<'k> Harness<'k> {
                 ));
             }
         }
+    }
+
+    /// The same for what follows from something that was put and that a link may lose which breaks: it is put again.
+    pub(crate) fn until_put<T>(
+        &mut self,
+        expected: &str,
+        patience: Duration,
+        mut put: impl FnMut(&Self) -> Result<(), RuleFailure>,
+        mut found: impl FnMut(&mut Self) -> Option<T>,
+    ) -> Result<T, RuleFailure> {
+        put(self)?;
+        let mut last_put = Instant::now();
+        self.until(expected, patience, |harness| {
+            if last_put.elapsed() > REPEAT {
+                last_put = Instant::now();
+                // Where nothing can be put any more, the wait ends by itself.
+                let _ = put(harness);
+            }
+            found(harness)
+        })
     }
 
     /// Files what comes within a time.
@@ -495,17 +516,8 @@ impl<'k> Harness<'k> {
         expected: &str,
         patience: Duration,
     ) -> Result<ExitStatus, RuleFailure> {
-        let mut limit = Limit::new(patience);
-        loop {
-            if let Some(status) = self.process.ended() {
-                return Ok(status);
-            }
-
-            if limit.is_over(&self.process) {
-                return Err(RuleFailure::new(expected, self.process.fate()));
-            }
-            self.pump(LOOK_AGAIN);
-        }
+        self.until(expected, patience, |harness| harness.process.ended())
+            .map_err(|_| RuleFailure::new(expected, self.process.fate()))
     }
 
     /// Waits until the robot's token is undeclared.

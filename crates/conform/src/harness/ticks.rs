@@ -38,13 +38,6 @@ impl Harness<'_> {
         1 << (index.unwrap_or_default() % protocol::messages::NEWS_FLAGS)
     }
 
-    /// The flags of all other robots of the roster in clocks.
-    pub(super) fn flags_of_others(&self) -> u32 {
-        let robots = self.barrier.roster().count() as u32;
-        let all = 1u32.checked_shl(robots).map_or(u32::MAX, |flag| flag - 1);
-        all & !self.flag()
-    }
-
     /// Puts a clock.
     pub(crate) fn put_clock(&self, clock: &Clock) -> Result<(), RuleFailure> {
         self.put_as_clock(&self.fake_peers.dress(clock))
@@ -80,6 +73,12 @@ impl Harness<'_> {
             joined: self.news.joined.or((generation > 1).then_some(generation)),
             ..self.news.clone()
         }
+    }
+
+    /// Puts the news of the open tick that were withheld. If a broken link loses them, they are put again with their clock.
+    pub(crate) fn release_news(&mut self) -> Result<(), RuleFailure> {
+        self.withholds_news = false;
+        self.put_news(&self.open_news())
     }
 
     /// Grants the next tick with these news.
@@ -272,10 +271,9 @@ impl Harness<'_> {
         Ok(())
     }
 
-    /// Puts the clock that ends the run.
-    pub(crate) fn put_end(&mut self, end: End) -> Result<(), RuleFailure> {
-        let clock = self.barrier.end(end);
-        self.put_clock(&clock)
+    /// Ends the run. Returns the clock that says so.
+    pub(crate) fn end(&mut self, end: End) -> Clock {
+        self.barrier.end(end)
     }
 
     /// Undeclares the simulator's liveliness token, or declares it again. Returns when that is done.
