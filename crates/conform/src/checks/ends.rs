@@ -90,13 +90,6 @@ pub(super) fn sigterm(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     harness.until_gone()
 }
 
-/// The simulator's token goes: the robot waits for it, goes on if it comes back, and ends when its patience is over.
-pub(super) fn gone(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
-    gone_for_a_while(kit)?;
-    in_each_attempt(|scale| back_in_time(kit, GONE_S * scale))?;
-    gone_forever(kit, findings)
-}
-
 /// A robot that lost its simulator, and is to wait so long for it.
 fn without_simulator(kit: &Kit, gone_patience_s: u32) -> Result<Harness<'_>, RuleFailure> {
     let options = HarnessOptions {
@@ -111,7 +104,7 @@ fn without_simulator(kit: &Kit, gone_patience_s: u32) -> Result<Harness<'_>, Rul
 
 /// It does not end before its patience is over, and goes on where it was. There is so much patience that no machine uses it up
 /// meanwhile.
-fn gone_for_a_while(kit: &Kit) -> Result<(), RuleFailure> {
+pub(super) fn gone_for_a_while(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     struct SimulatorAway;
     impl Disturbance for SimulatorAway {
         fn after(
@@ -142,7 +135,11 @@ fn gone_for_a_while(kit: &Kit) -> Result<(), RuleFailure> {
 }
 
 /// The simulator is back before the robot's patience is over, and the time is over when its patience would have been.
-fn back_in_time(kit: &Kit, gone_patience_s: u32) -> Result<(), RuleFailure> {
+pub(super) fn back_in_time(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
+    in_each_attempt(|scale| back_within(kit, GONE_S * scale))
+}
+
+fn back_within(kit: &Kit, gone_patience_s: u32) -> Result<(), RuleFailure> {
     let mut harness = without_simulator(kit, gone_patience_s)?;
     let patience = Duration::from_secs(gone_patience_s.into());
     harness.pass(patience / 4);
@@ -157,7 +154,7 @@ fn back_in_time(kit: &Kit, gone_patience_s: u32) -> Result<(), RuleFailure> {
 }
 
 /// The simulator does not come back.
-fn gone_forever(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
+pub(super) fn gone_forever(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
     let mut harness = without_simulator(kit, GONE_S)?;
     // Tokens that are left now are the robot's: it has one.
     let left = harness.tokens_of_others()?;

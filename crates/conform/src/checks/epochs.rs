@@ -133,7 +133,7 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
                 return Ok(());
             }
             let joining = join_again(harness)?;
-            harness.welcome_to(&joining, 1);
+            harness.welcome_to(joining, 1);
             harness.settle(QUIET);
             demand_silence(
                 harness,
@@ -141,7 +141,7 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
             )?;
             harness.repeat();
             let joining = join_again(harness)?;
-            harness.admit(&joining);
+            harness.admit(joining);
             harness.keeps_requests = false;
             Ok(())
         }
@@ -210,7 +210,7 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     harness.is_cut_off = false;
 
     let joining = join_again(&mut harness)?;
-    harness.admit(&joining);
+    harness.admit(joining);
     harness.keeps_requests = false;
     demand_same_process(&harness)?;
     harness.settle(QUIET);

@@ -32,7 +32,7 @@ pub(super) fn ready_last(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure>
             "it came before",
         ));
     }
-    harness.admit(&joining);
+    harness.admit(joining);
     harness.keeps_requests = false;
     harness.until_ready()?;
 
@@ -64,7 +64,7 @@ fn refused_for_good(kit: &Kit) -> Result<(), RuleFailure> {
     let mut harness = Harness::open_run(kit, HarnessOptions::default())?;
     let joining = harness.next_join(START_PATIENCE)?;
     let explanation = format!("no robot of {} has this name", harness.run);
-    harness.refuse_join(&joining, Refusal::UnknownName, &explanation);
+    harness.refuse_join(joining, Refusal::UnknownName, &explanation);
     let expected = "its process ends when it is refused with unknown_name";
     let status = harness.until_ended(expected, PATIENCE)?;
     if status.success() {
@@ -91,11 +91,7 @@ fn taken_for_a_while(kit: &Kit) -> Result<(), RuleFailure> {
     harness.prepare()?;
     for _ in 0..TAKEN {
         let joining = harness.next_join(START_PATIENCE)?;
-        harness.refuse_join(
-            &joining,
-            Refusal::NameTaken,
-            "another process is this robot",
-        );
+        harness.refuse_join(joining, Refusal::NameTaken, "another process is this robot");
     }
 
     let joining = harness.next_join(PATIENCE).map_err(|failure| {
@@ -104,7 +100,7 @@ fn taken_for_a_while(kit: &Kit) -> Result<(), RuleFailure> {
             failure.came,
         )
     })?;
-    harness.admit(&joining);
+    harness.admit(joining);
     harness.keeps_requests = false;
     harness.until_ready()?;
     play(&mut harness, &PlayScript::quiet(2), &mut Straight).map(drop)
@@ -120,13 +116,13 @@ fn taken_forever(kit: &Kit) -> Result<(), RuleFailure> {
     let explanation = "another process is this robot";
     let expected = "its process ends when its place stays taken for longer than CARS_PATIENCE_S";
     let first = harness.next_join(START_PATIENCE)?;
-    harness.refuse_join(&first, Refusal::NameTaken, explanation);
+    harness.refuse_join(first, Refusal::NameTaken, explanation);
 
     let mut limit = Limit::new(patience);
     // Each request is refused, as long as the robot asks: only its own patience ends this.
     while harness.process.ended().is_none() && !limit.is_over(&harness.process) {
         if let Ok(joining) = harness.next_join(Duration::from_millis(100)) {
-            harness.refuse_join(&joining, Refusal::NameTaken, explanation);
+            harness.refuse_join(joining, Refusal::NameTaken, explanation);
         }
     }
     let status = harness.until_ended(expected, Duration::ZERO)?;

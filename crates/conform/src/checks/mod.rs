@@ -43,9 +43,11 @@ const fn rules(
 }
 
 /// Checks that need nothing but the usual ticks before; those that take longest begin.
-const CHECKS: [Check; 32] = [
+const CHECKS: [Check; 34] = [
     rules(&["join.refused"], joining::refused),
-    rules(&["end.gone"], ends::gone),
+    rules(&["end.gone"], ends::gone_for_a_while),
+    rules(&["end.gone"], ends::gone_forever),
+    rules(&["end.gone"], ends::back_in_time),
     rules(&["tick.newest"], peers::newest),
     rules(&["query.reply"], peers::reply),
     rules(&["query.again"], peers::again),

@@ -163,7 +163,7 @@ pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     let joining = harness
         .next_join(PATIENCE)
         .map_err(|failure| RuleFailure::new(expected, failure.came))?;
-    harness.admit(&joining);
+    harness.admit(joining);
     harness.keeps_requests = false;
     let mut instances = Vec::new();
     for request in harness.seen.requests.iter().flatten() {

@@ -55,7 +55,7 @@ pub(super) fn usual(
     kit.learn(&request)?;
     findings.settle("join.request", check_request(&harness, &joining));
     harness.prepare().map_err(cannot_run)?;
-    harness.admit(&joining);
+    harness.admit(joining);
     harness.keeps_requests = false;
     harness.until_ready().map_err(cannot_run)?;
 

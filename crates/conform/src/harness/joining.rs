@@ -118,17 +118,20 @@ impl Harness<'_> {
     /// The same where the other robots are set up.
     pub(crate) fn admit_first(&mut self) -> Result<(), RuleFailure> {
         let joining = self.next_join(START_PATIENCE)?;
-        self.admit(&joining);
+        self.admit(joining);
         self.keeps_requests = false;
         self.until_ready()
     }
 
     /// Answers a request to join as the barrier decides.
-    pub(crate) fn admit(&mut self, joining: &Joining) {
+    pub(crate) fn admit(&mut self, joining: Joining) {
         self.seen.requests.push(joining.request.clone());
         let request = match &joining.request {
             Ok(request) => request.clone(),
-            Err(error) => return self.refuse_join(joining, Refusal::Malformed, error),
+            Err(error) => {
+                let explanation = error.clone();
+                return self.refuse_join(joining, Refusal::Malformed, &explanation);
+            }
         };
 
         let mut admitted = Err(Refused::Ended);
@@ -149,7 +152,7 @@ impl Harness<'_> {
         }
     }
 
-    fn welcome(&self, joining: &Joining, admission: Admission) {
+    fn welcome(&self, joining: Joining, admission: Admission) {
         let mut welcome = self.template.clone();
         welcome.epoch = admission.epoch;
         welcome.generation = admission.generation;
@@ -164,7 +167,7 @@ impl Harness<'_> {
     }
 
     /// Welcomes the robot to an epoch that is over.
-    pub(crate) fn welcome_to(&mut self, joining: &Joining, epoch: Epoch) {
+    pub(crate) fn welcome_to(&mut self, joining: Joining, epoch: Epoch) {
         self.seen.requests.push(joining.request.clone());
         let admission = Admission {
             epoch,
@@ -174,15 +177,14 @@ impl Harness<'_> {
         self.welcome(joining, admission);
     }
 
-    /// Answers a request to join.
-    fn answer_join(&self, joining: &Joining, answer: &JoinAnswer) {
-        joining
-            .query
-            .reply(&joining.key, self.fake_peers.dress(answer));
+    /// Answers a request to join. With it the query ends, for which a robot may wait.
+    fn answer_join(&self, joining: Joining, answer: &JoinAnswer) {
+        let Joining { query, key, .. } = joining;
+        query.reply(&key, self.fake_peers.dress(answer));
     }
 
     /// Refuses a request to join.
-    pub(crate) fn refuse_join(&self, joining: &Joining, reason: Refusal, explanation: &str) {
+    pub(crate) fn refuse_join(&self, joining: Joining, reason: Refusal, explanation: &str) {
         let refused = JoinAnswer::Refused {
             reason,
             explanation: explanation.to_owned(),

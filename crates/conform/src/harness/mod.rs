@@ -269,7 +269,7 @@ impl<'k> Harness<'k> {
         if self.keeps_requests {
             self.joins.push_back(joining);
         } else {
-            self.admit(&joining);
+            self.admit(joining);
         }
     }
 
