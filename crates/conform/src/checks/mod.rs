@@ -91,7 +91,8 @@ const CHECKS: [Check; 34] = [
 /// Checks of programs that `cars exec` runs.
 const STDIO_CHECKS: [Check; 1] = [rules(&[rules::STDIO_END], stdio::end)];
 /// Rules whose checks presume that the robot keeps another one: without it they show nothing.
-const PRESUMED: [(&str, &str); 3] = [
+const PRESUMED: [(&str, &str); 4] = [
+    ("epoch.init", "clock.duplicate"),
     ("tick.newest", "news.wait"),
     ("query.reply", "news.wait"),
     ("query.reply", "query.again"),

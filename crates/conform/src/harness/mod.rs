@@ -36,6 +36,8 @@ const LOOK_AGAIN: Duration = Duration::from_millis(20);
 const LAST_WORDS: Duration = Duration::from_millis(200);
 /// How often something is put again that may have been lost, as the clock of a run would.
 const REPEAT: Duration = Duration::from_secs(2);
+/// How soon a clock is repeated for a robot that was welcomed and does not answer: some drop it, which a run forgives.
+const REPEAT_FOR_NEWCOMERS: Duration = Duration::from_millis(200);
 /// A robot that still does not rest after this time never does.
 const RESTLESS: Duration = Duration::from_secs(1);
 /// How long a robot that was admitted has to declare its token. The checks demand that it does.
@@ -140,8 +142,8 @@ fn start(kit: &Kit, run: &RunName, options: &HarnessOptions) -> Result<RobotProc
 fn barrier(roster: impl IntoIterator<Item = RobotName>) -> Barrier<usize, ReportedCommand> {
     let timing = Timing {
         token: TOKEN_PATIENCE,
-        // A welcome repeats no clock here: what a robot does with one that comes again is another rule's.
-        repeat_for_newcomers: Timing::default().repeat,
+        // Later than in a run, after any robot's answer: what it does with a clock that comes again is another rule's.
+        repeat_for_newcomers: REPEAT_FOR_NEWCOMERS,
         ..Timing::default()
     };
     Barrier::new(roster, patient(), timing, MAX_ENTRIES as u32)
