@@ -199,6 +199,19 @@ impl Bus {
         used("put on", key, put)
     }
 
+    /// Deletes a key: its subscribers get a sample without a payload.
+    ///
+    /// # Errors
+    /// [`BusError::Use`] if the session is closed or the key is not legal.
+    pub fn delete(&self, key: &str) -> Result<(), BusError> {
+        let deleted = self
+            .session
+            .delete(key)
+            .congestion_control(CongestionControl::Block)
+            .wait();
+        used("delete", key, deleted)
+    }
+
     /// Puts one message with another quality of service than [`Qos::IN_ORDER`].
     ///
     /// # Errors

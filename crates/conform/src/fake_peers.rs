@@ -45,7 +45,8 @@ pub(crate) enum Unhelpful {
 struct PeersState {
     now: (Epoch, Tick),
     asked: Vec<ReceivedQuery>,
-    is_holding: bool,
+    /// Queries for earlier ticks, and of earlier epochs, are held back.
+    holds_before: Option<(Epoch, Tick)>,
     /// How the next queries of each robot are replied to, instead of with its state.
     unhelpful: BTreeMap<RobotName, Vec<Unhelpful>>,
     held: Vec<(RobotName, String, Query)>,
@@ -97,7 +98,12 @@ impl FakePeers {
 
     /// From now on they hold queries back.
     pub(crate) fn hold(&self) {
-        self.state().is_holding = true;
+        self.hold_before(Epoch::MAX, Tick::MAX);
+    }
+
+    /// They hold back queries for ticks before this one, and answer all others.
+    pub(crate) fn hold_before(&self, epoch: Epoch, tick: Tick) {
+        self.state().holds_before = Some((epoch, tick));
     }
 
     /// They reply in this order to the next queries of each robot, and then as usual.
@@ -139,7 +145,7 @@ impl FakePeers {
         // Answered without the lock, which `answer` takes itself.
         let held = {
             let mut state = self.state();
-            state.is_holding = false;
+            state.holds_before = None;
             std::mem::take(&mut state.held)
         };
 
@@ -212,7 +218,7 @@ impl FakePeers {
         value.to_string().into_bytes()
     }
 
-    /// Declares their queryables and tokens.
+    /// Declares their queryables.
     pub(crate) fn serve(&self, bus: &Bus, keys: &Keys) -> Result<Vec<Declared>, BusError> {
         let mut declared = Vec::new();
         for name in self.names() {
@@ -225,11 +231,14 @@ impl FakePeers {
                 );
             }
         }
-        for name in self.names() {
-            declared.push(bus.token(&keys.alive_robot(name))?);
-        }
-
         Ok(declared)
+    }
+
+    /// Declares their tokens.
+    pub(crate) fn show(&self, bus: &Bus, keys: &Keys) -> Result<Vec<Declared>, BusError> {
+        self.names()
+            .map(|name| bus.token(&keys.alive_robot(name)))
+            .collect()
     }
 
     fn receive(&self, name: &RobotName, what: &str, query: Query) {
@@ -241,7 +250,11 @@ impl FakePeers {
             epoch: query.parameter("epoch").map(str::to_owned),
             now,
         });
-        if state.is_holding {
+        let epoch = query
+            .parameter("epoch")
+            .and_then(|epoch| epoch.parse().ok());
+        let tick = query.parameter("tick").and_then(|tick| tick.parse().ok());
+        if state.holds_before > Some((epoch.unwrap_or(now.0), tick.unwrap_or(now.1))) {
             state.held.push((name.clone(), what.to_owned(), query));
             return;
         }

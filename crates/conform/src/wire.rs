@@ -105,6 +105,19 @@ impl Wire {
         })
     }
 
+    /// Keeps further declarations until the run is over.
+    pub(crate) fn keep(&mut self, declared: impl IntoIterator<Item = Declared>) {
+        self.declared.extend(declared);
+    }
+
+    /// Deletes the keys of the clock and of a robot's news, as a tool may do.
+    pub(crate) fn delete(&self, robot: &RobotName) -> Result<(), RuleFailure> {
+        for key in [self.keys.clock(), self.keys.news(robot)] {
+            self.bus.delete(&key)?;
+        }
+        Ok(())
+    }
+
     /// Watches what a robot may not put: the states of these others, whom the kit plays.
     pub(crate) fn guard<'n>(
         &mut self,

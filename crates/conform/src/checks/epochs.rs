@@ -5,6 +5,7 @@ use std::time::Duration;
 use protocol::messages::{Clock, Delivery, JoinRequest, Performative, Point, TickUpdate};
 use protocol::{Epoch, Tick};
 
+use super::waiting;
 use crate::comparison::{PlayDifference, demand_same, difference};
 use crate::findings::Findings;
 use crate::harness::{Harness, HarnessOptions};
@@ -17,6 +18,8 @@ use crate::wire::Joining;
 
 /// No report comes within this time where it is not the robot's turn.
 const QUIET: Duration = Duration::from_millis(300);
+/// An epoch that follows the first one, where those between were missed.
+const LATER: Epoch = 4;
 /// Ticks of an epoch that is to leave nothing behind, commands among them.
 const BUSY: Tick = 21;
 /// So many streams and seeds are tried, for so many ticks each.
@@ -55,7 +58,7 @@ type Moves = Vec<(Point, f64, f64)>;
 
 /// What is drawn is decided by the seed together with the stream that the welcome names. Each welcome is that of a
 /// further epoch, so that one process does for all.
-pub(super) fn streams(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
+pub(super) fn streams(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
     // Of a robot that does not repeat itself nothing can be compared.
     if kit.is_deterministic.get() == Some(&false) {
         return Ok(());
@@ -71,6 +74,12 @@ pub(super) fn streams(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         by_stream.push(moves(&mut harness, seed, format!("{stream}#{number}"))?);
         // It does not start over, so there is nothing to compare.
         if by_stream.last().is_some_and(Vec::is_empty) {
+            if harness.process.ended().is_some() {
+                let epoch = harness.epoch();
+                let expected = format!("another request to join for a clock of epoch {epoch}");
+                let failure = RuleFailure::new(expected, harness.process.fate());
+                findings.fail("epoch.init", failure);
+            }
             return Ok(());
         }
         by_seed.push(moves(&mut harness, seed + number, stream.clone())?);
@@ -188,13 +197,35 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     )
 }
 
+/// An epoch begins while it waits for its news, or for another robot's answer: nothing else would ever end that wait.
+pub(super) fn while_waiting(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
+    let mut harness = waiting::for_news(kit)?;
+    harness.withholds_news = false;
+    begin_later(&mut harness)?;
+
+    let (mut harness, is_asking) = waiting::for_another(kit)?;
+    if is_asking {
+        // What it asked for in the epoch before is never answered.
+        harness.fake_peers.hold_before(LATER, 0);
+        begin_later(&mut harness)?;
+    }
+    Ok(())
+}
+
+/// A later epoch begins, not always the next one: the robot may have missed some.
+fn begin_later(harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
+    harness.begin_epoch(LATER);
+    let played = play(harness, &PlayScript::quiet(2), &mut Straight)?;
+    demand_epoch(&played, LATER)
+}
+
 /// A robot that has missed the beginning of an epoch joins again, too, and waits until it is named.
 pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     let mut harness = with_robot(kit, HarnessOptions::default())?;
     play(&mut harness, &PlayScript::quiet(3), &mut Straight)?;
     let tokens_lost = harness.seen.tokens_lost;
 
-    harness.begin_epoch(2);
+    harness.begin_epoch(LATER);
     // Tick 0 goes on without it: from then on only its news can tell it that it takes part.
     harness.miss()?;
     harness.keeps_requests = true;
@@ -203,7 +234,7 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     harness.is_cut_off = true;
     harness.open(&TickUpdate::default())?;
     harness.put_clock(&Clock {
-        epoch: 2,
+        epoch: LATER,
         tick: 1,
         ..Clock::default()
     })?;
@@ -218,7 +249,7 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     demand_silence(&harness, expected)?;
 
     let transcript = play(&mut harness, &PlayScript::quiet(4), &mut Straight)?;
-    demand_epoch(&transcript, 2)?;
+    demand_epoch(&transcript, LATER)?;
     if harness.seen.tokens_lost > tokens_lost {
         return Err(RuleFailure::new(
             "its token stays declared when it joins a further epoch",

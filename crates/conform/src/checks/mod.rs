@@ -43,12 +43,14 @@ const fn rules(
 }
 
 /// Checks that need nothing but the usual ticks before; those that take longest begin.
-const CHECKS: [Check; 34] = [
+const CHECKS: [Check; 37] = [
     rules(&["join.refused"], joining::refused),
     rules(&["end.gone"], ends::gone_for_a_while),
     rules(&["end.gone"], ends::gone_forever),
     rules(&["end.gone"], ends::back_in_time),
+    rules(&["query.again"], peers::patient),
     rules(&["tick.newest"], peers::newest),
+    rules(&["tick.newest"], peers::newer),
     rules(&["query.reply"], peers::reply),
     rules(&["query.again"], peers::again),
     rules(&["query.waiting"], peers::waiting),
@@ -58,6 +60,7 @@ const CHECKS: [Check; 34] = [
     rules(&["end.clock"], ends::clock),
     rules(&["news.wait"], news::wait),
     rules(&["epoch.init"], epochs::init),
+    rules(&["epoch.init"], epochs::while_waiting),
     rules(&["epoch.late"], epochs::late),
     rules(&["return.generation"], returns::generation),
     rules(&["return.rejoin"], returns::rejoin),
@@ -85,7 +88,7 @@ const CHECKS: [Check; 34] = [
     rules(&["number.integers"], tolerance::integers),
     rules(&["robust.malformed"], tolerance::malformed),
     rules(&["tick.answer"], ticks::unasked),
-    rules(&["determinism.seed"], epochs::streams),
+    rules(&["determinism.seed", "epoch.init"], epochs::streams),
 ];
 
 /// Checks of programs that `cars exec` runs.

@@ -20,6 +20,9 @@ use crate::transcript::PlayedTick;
 const ARRIVED: Duration = Duration::from_millis(100);
 /// One tick in so many is disturbed: a query that is made again takes half a second.
 const ROUND: Tick = 9;
+/// A robot that gives up, gives up in less: after a time, or after so many refusals.
+const SILENCE: Duration = Duration::from_secs(11);
+const REFUSALS: usize = 10;
 /// Ticks in which the answers of others are compared, fewer than the usual ones.
 const TICKS: Tick = 30;
 
@@ -190,6 +193,77 @@ pub(super) fn again(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailur
     let mut harness = waiting::of_queries(kit)?;
     let played = play(&mut harness, &shorter(kit), &mut Refusing)?;
     demand_same(kit, "that others refuse first", &expected, &played)
+}
+
+/// It goes on asking robots that do not answer for long, and whose tokens are gone: only a newer clock ends the tick.
+pub(super) fn patient(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
+    let (mut harness, is_asking) = waiting::for_another(kit)?;
+    if !is_asking {
+        findings.skip("query.again", "the robot queried no other one");
+        return Ok(());
+    }
+    harness.hide_others();
+    harness.pass_while(SILENCE, Harness::is_open);
+    if !harness.is_open() {
+        let expected = format!(
+            "it asks again for {} s, and puts no report without an answer",
+            SILENCE.as_secs()
+        );
+        return Err(RuleFailure::new(expected, "a report"));
+    }
+    // Which it asks next is answered late, and refused before.
+    harness
+        .fake_peers
+        .be_unhelpful(&[Unhelpful::Refusal; REFUSALS]);
+    harness.fake_peers.release();
+    harness.complete()?;
+    match harness.fake_peers.given_up() {
+        None => Ok(()),
+        Some(of) => Err(RuleFailure::new(
+            format!("queries of {of} until it answers"),
+            format!("the report, after fewer than {REFUSALS} refusals"),
+        )),
+    }
+}
+
+/// A newer clock comes while it waits for an answer: it finishes the tick without it, and goes on.
+pub(super) fn newer(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
+    let (mut harness, is_asking) = waiting::for_another(kit)?;
+    if !is_asking {
+        return Ok(());
+    }
+    let tick = harness.next_tick();
+    let clock = Clock {
+        epoch: 1,
+        tick,
+        news: harness.flag(),
+        ..Clock::default()
+    };
+    let news = TickUpdate {
+        epoch: 1,
+        tick,
+        correction: Some(Correction {
+            location: harness.body.stands,
+            blocked: false,
+        }),
+        ..TickUpdate::default()
+    };
+
+    // What it asked for is never answered; what it asks for in the newer tick is.
+    harness.fake_peers.hold_before(1, tick);
+    harness.fake_peers.begin(1, tick);
+    let expected = format!(
+        "a report for tick {tick}, whose clock comes while it waits for an answer in the tick before"
+    );
+    harness.until_put(
+        &expected,
+        PATIENCE,
+        |harness| {
+            harness.put_news(&news)?;
+            harness.put_clock(&clock)
+        },
+        |harness| harness.has_answered(tick).then_some(()),
+    )
 }
 
 /// It says for whom it waits, in the way that ticks need.

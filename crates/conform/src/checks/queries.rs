@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use bus::Reply;
 use protocol::keys::{QUERIES, STATE};
-use protocol::messages::{Answer, Point, PublicState};
+use protocol::messages::{Answer, Point, PublicState, TickUpdate};
 use protocol::{Epoch, Tick, decode};
 
 use super::{computing, waiting, wire};
@@ -461,7 +461,7 @@ pub(super) fn asking(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailu
     let asked = harness.fake_peers.asked();
     if asked.is_empty() {
         findings.skip("query.asking", "the robot queried no other one");
-        return Ok(());
+        return demand_none_in_range(kit);
     }
 
     for query in asked {
@@ -490,6 +490,30 @@ pub(super) fn asking(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailu
         }
     }
     Ok(())
+}
+
+/// A robot that queries nobody does not do so only because its news list nobody: all are in range where they have no list.
+fn demand_none_in_range(kit: &Kit) -> Result<(), RuleFailure> {
+    struct AllInRange;
+    impl Disturbance for AllInRange {
+        fn news(&mut self, harness: &Harness<'_>, news: &mut TickUpdate) {
+            let all = || harness.fake_peers.names().cloned().collect();
+            news.in_range.get_or_insert_with(all);
+        }
+    }
+
+    let mut harness = waiting::of_queries(kit)?;
+    play(&mut harness, &PlayScript::usual(kit), &mut AllInRange)?;
+    match harness.fake_peers.asked().first() {
+        None => Ok(()),
+        Some(query) => Err(RuleFailure::new(
+            "the same queries where news list all others as `in_range` and where they list nobody",
+            format!(
+                "a query of {} in tick {} where they do, and none where they do not",
+                query.of, query.now.1
+            ),
+        )),
+    }
 }
 
 /// Each query has exactly one reply, the query object is released, and the robot has no queryable of another key.

@@ -50,7 +50,7 @@ pub(super) fn malformed(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> 
             for rubbish in news(tick) {
                 harness.put_as_news(&rubbish)?;
             }
-            Ok(())
+            harness.delete_keys()
         }
     }
 

@@ -33,7 +33,8 @@ impl Harness<'_> {
             self.options.has_extras,
             self.options.writes_integers,
         );
-        self.played = self.fake_peers.serve(&kit.bus, &self.keys)?;
+        self.wire.keep(self.fake_peers.serve(&kit.bus, &self.keys)?);
+        self.tokens = self.fake_peers.show(&kit.bus, &self.keys)?;
         self.wire.guard(self.fake_peers.names())?;
         if self.options.is_followed {
             self.wire.follow(&subject)?;
@@ -239,10 +240,14 @@ impl Harness<'_> {
         self.barrier.presence(&self.kit.subject()).0
     }
 
-    /// The other robots are gone, and so are their queryables and tokens. Returns tokens that are declared all the same, but for
-    /// that of the robot.
+    /// The tokens of the other robots are gone; their queryables are still there.
+    pub(crate) fn hide_others(&mut self) {
+        self.tokens.clear();
+    }
+
+    /// The same. Returns tokens that are declared all the same, but for that of the robot.
     pub(crate) fn tokens_of_others(&mut self) -> Result<BTreeSet<String>, RuleFailure> {
-        self.played.clear();
+        self.hide_others();
         let tokens = Arc::new(Mutex::new(BTreeSet::new()));
         let known = Arc::clone(&tokens);
         let watched = self

@@ -109,8 +109,8 @@ pub(crate) struct Harness<'k> {
     /// Further incarnations are welcomed as if they had asked a tick earlier, when the body stood elsewhere.
     pub(crate) asks_early: bool,
     wire: Wire,
-    /// Queryables and tokens of the robots that the kit plays.
-    played: Vec<Declared>,
+    /// Tokens of the robots that the kit plays.
+    tokens: Vec<Declared>,
     barrier: Barrier<usize, ReportedCommand>,
     timers: BTreeMap<Timer, Instant>,
     epoch: Epoch,
@@ -182,7 +182,7 @@ impl<'k> Harness<'k> {
             more_flags: 0,
             asks_early: false,
             wire,
-            played: Vec::new(),
+            tokens: Vec::new(),
             barrier: barrier([]),
             timers: BTreeMap::new(),
             epoch: 1,

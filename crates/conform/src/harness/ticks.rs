@@ -58,6 +58,11 @@ impl Harness<'_> {
         self.wire.put_news(&self.kit.subject(), bytes.to_vec())
     }
 
+    /// Deletes the keys of clocks and of the robot's news.
+    pub(crate) fn delete_keys(&self) -> Result<(), RuleFailure> {
+        self.wire.delete(&self.kit.subject())
+    }
+
     /// Puts the last clock and its news again.
     pub(crate) fn repeat(&mut self) {
         self.drive(lockstep::Barrier::repeat);

@@ -4,12 +4,14 @@ use std::time::Duration;
 
 use lockstep::{Admission, IncarnationNotice, Leave};
 use protocol::messages::{Clock, End, JoinAnswer, JoinRequest, Refusal, TickUpdate, Welcome};
-use protocol::{PROTOCOL_VERSION, encode};
+use protocol::{Epoch, PROTOCOL_VERSION, encode};
 
 use crate::answering::Phase;
 use crate::host::{Failure, Host};
 use crate::walker::Walker;
 
+/// After so many epochs it ends, if it is to.
+const MAX_EPOCHS: Epoch = 10;
 /// Delay of a declaration that is made too late.
 const LATE: Duration = Duration::from_millis(1500);
 
@@ -34,6 +36,11 @@ impl Host {
         if is_queued && self.wrong.is("tick.newest") {
             return Ok(());
         }
+        let is_asking = self.shared.is_in(Phase::Asking);
+        let is_newer = is_asking && clock.tick > self.last_clock.tick && clock.end.is_none();
+        if is_newer && self.wrong.is("tick.newest:asking") {
+            return Ok(());
+        }
         if is_queued && self.wrong.is("tick.newest:every") {
             self.queued.push_back(clock);
             return Ok(());
@@ -43,6 +50,13 @@ impl Host {
             self.serve()?;
         }
 
+        let begins = is_later && clock.end.is_none();
+        if begins && is_asking && self.wrong.is("epoch.init:asking")
+            || begins && is_waiting && self.wrong.is("epoch.init:waiting")
+            || begins && clock.epoch > own + 1 && self.wrong.is("epoch.late:next")
+        {
+            return Ok(());
+        }
         let is_first = clock.tick == 0 && clock.end.is_none();
         if self.wrong.is("epoch.init") && is_later && is_first
             || self.wrong.is("epoch.late") && is_later && clock.tick > 0
@@ -162,6 +176,10 @@ impl Host {
         }
         if is_again && self.wrong.is("epoch.init:instance") {
             instance.push_str(" again");
+        }
+        let epoch = self.welcome.as_ref().map_or(0, |welcome| welcome.epoch);
+        if epoch >= MAX_EPOCHS && self.wrong.is("epoch.init:few") {
+            self.leave = Some(Leave::Stopped);
         }
         let request = JoinRequest {
             protocol: if self.wrong.is("join.request") {

@@ -25,6 +25,9 @@ const QUEUE: usize = 4096;
 /// The simulator is gone for long after this time.
 const LONG_GONE: Duration = Duration::from_secs(5);
 
+/// After so many queries it gives up, if it is to.
+const MAX_QUERIES: usize = 8;
+
 /// What arrives from the bus. Malformed messages are dropped before.
 pub(crate) enum Event {
     Clock(Clock),
@@ -73,6 +76,8 @@ pub(crate) struct Host {
     gone: Option<Instant>,
     /// Whether it has had no answer to its query, if it is to give up then.
     pub(crate) has_given_up: bool,
+    /// How often it has queried again.
+    queries: usize,
     /// Whether the queryables are still to be declared.
     pub(crate) is_unserved: bool,
 }
@@ -140,6 +145,7 @@ impl Host {
             newest: None,
             gone: None,
             has_given_up: false,
+            queries: 0,
             is_unserved: false,
         };
         host.declare()?;
@@ -332,6 +338,11 @@ impl Host {
             };
             if is_ignored {
                 continue;
+            }
+            if timer == RobotTimer::Query {
+                self.queries += 1;
+                self.has_given_up |=
+                    self.queries > MAX_QUERIES && self.wrong.is("query.again:often");
             }
             self.drive(|machine, out| machine.timer(timer, out))?;
         }

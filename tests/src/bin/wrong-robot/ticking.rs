@@ -259,6 +259,9 @@ impl Host {
             self.query(other, tick, epoch)?;
             return Ok(None);
         }
+        if news.in_range.is_none() && self.wrong.is("query.asking:listed") {
+            return Ok(None);
+        }
         let is_unreachable = !news.can_query(&other);
         // The participant does not know of a tick that is run a second time.
         let is_running = self.shared.is_in(Phase::Computing);
