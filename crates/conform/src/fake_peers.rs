@@ -14,6 +14,8 @@ use crate::setting::RosterRobot;
 /// Below this, each whole number has a floating-point number of its own.
 const MAX_WHOLE: f64 = 9_007_199_254_740_992.0;
 
+/// How far from its place a robot is shown where that must make no difference, meters.
+const MISPLACED_M: f64 = 1.5;
 /// How far a robot without a script moves in a tick, meters, and after how many ticks it is back.
 const PACE_M: f64 = 0.01;
 const PACES: Tick = 50;
@@ -47,6 +49,8 @@ struct PeersState {
     asked: Vec<ReceivedQuery>,
     /// Queries for earlier ticks, and of earlier epochs, are held back.
     holds_before: Option<(Epoch, Tick)>,
+    /// States that are put show the robots elsewhere than they are.
+    misplaces: bool,
     /// How the next queries of each robot are replied to, instead of with its state.
     unhelpful: BTreeMap<RobotName, Vec<Unhelpful>>,
     held: Vec<(RobotName, String, Query)>,
@@ -104,6 +108,11 @@ impl FakePeers {
     /// They hold back queries for ticks before this one, and answer all others.
     pub(crate) fn hold_before(&self, epoch: Epoch, tick: Tick) {
         self.state().holds_before = Some((epoch, tick));
+    }
+
+    /// States that are put show them elsewhere than they are, or no longer do.
+    pub(crate) fn misplace(&self, misplaces: bool) {
+        self.state().misplaces = misplaces;
     }
 
     /// They reply in this order to the next queries of each robot, and then as usual.
@@ -312,8 +321,12 @@ impl FakePeers {
         keys: &Keys,
     ) -> Result<(), BusError> {
         let (epoch, _) = self.state().now;
+        let misplaces = self.state().misplaces;
         for name in self.names() {
-            if let Some(state) = self.state_of(name, epoch, before) {
+            if let Some(mut state) = self.state_of(name, epoch, before) {
+                if misplaces {
+                    state.location.x += MISPLACED_M;
+                }
                 bus.put(&keys.query(name, STATE), self.dress(&state))?;
             }
         }

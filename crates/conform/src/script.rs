@@ -204,6 +204,11 @@ pub(crate) fn step(
     Ok(entry)
 }
 
+/// Whether the robot can query another one in a tick, by the news of these ticks.
+pub(crate) fn can_query(tick: Tick) -> bool {
+    ![CUT_OFF, OUT_OF_RANGE].contains(&(tick % ROUND))
+}
+
 /// What is new for the robot in a tick.
 fn news_of(harness: &mut Harness<'_>, script: &PlayScript, tick: Tick) -> TickUpdate {
     let epoch = harness.epoch();

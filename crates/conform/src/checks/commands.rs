@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use protocol::messages::{MAX_PAYLOAD_BYTES, Payload, Variable};
+use protocol::messages::{MAX_PAYLOAD_BYTES, MAX_TEXT_BYTES, Payload, Variable};
 use protocol::{RobotName, Tick};
 use serde_json::{Value, json};
 
@@ -21,8 +21,6 @@ const MANY: usize = 300;
 const FEW: usize = 7;
 /// The last tick where as many come in few in each tick.
 const LAST_OF_MANY: Tick = (MANY / FEW) as Tick + 1;
-/// A long text, bytes. A robot may quote it in a line of its log, which has the same limit.
-const LONG_TEXT: usize = 2000;
 const SHORT_TEXT: usize = 90;
 /// All kinds of characters that JSON escapes, and such as have two, three and four bytes.
 const ESCAPED_TEXT: &str = " \"a\\b/\t\r\n{\"tick\":9}\u{1}äßﬁ猫🤖 ";
@@ -99,7 +97,7 @@ pub(super) fn order(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailur
         }
         // Both ways: a robot that sorts its commands would be right in one of them.
         if votes.right > 0 && back.right > 0 {
-            return Ok(());
+            return order_of_senders(kit, &one, &two);
         }
     }
 
@@ -108,6 +106,35 @@ pub(super) fn order(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailur
         shown(kit)
     );
     findings.skip("command.order", &reason);
+    Ok(())
+}
+
+/// The same of commands from two senders, of which news list that of the first one before that of the second one.
+fn order_of_senders(kit: &Kit, one: &str, two: &str) -> Result<(), RuleFailure> {
+    let mut senders = [kit.sender(), RobotName::operator()];
+    senders.sort();
+    let [first, second] = senders;
+    let play = |one_at: Tick, two_at: Tick| {
+        let arrivals = vec![
+            ArrivingCommand::new(&first, one, one_at),
+            ArrivingCommand::new(&second, two, two_at),
+        ];
+        Ok(values(&played(kit, &PlayScript::with(TICKS, arrivals))?))
+    };
+
+    let votes = vote(
+        &play(LAST, LAST)?,
+        &play(LAST - 1, LAST)?,
+        &play(LAST, LAST - 1)?,
+    );
+    if votes.is_broken() {
+        return Err(RuleFailure::new(
+            format!(
+                "news that list {one:?} of {first} and then {two:?} of {second} have their effect in this order"
+            ),
+            "the effect of the other order",
+        ));
+    }
     Ok(())
 }
 
@@ -336,13 +363,13 @@ pub(super) fn payload(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
 /// robot does not know.
 fn demand_any(kit: &Kit) -> Result<(), RuleFailure> {
     let short = "x".repeat(SHORT_TEXT);
-    let long = commanded(kit, &[(&"x".repeat(LONG_TEXT), LAST)])?;
+    let long = commanded(kit, &[(&"x".repeat(MAX_TEXT_BYTES), LAST)])?;
     let escaped = commanded(kit, &[(ESCAPED_TEXT, LAST)])?;
     if kit.is_deterministic.get() == Some(&false) {
         return Ok(());
     }
     let any = [
-        (format!("a text of {LONG_TEXT} bytes"), numbers(&long)),
+        (format!("a text of {MAX_TEXT_BYTES} bytes"), numbers(&long)),
         (format!("the text {ESCAPED_TEXT:?}"), numbers(&escaped)),
     ];
 

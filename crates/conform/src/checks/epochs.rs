@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use protocol::messages::{Clock, Delivery, JoinRequest, Performative, Point, TickUpdate};
+use protocol::messages::{
+    Clock, Delivery, JoinRequest, Performative, Point, StreamReseed, TickUpdate,
+};
 use protocol::{Epoch, Tick};
 
 use super::waiting;
@@ -25,6 +27,8 @@ const BUSY: Tick = 21;
 /// So many streams and seeds are tried, for so many ticks each.
 const DRAWS: u64 = 16;
 const DRAWN: Tick = 12;
+/// The tick from which on it draws from another stream in the same epoch.
+const RESEEDED: Tick = 4;
 
 /// Another process, the same seed: the same reports.
 pub(super) fn same_seed(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
@@ -74,33 +78,71 @@ pub(super) fn streams(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFail
         by_stream.push(moves(&mut harness, seed, format!("{stream}#{number}"))?);
         // It does not start over, so there is nothing to compare.
         if by_stream.last().is_some_and(Vec::is_empty) {
-            if harness.process.ended().is_some() {
-                let epoch = harness.epoch();
-                let expected = format!("another request to join for a clock of epoch {epoch}");
-                let failure = RuleFailure::new(expected, harness.process.fate());
-                findings.fail("epoch.init", failure);
+            if harness.process.ended().is_none() {
+                return Ok(());
             }
-            return Ok(());
+            let epoch = harness.epoch();
+            let expected = format!("another request to join for a clock of epoch {epoch}");
+            return Err(RuleFailure::new(expected, harness.process.fate()));
         }
         by_seed.push(moves(&mut harness, seed + number, stream.clone())?);
     }
 
-    let expected = format!("{DRAWS} streams and {DRAWS} seeds give different moves");
     // A robot that draws nothing moves the same way each time, which is right. Wrong is only one that
     // follows the one and not the other.
+    let expected = format!("{DRAWS} streams and {DRAWS} seeds give different moves");
     if are_all_different(&by_seed) && are_all_the_same(&by_stream) {
-        return Err(RuleFailure::new(
-            expected,
-            "the name of the stream makes no difference, the seed does",
-        ));
+        let came = "the name of the stream makes no difference, the seed does";
+        findings.fail("determinism.seed", RuleFailure::new(&expected, came));
     }
     if are_all_different(&by_stream) && are_all_the_same(&by_seed) {
-        return Err(RuleFailure::new(
-            expected,
-            "the seed makes no difference, the name of the stream does",
-        ));
+        let came = "the seed makes no difference, the name of the stream does";
+        findings.fail("determinism.seed", RuleFailure::new(&expected, came));
+    }
+    if are_all_different(&by_seed) {
+        let judged = demand_reseeded(&mut harness, seed, &stream)?;
+        findings.settle("determinism.seed", judged);
     }
     Ok(())
+}
+
+/// In the middle of an epoch a robot draws from another stream, if its welcome says so, and up to there as if it did not.
+fn demand_reseeded(
+    harness: &mut Harness<'_>,
+    seed: u64,
+    stream: &str,
+) -> Result<Result<(), RuleFailure>, RuleFailure> {
+    let straight = moves(harness, seed, stream.to_owned())?;
+    harness.template.reseeds = vec![StreamReseed {
+        tick: RESEEDED,
+        seed: seed + 1,
+    }];
+    let reseeded = moves(harness, seed, stream.to_owned())?;
+    harness.template.reseeds.clear();
+
+    let at = RESEEDED as usize;
+    // It does not start over: that is another rule's matter.
+    if straight.len().min(reseeded.len()) <= at {
+        return Ok(Ok(()));
+    }
+    let what = format!("the seed {} from tick {RESEEDED} on", seed + 1);
+    if straight[..at] != reseeded[..at] {
+        return Ok(Err(RuleFailure::new(
+            format!("up to tick {RESEEDED} the same moves as without {what}"),
+            "others",
+        )));
+    }
+    // One that turns in each tick draws in each; of others it is not known when they draw.
+    let turns = straight[at - 1..]
+        .windows(2)
+        .all(|pair| pair[0].2 != pair[1].2);
+    if turns && straight[at..] == reseeded[at..] {
+        return Ok(Err(RuleFailure::new(
+            format!("other moves with {what} (`reseeds` of its welcome)"),
+            "the same",
+        )));
+    }
+    Ok(Ok(()))
 }
 
 fn are_all_the_same(moves: &[Moves]) -> bool {

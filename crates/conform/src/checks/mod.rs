@@ -43,7 +43,7 @@ const fn rules(
 }
 
 /// Checks that need nothing but the usual ticks before; those that take longest begin.
-const CHECKS: [Check; 37] = [
+const CHECKS: [Check; 38] = [
     rules(&["join.refused"], joining::refused),
     rules(&["end.gone"], ends::gone_for_a_while),
     rules(&["end.gone"], ends::gone_forever),
@@ -75,6 +75,7 @@ const CHECKS: [Check; 37] = [
         queries::by_tick,
     ),
     rules(&["query.asking"], queries::asking),
+    rules(&["query.asking"], queries::unreachable),
     rules(&["query.unknown"], queries::unknown),
     rules(&["command.order"], commands::order),
     rules(&["command.twice", "command.sent"], commands::many),
@@ -88,13 +89,14 @@ const CHECKS: [Check; 37] = [
     rules(&["number.integers"], tolerance::integers),
     rules(&["robust.malformed"], tolerance::malformed),
     rules(&["tick.answer"], ticks::unasked),
-    rules(&["determinism.seed", "epoch.init"], epochs::streams),
+    rules(&["epoch.init", "determinism.seed"], epochs::streams),
 ];
 
 /// Checks of programs that `cars exec` runs.
 const STDIO_CHECKS: [Check; 1] = [rules(&[rules::STDIO_END], stdio::end)];
 /// Rules whose checks presume that the robot keeps another one: without it they show nothing.
-const PRESUMED: [(&str, &str); 4] = [
+const PRESUMED: [(&str, &str); 5] = [
+    ("command.order", "operator.commands"),
     ("epoch.init", "clock.duplicate"),
     ("tick.newest", "news.wait"),
     ("query.reply", "news.wait"),

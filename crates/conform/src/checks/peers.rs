@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use protocol::Tick;
-use protocol::messages::{Clock, Correction, TickUpdate};
+use protocol::messages::{Clock, Correction, Delivery, Performative, Report, TickUpdate};
 
 use super::{waiting, wire};
 use crate::comparison::demand_same;
@@ -35,8 +35,31 @@ fn shorter(kit: &Kit) -> PlayScript {
     }
 }
 
-/// The clock has gone on twice: it answers the newest one, and never those before.
+/// The clock has gone on twice: it answers the newest one, and never those before. What the news of those before list is lost.
 pub(super) fn newest(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
+    let [text, _] = kit.texts();
+    let command = Delivery {
+        from: kit.sender(),
+        performative: Performative::Achieve,
+        command: text,
+        payload: None,
+    };
+    let without = after_skipped(kit, &[])?;
+    let with = after_skipped(kit, &[command])?;
+
+    if kit.is_deterministic.get() != Some(&false) && with != without {
+        return Err(RuleFailure::new(
+            format!(
+                "the same after a command in the news of skipped clocks, which is lost: {without:?}"
+            ),
+            format!("{with:?}"),
+        ));
+    }
+    Ok(())
+}
+
+/// What the robot reports for the newest of three clocks, and for the one after it. The news of those before list these commands.
+fn after_skipped(kit: &Kit, commands: &[Delivery]) -> Result<Vec<Report>, RuleFailure> {
     let mut harness = waiting::for_news(kit)?;
     // It waits for the news of this tick. Two clocks more, and only the last one has its news: which of them
     // it answers does not depend on how fast it reads.
@@ -57,23 +80,27 @@ pub(super) fn newest(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         }),
         ..TickUpdate::default()
     };
+    let put_news = |harness: &Harness<'_>, tick: Tick, commands: &[Delivery]| {
+        harness.put_news(&TickUpdate {
+            tick,
+            commands: commands.to_vec(),
+            ..news.clone()
+        })
+    };
     let expected =
         format!("a report for tick {newest}, the newest of three clocks, when its news are here");
     harness.until_put(
         &expected,
         PATIENCE,
         |harness| {
+            // Before its clock, which is followed by the newest at once, and, of the held one, late.
+            put_news(harness, held + 1, commands)?;
             for tick in [held + 1, newest] {
                 harness.put_clock(&Clock { tick, ..clock })?;
             }
-            // News of the ticks before come last, and late.
-            for tick in [newest, held + 1, held] {
-                harness.put_news(&TickUpdate {
-                    tick,
-                    ..news.clone()
-                })?;
-            }
-            Ok(())
+            put_news(harness, held, commands)?;
+            put_news(harness, newest, &[])?;
+            put_news(harness, held + 1, commands)
         },
         |harness| harness.has_answered(newest).then_some(()),
     )?;
@@ -88,7 +115,29 @@ pub(super) fn newest(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
             ));
         }
     }
-    Ok(())
+
+    let after = newest + 1;
+    harness.fake_peers.begin(1, after);
+    let expected = format!("a report for tick {after}");
+    harness.until_put(
+        &expected,
+        PATIENCE,
+        |harness| {
+            put_news(harness, after, &[])?;
+            harness.put_clock(&Clock {
+                tick: after,
+                ..clock
+            })
+        },
+        |harness| harness.has_answered(after).then_some(()),
+    )?;
+    let mut reports = Vec::new();
+    for tick in [newest, after] {
+        let mut answers = harness.seen.answers.iter();
+        let answer = answers.find(|answer| answer.reading.report.tick == tick);
+        reports.extend(answer.map(|answer| answer.reading.report.clone()));
+    }
+    Ok(reports)
 }
 
 /// The states of others arrive before it decides, as they do where it is slower than they: those of the tick do not count.

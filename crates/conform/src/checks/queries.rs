@@ -14,7 +14,7 @@ use crate::harness::{Harness, HarnessOptions};
 use crate::kit::Kit;
 use crate::patience::{PATIENCE, in_each_attempt};
 use crate::report::RuleFailure;
-use crate::script::{Disturbance, PlayScript, Straight, play, usual, with_robot};
+use crate::script::{Disturbance, PlayScript, Straight, can_query, play, usual, with_robot};
 use crate::transcript::PlayedTick;
 
 /// The kit's own limit where it waits until all replies are in.
@@ -490,6 +490,26 @@ pub(super) fn asking(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailu
         }
     }
     Ok(())
+}
+
+/// What robots that it cannot query put for subscribers makes no difference.
+pub(super) fn unreachable(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
+    struct Misplaced;
+    impl Disturbance for Misplaced {
+        fn before(&mut self, harness: &mut Harness<'_>, tick: Tick) -> Result<(), RuleFailure> {
+            harness.fake_peers.misplace(!can_query(tick));
+            Ok(())
+        }
+    }
+
+    let mut harness = with_robot(kit, HarnessOptions::default())?;
+    let played = play(&mut harness, &PlayScript::usual(kit), &mut Misplaced)?;
+    demand_same(
+        kit,
+        "what robots put that are unreachable, or not in range",
+        usual(kit)?,
+        &played,
+    )
 }
 
 /// A robot that queries nobody does not do so only because its news list nobody: all are in range where they have no list.

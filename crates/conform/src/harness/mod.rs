@@ -102,6 +102,8 @@ pub(crate) struct Harness<'k> {
     pub(crate) keeps_requests: bool,
     /// Nothing reaches the robot: neither news nor clocks are put.
     pub(crate) is_cut_off: bool,
+    /// News are put twice before each clock.
+    pub(crate) doubles_news: bool,
     /// News are not put.
     pub(crate) withholds_news: bool,
     /// Flags that clocks have in addition to the barrier's.
@@ -178,6 +180,7 @@ impl<'k> Harness<'k> {
             run,
             keeps_requests: true,
             is_cut_off: false,
+            doubles_news: false,
             withholds_news: false,
             more_flags: 0,
             asks_early: false,
@@ -419,13 +422,17 @@ impl<'k> Harness<'k> {
         if let Some((_, notice)) = own
             && !self.withholds_news
         {
-            self.put_news(&TickUpdate {
+            let news = TickUpdate {
                 epoch: clock.epoch,
                 tick: clock.tick,
                 joined: self.news.joined.or(notice.joined),
                 rejoin: notice.rejoin,
                 ..self.news.clone()
-            })?;
+            };
+            self.put_news(&news)?;
+            if self.doubles_news {
+                self.put_news(&news)?;
+            }
         }
 
         self.put_clock(&Clock {

@@ -488,13 +488,14 @@ fn sizes_are_bounded() {
     assert_eq!(error.field, "emotion_state");
 
     let mut many = report();
-    many.log = vec![String::new(); 2000];
-    assert_eq!(
-        decode::<Report>("key", "Butler", &encode(&many))
-            .unwrap_err()
-            .field,
-        "log"
-    );
+    many.log = vec!["\u{e9}".repeat(MAX_TEXT_BYTES / 2) + "x"; MAX_ENTRIES / 4];
+    many.log.resize(MAX_ENTRIES + 1, "y".to_owned());
+    let kept = decode::<Report>("key", "Butler", &encode(&many))
+        .unwrap()
+        .log;
+    assert_eq!(kept.len(), MAX_ENTRIES);
+    assert_eq!(kept[0], "\u{e9}".repeat(MAX_TEXT_BYTES / 2));
+    assert_eq!(kept[MAX_ENTRIES - 1], "y");
 
     let mut sent = report();
     sent.commands = MAX_ENTRIES as u32;

@@ -1,7 +1,10 @@
 //! Limits of the fields of messages, the checks of them, and the defaults that are left out.
 
+use serde::{Deserialize, Deserializer};
+
 use super::numbers::Tick;
 use crate::codec::FieldError;
+use crate::plain::cut;
 
 /// Longest text in a message, in bytes: a command, a state's name, a log line.
 pub const MAX_TEXT_BYTES: usize = 4096;
@@ -54,6 +57,16 @@ pub(super) fn few(len: usize, field: &str) -> Result<(), FieldError> {
 
     let reason = format!("{len} entries, more than the {MAX_ENTRIES} allowed");
     Err(FieldError::new(field, reason))
+}
+
+/// Reads lines of a robot's log, within the limits: how much a robot has to say never decides whether it has answered.
+pub(super) fn log_lines<'de, D: Deserializer<'de>>(reader: D) -> Result<Vec<String>, D::Error> {
+    let mut lines = Vec::<String>::deserialize(reader)?;
+    lines.truncate(MAX_ENTRIES);
+    for line in &mut lines {
+        cut(line, MAX_TEXT_BYTES);
+    }
+    Ok(lines)
 }
 
 /// Whether a flag has its default and is left out of a message.

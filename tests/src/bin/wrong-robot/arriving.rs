@@ -161,7 +161,7 @@ impl Host {
             tick = self.last_clock.tick;
         }
 
-        if self.wrong.is("epoch.init:received") {
+        if self.wrong.is("epoch.init:received") || self.wrong.is("tick.newest:news") {
             self.strays.push(news.clone());
         }
         let naming = IncarnationNotice::from(&news);
@@ -180,6 +180,7 @@ impl Host {
         let epoch = self.welcome.as_ref().map_or(0, |welcome| welcome.epoch);
         if epoch >= MAX_EPOCHS && self.wrong.is("epoch.init:few") {
             self.leave = Some(Leave::Stopped);
+            return Ok(());
         }
         let request = JoinRequest {
             protocol: if self.wrong.is("join.request") {

@@ -8,7 +8,7 @@ use protocol::messages::{
     CommandText, Point, PublicState, Report, StateVariables, TickUpdate, Variable, Velocity,
     Welcome,
 };
-use protocol::random::unit;
+use protocol::random::{stream, unit};
 use protocol::{Epoch, RobotName, Tick};
 
 use crate::answering::{Phase, lock};
@@ -42,7 +42,16 @@ impl Host {
             .strays
             .iter()
             .find(|stray| stray.epoch < turn.epoch && stray.tick == turn.tick);
-        let news = turn.news.or(stray.cloned()).unwrap_or_default();
+        let mut news = turn.news.or(stray.cloned()).unwrap_or_default();
+        if self.wrong.is("tick.newest:news") {
+            let last = self.last.map_or(0, |(_, tick)| tick);
+            let skipped = |stray: &&TickUpdate| {
+                stray.epoch == turn.epoch && (last + 1..turn.tick).contains(&stray.tick)
+            };
+            for stray in self.strays.iter().filter(skipped) {
+                news.commands.extend(stray.commands.iter().cloned());
+            }
+        }
 
         let (commands, state, report) = self.act(turn.epoch, turn.tick, &news)?;
         self.drive(|machine, out| machine.done(commands, state, report, out))?;
@@ -98,6 +107,9 @@ impl Host {
         if wrong.is("command.order:sorts") {
             deliveries.sort_by(|one, other| one.command.cmp(&other.command));
         }
+        if wrong.is("command.order:senders") {
+            deliveries.sort_by(|one, other| other.from.cmp(&one.from));
+        }
         if wrong.is("command.twice:ten") {
             deliveries.truncate(TEN);
         }
@@ -151,6 +163,12 @@ impl Host {
             commands.truncate(TEN);
         }
 
+        let mut reseeds = welcome.reseeds.iter();
+        if let Some(reseed) = reseeds.find(|reseed| reseed.tick == tick)
+            && !wrong.is("determinism.seed:reseeds")
+        {
+            walker.random = stream(reseed.seed, &welcome.stream);
+        }
         let seen = self.ask_another(tick, epoch, news, &welcome)?;
         if tick == SLOW_TICK {
             std::thread::sleep(COMPUTES);
@@ -277,6 +295,12 @@ impl Host {
             };
             if self.wrong.is(wrong) {
                 self.query(other, tick, epoch)?;
+            }
+            if self.wrong.is("query.asking:followed") {
+                if !std::mem::replace(&mut self.is_following, true) {
+                    self.follow(&other)?;
+                }
+                return Ok(self.newest.as_ref().map(|state| state.location));
             }
             return Ok(None);
         }
