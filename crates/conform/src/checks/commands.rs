@@ -119,7 +119,7 @@ fn order_of_senders(kit: &Kit, one: &str, two: &str) -> Result<(), RuleFailure> 
             ArrivingCommand::new(&first, one, one_at),
             ArrivingCommand::new(&second, two, two_at),
         ];
-        Ok(values(&played(kit, &PlayScript::with(TICKS, arrivals))?))
+        played(kit, &PlayScript::with(TICKS, arrivals)).map(|played| values(&played))
     };
 
     let votes = vote(

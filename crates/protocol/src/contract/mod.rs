@@ -488,7 +488,7 @@ fn sizes_are_bounded() {
     assert_eq!(error.field, "emotion_state");
 
     let mut many = report();
-    many.log = vec!["\u{e9}".repeat(MAX_TEXT_BYTES / 2) + "x"; MAX_ENTRIES / 4];
+    many.log = vec!["\u{e9}".repeat(MAX_TEXT_BYTES / 2) + "x"; MAX_ENTRIES / 8];
     many.log.resize(MAX_ENTRIES + 1, "y".to_owned());
     let kept = decode::<Report>("key", "Butler", &encode(&many))
         .unwrap()

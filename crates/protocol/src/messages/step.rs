@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::drive::{DriveLimits, Pose, Velocity};
 use super::layer::{LayerAction, LayerResult, SensedLayer, check_layer_actions};
-use super::limits::{counted, few, finite, is_false, is_zero, short};
+use super::limits::{counted, few, finite, is_false, is_zero, log_lines, short};
 use super::numbers::{Epoch, Generation, Tick};
 use super::payload::Payload;
 use super::performative::Performative;

@@ -287,6 +287,12 @@ impl Host {
             return Ok(None);
         }
         if is_unreachable {
+            if self.wrong.is("query.asking:followed") {
+                if !std::mem::replace(&mut self.is_following, true) {
+                    self.follow(&other)?;
+                }
+                return Ok(self.newest.as_ref().map(|state| state.location));
+            }
             let is_cut = news.unreachable.contains(&other);
             let wrong = if is_cut {
                 "query.asking:unreachable"
@@ -295,12 +301,6 @@ impl Host {
             };
             if self.wrong.is(wrong) {
                 self.query(other, tick, epoch)?;
-            }
-            if self.wrong.is("query.asking:followed") {
-                if !std::mem::replace(&mut self.is_following, true) {
-                    self.follow(&other)?;
-                }
-                return Ok(self.newest.as_ref().map(|state| state.location));
             }
             return Ok(None);
         }
