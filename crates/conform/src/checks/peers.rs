@@ -93,11 +93,10 @@ fn after_skipped(kit: &Kit, commands: &[Delivery]) -> Result<Vec<Report>, RuleFa
         &expected,
         PATIENCE,
         |harness| {
-            // Before its clock, which is followed by the newest at once, and, of the held one, late.
-            put_news(harness, held + 1, commands)?;
             for tick in [held + 1, newest] {
                 harness.put_clock(&Clock { tick, ..clock })?;
             }
+            // Those of the ticks before come late, before the newest and after them.
             put_news(harness, held, commands)?;
             put_news(harness, newest, &[])?;
             put_news(harness, held + 1, commands)
@@ -312,7 +311,17 @@ pub(super) fn newer(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
             harness.put_clock(&clock)
         },
         |harness| harness.has_answered(tick).then_some(()),
-    )
+    )?;
+    if !harness.has_answered(tick - 1) {
+        return Err(RuleFailure::new(
+            format!(
+                "a report for tick {}, which it finishes without the answer",
+                tick - 1
+            ),
+            format!("only that for tick {tick}"),
+        ));
+    }
+    Ok(())
 }
 
 /// It says for whom it waits, in the way that ticks need.

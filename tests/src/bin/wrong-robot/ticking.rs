@@ -5,9 +5,10 @@ use std::time::Duration;
 use lockstep::{Begin, Sent, Turn};
 use protocol::keys::STATE;
 use protocol::messages::{
-    CommandText, Point, PublicState, Report, StateVariables, TickUpdate, Variable, Velocity,
-    Welcome,
+    CommandText, MAX_TEXT_BYTES, Point, PublicState, Report, StateVariables, TickUpdate, Variable,
+    Velocity, Welcome,
 };
+use protocol::plain::cut;
 use protocol::random::{stream, unit};
 use protocol::{Epoch, RobotName, Tick};
 
@@ -149,12 +150,11 @@ impl Host {
             let answers_operator = wrong.is("operator.commands:answers");
             if welcome.roster.contains(&delivery.from) || answers_operator {
                 walker.sent += 1;
+                let mut answer = format!("{} received: {}", walker.sent, delivery.command);
+                cut(&mut answer, MAX_TEXT_BYTES);
                 commands.push(Sent {
                     to: delivery.from.into(),
-                    command: CommandText::named(format!(
-                        "{} received: {}",
-                        walker.sent, delivery.command
-                    )),
+                    command: CommandText::named(answer),
                 });
             }
         }
