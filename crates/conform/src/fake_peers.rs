@@ -220,6 +220,7 @@ impl FakePeers {
         let mut value = serde_json::from_slice(&bytes).unwrap_or(Value::Null);
         if self.has_extras {
             add_extras(&mut value);
+            add_defaults(".", &mut value);
         }
         if self.writes_integers {
             write_integers(&mut value);
@@ -332,6 +333,36 @@ impl FakePeers {
         }
 
         Ok(())
+    }
+}
+
+/// Fields that are left out where they have their default, by the list or object that they belong to; `.` is the message.
+const DEFAULTS: [(&str, &str, &str); 5] = [
+    (".", "commands", "[]"),
+    (".", "sensed", "[]"),
+    (".", "unreachable", "[]"),
+    ("correction", "blocked", "false"),
+    ("commands", "performative", "\"achieve\""),
+];
+
+/// Writes out what a message leaves out because it is the default.
+fn add_defaults(name: &str, value: &mut Value) {
+    match value {
+        Value::Array(values) => values
+            .iter_mut()
+            .for_each(|value| add_defaults(name, value)),
+        Value::Object(fields) => {
+            for (within, field) in fields.iter_mut() {
+                add_defaults(within, field);
+            }
+            for (within, field, default) in DEFAULTS {
+                if within == name && !fields.contains_key(field) {
+                    let default = serde_json::from_str(default).unwrap_or(Value::Null);
+                    fields.insert(field.to_owned(), default);
+                }
+            }
+        }
+        _ => {}
     }
 }
 

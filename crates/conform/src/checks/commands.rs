@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use protocol::messages::{MAX_PAYLOAD_BYTES, MAX_TEXT_BYTES, Payload, Variable};
+use protocol::messages::{MAX_PAYLOAD_BYTES, MAX_PAYLOAD_DEPTH, MAX_TEXT_BYTES, Payload, Variable};
 use protocol::{RobotName, Tick};
 use serde_json::{Value, json};
 
@@ -284,6 +284,7 @@ fn twice(
             ));
         }
         if votes.right > 0 {
+            from_two(kit, &text, &none, &once)?;
             return demand_many(plays.insert(ManyPlays::play(kit, &text)?));
         }
     }
@@ -293,6 +294,42 @@ fn twice(
         shown(kit)
     );
     findings.skip("command.twice", &reason);
+    Ok(())
+}
+
+/// The same command of two senders is two commands.
+fn from_two(
+    kit: &Kit,
+    text: &str,
+    none: &BTreeMap<String, f64>,
+    once: &BTreeMap<String, f64>,
+) -> Result<(), RuleFailure> {
+    let senders = [kit.sender(), RobotName::operator()];
+    let play = |ticks: [Tick; 2]| {
+        let arrivals = senders
+            .iter()
+            .zip(ticks)
+            .map(|(from, tick)| ArrivingCommand::new(from, text, tick))
+            .collect();
+        played(kit, &PlayScript::with(TICKS, arrivals)).map(|played| numbers(&played))
+    };
+
+    let apart = play([LAST - 1, LAST])?;
+    let together = play([LAST, LAST])?;
+    for (name, first) in once {
+        let (Some(before), Some(second), Some(came)) =
+            (none.get(name), apart.get(name), together.get(name))
+        else {
+            continue;
+        };
+        let is_counter = first != before && first - before == second - first;
+        if is_counter && came == first {
+            return Err(RuleFailure::new(
+                format!("{text:?} from two senders in the news of a tick is executed twice"),
+                format!("{name} counts it once"),
+            ));
+        }
+    }
     Ok(())
 }
 
@@ -342,14 +379,17 @@ pub(super) fn payload(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     let [text, _] = kit.texts();
     // With its quotation marks.
     let largest = "x".repeat(MAX_PAYLOAD_BYTES - 2);
+    // As deep as a payload may be.
+    let deepest = (2..MAX_PAYLOAD_DEPTH).fold(json!([]), |inner, _| json!([inner]));
     let payloads = [
         json!({ "task": 3, "bid": 0.1, "of": ["A", null, true] }),
         json!(largest),
+        json!([u64::MAX, i64::MIN, -0.0, 1e300, deepest]),
     ];
 
     demand_any(kit)?;
 
-    for (payload, tick) in payloads.into_iter().zip([LAST - 1, LAST]) {
+    for (payload, tick) in payloads.into_iter().zip(LAST - 2..) {
         let arrival = ArrivingCommand {
             payload: Payload::new(payload),
             ..ArrivingCommand::new(&kit.sender(), &text, tick)

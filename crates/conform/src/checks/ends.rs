@@ -21,6 +21,8 @@ const END_PATIENCE: Duration = Duration::from_secs(5);
 const GONE_S: u32 = 2;
 /// The same where the wait is not to end.
 const LONG_GONE_S: u32 = 60;
+/// How long its token is away while the robot waits for an answer.
+const BRIEFLY: Duration = Duration::from_millis(50);
 /// The tick after which the simulator is gone.
 const CUT_AFTER: u64 = 12;
 /// How long the simulator's token is away: longer than any lease, as after a cut.
@@ -131,7 +133,16 @@ pub(super) fn gone_for_a_while(kit: &Kit, _: &mut Findings) -> Result<(), RuleFa
     let mut harness = with_robot(kit, options)?;
     let played = play(&mut harness, &PlayScript::usual(kit), &mut SimulatorAway)?;
     let what = format!("that the simulator was gone for {} s", CUT.as_secs());
-    demand_same(kit, &what, usual(kit)?, &played)
+    demand_same(kit, &what, usual(kit)?, &played)?;
+    waiting::while_asking(
+        kit,
+        "that the simulator was gone while it waits for an answer",
+        |harness| {
+            harness.show_simulator(false)?;
+            harness.pass(BRIEFLY);
+            harness.show_simulator(true).map(drop)
+        },
+    )
 }
 
 /// The simulator is back before the robot's patience is over, and the time is over when its patience would have been.

@@ -118,11 +118,12 @@ fn demand_reseeded(
         seed: seed + 1,
     }];
     let reseeded = moves(harness, seed, stream.to_owned())?;
+    let of_other = moves(harness, seed, format!("{stream}#{}", DRAWS + 1))?;
     harness.template.reseeds.clear();
 
     let at = RESEEDED as usize;
     // It does not start over: that is another rule's matter.
-    if straight.len().min(reseeded.len()) <= at {
+    if straight.len().min(reseeded.len()).min(of_other.len()) <= at {
         return Ok(Ok(()));
     }
     let what = format!("the seed {} from tick {RESEEDED} on", seed + 1);
@@ -139,6 +140,13 @@ fn demand_reseeded(
     if turns && straight[at..] == reseeded[at..] {
         return Ok(Err(RuleFailure::new(
             format!("other moves with {what} (`reseeds` of its welcome)"),
+            "the same",
+        )));
+    }
+    let directions = |moves: &Moves| -> Vec<f64> { moves[at..].iter().map(|one| one.2).collect() };
+    if turns && directions(&reseeded) == directions(&of_other) {
+        return Ok(Err(RuleFailure::new(
+            format!("other moves with {what} for another stream"),
             "the same",
         )));
     }

@@ -13,14 +13,12 @@ use crate::harness::{Harness, HarnessOptions};
 use crate::kit::Kit;
 use crate::patience::PATIENCE;
 use crate::report::RuleFailure;
-use crate::script::{Disturbance, PlayScript, Straight, play, usual, with_robot};
+use crate::script::{Disturbance, PlayScript, play, usual, with_robot};
 use crate::seen::{ReceivedReport, ReportedCommand};
 use crate::transcript::PlayedTick;
 
 /// One clock in so many comes again, and each whose tick had commands.
 const EVERY: Tick = 3;
-/// Ticks in which clocks come again while others do not answer: all in which there are usual commands.
-const FEW_TICKS: Tick = 22;
 /// How long a robot may still send what belongs to the tick itself.
 const BEFORE_REPEATING: Duration = Duration::from_millis(50);
 /// How long the commands may take that should have come before the report that is there.
@@ -45,44 +43,14 @@ pub(super) fn duplicate(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> 
     harness.doubles_news = true;
     let repeated = play(&mut harness, &PlayScript::usual(kit), &mut Again)?;
     demand_same(kit, "a clock that comes again", usual(kit)?, &repeated)?;
-    while_asking(kit)
-}
-
-/// Clock and news come again while it waits for another robot's answer.
-fn while_asking(kit: &Kit) -> Result<(), RuleFailure> {
-    struct AgainWhileHeld;
-    impl Disturbance for AgainWhileHeld {
-        fn before(&mut self, harness: &mut Harness<'_>, _: Tick) -> Result<(), RuleFailure> {
-            harness.fake_peers.hold();
+    waiting::while_asking(
+        kit,
+        "a clock that comes again, with its news, while it waits for an answer",
+        |harness| {
+            harness.repeat();
             Ok(())
-        }
-
-        fn during(&mut self, harness: &mut Harness<'_>, _: Tick) -> Result<(), RuleFailure> {
-            harness.until("a report or a query", PATIENCE, |harness| {
-                (harness.fake_peers.has_held() || !harness.is_open()).then_some(())
-            })?;
-            if harness.is_open() {
-                harness.repeat();
-                harness.pass(BEFORE_REPEATING);
-            }
-            harness.fake_peers.release();
-            Ok(())
-        }
-    }
-
-    let script = PlayScript {
-        ticks: FEW_TICKS,
-        ..PlayScript::usual(kit)
-    };
-    let mut straight = waiting::of_queries(kit)?;
-    let expected = play(&mut straight, &script, &mut Straight)?;
-    if straight.fake_peers.asked().is_empty() {
-        return Ok(());
-    }
-    let mut harness = waiting::of_queries(kit)?;
-    let repeated = play(&mut harness, &script, &mut AgainWhileHeld)?;
-    let what = "a clock that comes again while it waits for an answer";
-    demand_same(kit, what, &expected, &repeated)
+        },
+    )
 }
 
 /// Repeats the clock of a tick, and waits for its report and its commands.
@@ -213,12 +181,14 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
                     }),
                     ..TickUpdate::default()
                 })?;
-                harness.put_clock(&Clock {
-                    epoch,
-                    tick,
-                    news: flag,
-                    ..Clock::default()
-                })?;
+                for news in [flag, 0] {
+                    harness.put_clock(&Clock {
+                        epoch,
+                        tick,
+                        news,
+                        ..Clock::default()
+                    })?;
+                }
             }
             Ok(())
         }

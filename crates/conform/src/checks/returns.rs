@@ -159,6 +159,7 @@ fn asked_again(kit: &Kit) -> Result<Harness<'_>, RuleFailure> {
 /// The clock has gone on without it: it joins again as the process that it is, and then does what a new process does.
 pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     let mut harness = asked_again(kit)?;
+    let tokens_lost = harness.seen.tokens_lost;
     let expected = "another request to join when its news have its generation as `rejoin`";
     let joining = harness
         .next_join(PATIENCE)
@@ -180,6 +181,12 @@ pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     harness.settle(QUIET);
     let again = play(&mut harness, &PlayScript::quiet(5), &mut Straight)?;
     demand_generation(&again)?;
+    if harness.seen.tokens_lost > tokens_lost {
+        return Err(RuleFailure::new(
+            "its token stays declared when it joins again",
+            "it was undeclared",
+        ));
+    }
     // What a new process does in the same place is what it has to do.
     let anew = play(
         &mut returned(kit, last)?,

@@ -5,11 +5,12 @@ use std::time::Duration;
 use protocol::Tick;
 use protocol::messages::{Correction, TickUpdate};
 
+use crate::comparison::demand_same;
 use crate::harness::{Harness, HarnessOptions};
 use crate::kit::Kit;
 use crate::patience::PATIENCE;
 use crate::report::RuleFailure;
-use crate::script::{PlayScript, Straight, play, with_robot};
+use crate::script::{Disturbance, PlayScript, Straight, play, with_robot};
 
 /// After this time, a robot that received a clock is in its tick.
 const UNDER_WAY: Duration = Duration::from_millis(50);
@@ -25,6 +26,46 @@ pub(super) fn of_queries(kit: &Kit) -> Result<Harness<'_>, RuleFailure> {
             ..HarnessOptions::default()
         },
     )
+}
+
+/// What happens while a robot waits for the others' answers makes no difference. Nothing is found of one that queries nobody.
+pub(super) fn while_asking(
+    kit: &Kit,
+    what: &str,
+    happen: fn(&mut Harness<'_>) -> Result<(), RuleFailure>,
+) -> Result<(), RuleFailure> {
+    struct WhileHeld(fn(&mut Harness<'_>) -> Result<(), RuleFailure>);
+    impl Disturbance for WhileHeld {
+        fn before(&mut self, harness: &mut Harness<'_>, _: Tick) -> Result<(), RuleFailure> {
+            harness.fake_peers.hold();
+            Ok(())
+        }
+
+        fn during(&mut self, harness: &mut Harness<'_>, _: Tick) -> Result<(), RuleFailure> {
+            harness.until("a report or a query", PATIENCE, |harness| {
+                (harness.fake_peers.has_held() || !harness.is_open()).then_some(())
+            })?;
+            if harness.is_open() {
+                (self.0)(harness)?;
+                harness.pass(UNDER_WAY);
+            }
+            harness.fake_peers.release();
+            Ok(())
+        }
+    }
+
+    let script = PlayScript {
+        ticks: TICKS,
+        ..PlayScript::usual(kit)
+    };
+    let mut straight = of_queries(kit)?;
+    let expected = play(&mut straight, &script, &mut Straight)?;
+    if straight.fake_peers.asked().is_empty() {
+        return Ok(());
+    }
+    let mut harness = of_queries(kit)?;
+    let played = play(&mut harness, &script, &mut WhileHeld(happen))?;
+    demand_same(kit, what, &expected, &played)
 }
 
 /// A robot that waits for its news: the clock of the open tick has its flag, and its news are withheld.
