@@ -182,7 +182,35 @@ fn left_out(trunk: &Trunk, tick: Tick, event: &Event) -> Option<(u8, String, Cou
                 seq: *seq,
             },
         )),
-        _ => None,
+        // Named one by one, so that a new event has to be decided about here. These follow from others, or
+        // nothing happens instead of them.
+        Event::Init { .. }
+        | Event::Joined { .. }
+        | Event::Lost { .. }
+        | Event::Missed { .. }
+        | Event::DoneLate { .. }
+        | Event::Blocked { .. }
+        | Event::Emotion { .. }
+        | Event::Behavior { .. }
+        | Event::CommandSent { .. }
+        | Event::CommandDelivered { .. }
+        | Event::CommandDropped { .. }
+        | Event::LinkCut { .. }
+        | Event::LinkHealed { .. }
+        | Event::Fault { .. }
+        | Event::Changed { .. }
+        | Event::Say { .. }
+        | Event::Guest { .. }
+        | Event::GuestEntered { .. }
+        | Event::GuestLeft { .. }
+        | Event::SiteChanged { .. }
+        | Event::SiteRefused { .. }
+        | Event::LayerChanged { .. }
+        | Event::LayerRefused { .. }
+        | Event::Warned { .. }
+        | Event::Judged { .. }
+        | Event::Tick { .. }
+        | Event::End { .. } => None,
     }
 }
 
@@ -213,13 +241,19 @@ fn is_of_network(because: Cause) -> bool {
 
 /// Whether it is the fate of a command that the scenario names by its number.
 fn is_named(event: &Event) -> bool {
-    match event {
-        Event::CommandDropped { because, .. } => *because == Cause::Scripted,
-        Event::CommandDelayed { because, .. } | Event::CommandDuplicated { because, .. } => {
-            *because == Some(Cause::Scripted)
+    matches!(
+        event,
+        Event::CommandDropped {
+            because: Cause::Scripted,
+            ..
+        } | Event::CommandDelayed {
+            because: Some(Cause::Scripted),
+            ..
+        } | Event::CommandDuplicated {
+            because: Some(Cause::Scripted),
+            ..
         }
-        _ => false,
-    }
+    )
 }
 
 /// What the scenario plans, in words, and what is without it: partitions, faults, and commands that it names by their numbers.

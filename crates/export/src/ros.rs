@@ -224,7 +224,32 @@ impl Bag {
                 Event::CommandDropped { from, to, seq, .. } => {
                     over.push((from.clone(), to.clone(), *seq));
                 }
-                _ => {}
+                // Named one by one, so that a new event has to be decided about here. These have no topic of their own.
+                Event::Init { .. }
+                | Event::Joined { .. }
+                | Event::Lost { .. }
+                | Event::Missed { .. }
+                | Event::DoneLate { .. }
+                | Event::Blocked { .. }
+                | Event::CommandDelayed { .. }
+                | Event::CommandDuplicated { .. }
+                | Event::QueryLost { .. }
+                | Event::LinkCut { .. }
+                | Event::LinkHealed { .. }
+                | Event::Fault { .. }
+                | Event::Changed { .. }
+                | Event::Say { .. }
+                | Event::Guest { .. }
+                | Event::GuestEntered { .. }
+                | Event::GuestLeft { .. }
+                | Event::SiteChanged { .. }
+                | Event::SiteRefused { .. }
+                | Event::LayerChanged { .. }
+                | Event::LayerRefused { .. }
+                | Event::Warned { .. }
+                | Event::Judged { .. }
+                | Event::Tick { .. }
+                | Event::End { .. } => {}
             }
         }
 

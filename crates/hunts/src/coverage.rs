@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use protocol::RobotName;
 use protocol::event::Cause;
+use protocol::{Event, RobotName};
 use serde::Serialize;
 
 use super::fault::FaultClass;
@@ -62,6 +62,31 @@ pub enum Feature {
 }
 
 impl Feature {
+    /// The change of a robot's state, if the event is one.
+    pub(super) fn transition(event: &Event) -> Option<Self> {
+        match event {
+            Event::Emotion {
+                robot,
+                from: Some(from),
+                to,
+            } => Some(Self::Emotion {
+                robot: robot.clone(),
+                from: from.clone(),
+                to: to.clone(),
+            }),
+            Event::Behavior {
+                robot,
+                from: Some(from),
+                to,
+            } => Some(Self::Behavior {
+                robot: robot.clone(),
+                from: from.clone(),
+                to: to.clone(),
+            }),
+            _ => None,
+        }
+    }
+
     /// Whether a run that shows it is in another state from then on, as far as its robots show: a transition, a command that
     /// arrives, a goal. What the faults of a plan do by themselves is none.
     pub(super) fn is_state(&self) -> bool {

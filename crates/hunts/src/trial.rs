@@ -15,7 +15,7 @@ use observe::Observation;
 use protocol::messages::{End, Verdict};
 use protocol::{Event, RobotName, RunName, Tick};
 use scenario::Scenario;
-use timeline::{CommandSpan, Span, Timeline};
+use timeline::{CommandSpan, Judged, Span, Timeline};
 
 use super::case::FaultCase;
 use super::coverage::{CommandFate, Feature};
@@ -451,37 +451,8 @@ impl TrialNotes {
         self.played.ticks = tick;
         self.seen.clear();
         for event in events {
-            match event {
-                Event::Judged {
-                    expectation,
-                    verdict,
-                    because,
-                } => self.note_verdict(tick, expectation, *verdict, because),
-                Event::Emotion {
-                    robot,
-                    from: Some(from),
-                    to,
-                } => self.see(
-                    tick,
-                    Feature::Emotion {
-                        robot: robot.clone(),
-                        from: from.clone(),
-                        to: to.clone(),
-                    },
-                ),
-                Event::Behavior {
-                    robot,
-                    from: Some(from),
-                    to,
-                } => self.see(
-                    tick,
-                    Feature::Behavior {
-                        robot: robot.clone(),
-                        from: from.clone(),
-                        to: to.clone(),
-                    },
-                ),
-                _ => {}
+            if let Some(transition) = Feature::transition(event) {
+                self.see(tick, transition);
             }
         }
         for span in self.timeline.tick(tick, events) {
@@ -496,13 +467,17 @@ impl TrialNotes {
         }
     }
 
-    fn note_verdict(&mut self, tick: Tick, expectation: &str, verdict: Verdict, because: &str) {
-        let expectation = expectation.to_owned();
+    fn note_verdict(&mut self, judged: Judged) {
+        let Judged {
+            tick,
+            expectation,
+            verdict,
+            because,
+        } = judged;
 
         match verdict {
             Verdict::NotAsked => _ = self.played.not_asked.insert(expectation),
             Verdict::Fail => {
-                let because = because.to_owned();
                 // The first failure counts: to it the run is shortened.
                 let failed = self.played.failed.entry(expectation);
                 failed.or_insert(FailedExpectation { tick, because });
@@ -516,23 +491,38 @@ impl TrialNotes {
 
     fn note_span(&mut self, tick: Tick, span: Span) {
         match span {
-            Span::Command(command) if !command.from.is_operator() => {
-                for fate in fates(&command) {
-                    let feature = Feature::Message {
-                        link: link(&command.from, &command.to),
-                        text: command.text.clone(),
-                        fate,
-                    };
-                    self.see(tick, feature);
-                }
-                self.commands.push(command);
-            }
+            Span::Command(command) => self.note_command(tick, command),
             Span::QueriesLost(lost) => {
                 let link = link(&lost.from, &lost.to);
                 self.see(tick, Feature::QueryLost { link });
             }
-            _ => {}
+            Span::Judged(judged) => self.note_verdict(judged),
+            // Transitions are features, and not how long a robot stays. What the plan or the scenario does by itself is none.
+            Span::Stay(_)
+            | Span::Absence(_)
+            | Span::Missed(_)
+            | Span::Fault(_)
+            | Span::Cut(_)
+            | Span::Guest(_)
+            | Span::Joined(_)
+            | Span::Change(_) => {}
         }
+    }
+
+    fn note_command(&mut self, tick: Tick, command: CommandSpan) {
+        if command.from.is_operator() {
+            return;
+        }
+
+        for fate in fates(&command) {
+            let feature = Feature::Message {
+                link: link(&command.from, &command.to),
+                text: command.text.clone(),
+                fate,
+            };
+            self.see(tick, feature);
+        }
+        self.commands.push(command);
     }
 
     /// What came of the run, with what is in progress at its end.

@@ -12,7 +12,7 @@ use protocol::time::time_s;
 use protocol::{Event, RobotName, RunName, Tick};
 use scenario::Scenario;
 use serde::{Deserialize, Serialize};
-use timeline::{Counts, Timeline};
+use timeline::{Counts, Span, Timeline};
 
 pub use network::{CutSummary, LinkSummary, NetworkSummary, QueryReach};
 
@@ -253,38 +253,32 @@ impl Summary {
         // A span is counted when it ends, by the tick in which that happens.
         for span in self.timeline.apply(tick, event) {
             self.counts.add_span(&span, tick);
+            if let Span::Judged(judged) = span {
+                let verdict = ExpectationVerdict {
+                    verdict: judged.verdict,
+                    tick,
+                    because: judged.because,
+                };
+                self.expectations.insert(judged.expectation, verdict);
+            }
         }
 
-        match event {
-            Event::Judged {
-                expectation,
-                verdict,
-                because,
-            } => {
-                let judged = ExpectationVerdict {
-                    verdict: *verdict,
-                    tick,
-                    because: because.clone(),
-                };
-                self.expectations.insert(expectation.clone(), judged);
-            }
-            Event::GuestEntered { .. } => self.guest_motion.entered += 1,
-            Event::GuestLeft { .. } => self.guest_motion.left += 1,
-            Event::End {
-                reason,
-                because,
-                waited_for,
-                digest,
-                ..
-            } => {
-                self.end = Some(*reason);
-                self.end_because.clone_from(because);
-                self.waited_for.clone_from(waited_for);
-                self.digest.clone_from(digest);
-            }
-            // The time in which robots join is not part of the epoch.
-            Event::Init { .. } => self.begun = Some(Instant::now()),
-            _ => {}
+        // The time in which robots join is not part of the epoch.
+        if let Event::Init { .. } = event {
+            self.begun = Some(Instant::now());
+        }
+        if let Event::End {
+            reason,
+            because,
+            waited_for,
+            digest,
+            ..
+        } = event
+        {
+            self.end = Some(*reason);
+            self.end_because.clone_from(because);
+            self.waited_for.clone_from(waited_for);
+            self.digest.clone_from(digest);
         }
     }
 
@@ -339,6 +333,8 @@ impl Summary {
                 .map(|(state, ticks)| (state, time_s(ticks, tick_s)))
                 .collect()
         };
+        self.guest_motion.entered = counts.guests_entered;
+        self.guest_motion.left = counts.guests_left;
         for (name, counts) in counts.robots {
             let robot = self.robots.entry(name).or_default();
             robot.emotions_s = times_s(counts.emotions.ticks);

@@ -5,14 +5,15 @@ use std::path::Path;
 
 use lab::LabError;
 use pictures::{Band, Floor};
-use protocol::messages::{End, Variable, Verdict};
+use protocol::messages::{End, Variable};
 use protocol::time::time_s;
 use protocol::{Event, RobotName, Tick};
 use record::EpochFiles;
 use record::Record;
 use recording::{RecordedTick, Recording, RecordingError};
 use timeline::{
-    Counts, LinkCounts, Period, RobotCounts, Span, StateKind, StateOrder, StateSpan, Timeline,
+    Counts, Judged, LinkCounts, Period, RobotCounts, Span, StateKind, StateOrder, StateSpan,
+    Timeline,
 };
 
 use super::loss::LossByDistance;
@@ -52,7 +53,7 @@ pub(super) struct RunFacts {
     /// Faults, absences, cuts and changes, in the order of their beginnings.
     pub(super) disturbances: Vec<ScenarioEffect>,
     /// The verdicts about expectations, in the order in which they were decided.
-    pub(super) judged: Vec<JudgedFacts>,
+    pub(super) judged: Vec<Judged>,
     /// The emotions and behaviors of its robots.
     pub(super) names: StateOrder,
     /// Where the robots were, if it was recorded.
@@ -71,16 +72,6 @@ pub(super) struct RobotFacts {
     /// Its state variables over time that are shown, those of [`COURSES`] that it publishes. Each value holds from its time on.
     pub(super) courses: BTreeMap<&'static str, Vec<(f64, Option<f64>)>>,
     pub(super) counts: RobotCounts,
-}
-
-/// The verdict about an expectation.
-#[derive(Debug)]
-pub(super) struct JudgedFacts {
-    pub(super) expectation: String,
-    pub(super) verdict: Verdict,
-    pub(super) tick: Tick,
-    /// Why, in words.
-    pub(super) because: String,
 }
 
 /// Something that the scenario did to the robots or their network.
@@ -107,10 +98,9 @@ impl RunFacts {
         while let Some(entry) = record.next_entry()? {
             is_empty = false;
             facts.last_tick = entry.tick;
+            facts.add_bounds(&entry.events);
             for event in &entry.events {
                 counts.add(event);
-                facts.loss.add(entry.tick, event);
-                facts.add_event(entry.tick, event);
             }
             for span in timeline.tick(entry.tick, &entry.events) {
                 counts.add_span(&span, entry.tick);
@@ -144,37 +134,29 @@ impl RunFacts {
         time_s(self.last_tick, self.tick_s)
     }
 
-    /// Adds what is of the run as a whole.
-    fn add_event(&mut self, tick: Tick, event: &Event) {
-        match event {
-            Event::Init {
-                seed,
-                version,
-                tick_s,
-                ..
-            } => {
-                self.seed = *seed;
-                self.version.clone_from(version);
-                self.tick_s = *tick_s;
-            }
-            Event::Tick { digest, .. } => self.digest.clone_from(digest),
-            Event::End {
-                reason, because, ..
-            } => {
-                self.end = Some(*reason);
-                self.end_because.clone_from(because);
-            }
-            Event::Judged {
-                expectation,
-                verdict,
-                because,
-            } => self.judged.push(JudgedFacts {
-                expectation: expectation.clone(),
-                verdict: *verdict,
-                tick,
-                because: because.clone(),
-            }),
-            _ => {}
+    /// Adds what the events say with which the run begins, and a tick or the run ends.
+    fn add_bounds(&mut self, events: &[Event]) {
+        if let Some(Event::Init {
+            seed,
+            version,
+            tick_s,
+            ..
+        }) = events.first()
+        {
+            self.seed = *seed;
+            self.version.clone_from(version);
+            self.tick_s = *tick_s;
+        }
+
+        if let Some(Event::Tick { digest, .. }) = events.last() {
+            self.digest.clone_from(digest);
+        }
+        if let Some(Event::End {
+            reason, because, ..
+        }) = events.last()
+        {
+            self.end = Some(*reason);
+            self.end_because.clone_from(because);
         }
     }
 
@@ -182,6 +164,8 @@ impl RunFacts {
     fn add_span(&mut self, span: Span) {
         let (what, whom, period) = match span {
             Span::Stay(stay) => return self.add_stay(stay),
+            Span::Command(command) => return self.loss.add(&command),
+            Span::Judged(judged) => return self.judged.push(judged),
             Span::Absence(absence) => (
                 "takes no part".to_owned(),
                 absence.robot.to_string(),
@@ -206,11 +190,7 @@ impl RunFacts {
                 change.set,
                 Period::since(change.tick),
             ),
-            Span::Missed(_)
-            | Span::QueriesLost(_)
-            | Span::Guest(_)
-            | Span::Command(_)
-            | Span::Joined(_) => return,
+            Span::Missed(_) | Span::QueriesLost(_) | Span::Guest(_) | Span::Joined(_) => return,
         };
 
         self.disturbances.push(ScenarioEffect {

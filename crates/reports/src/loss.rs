@@ -7,9 +7,10 @@ use pictures::{
 };
 use protocol::event::Cause;
 use protocol::messages::Point;
-use protocol::{Event, RobotName, Tick};
+use protocol::{RobotName, Tick};
 use recording::PlacedRobot;
 use statistics::Estimate;
+use timeline::CommandSpan;
 
 /// Most commands whose distance is looked for.
 const MAX_COMMANDS: usize = 500_000;
@@ -29,24 +30,20 @@ pub(super) struct LossByDistance {
 }
 
 impl LossByDistance {
-    /// Notes what became of a command.
-    pub(super) fn add(&mut self, tick: Tick, event: &Event) {
-        let (from, to, lost) = match event {
-            Event::CommandDelivered { from, to, .. } => (from, to, None),
-            Event::CommandDropped {
-                from, to, because, ..
-            } => (from, to, Some(*because)),
-            _ => return,
-        };
-        let is_of_radio = lost.is_some_and(is_of_radio);
-        self.has_radio |= is_of_radio;
-        // Other losses are not of the way from one place to another.
-        if (lost.is_some() && !is_of_radio) || self.count == MAX_COMMANDS {
-            return;
+    /// Notes what became of the copies of a command.
+    pub(super) fn add(&mut self, command: &CommandSpan) {
+        for end in &command.ends {
+            let is_of_radio = end.lost.is_some_and(is_of_radio);
+            self.has_radio |= is_of_radio;
+            // Other losses are not of the way from one place to another.
+            if (end.lost.is_some() && !is_of_radio) || self.count == MAX_COMMANDS {
+                continue;
+            }
+
+            self.count += 1;
+            let fates = self.fates.entry(end.tick).or_default();
+            fates.push((command.from.clone(), command.to.clone(), is_of_radio));
         }
-        self.count += 1;
-        let fates = self.fates.entry(tick).or_default();
-        fates.push((from.clone(), to.clone(), is_of_radio));
     }
 
     /// Adds the distances of the commands of a tick.

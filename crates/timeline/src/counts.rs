@@ -15,6 +15,10 @@ pub struct Counts {
     pub robots: BTreeMap<RobotName, RobotCounts>,
     /// Counts of commands, by sender and target.
     pub links: BTreeMap<(RobotName, RobotName), LinkCounts>,
+    /// How often a guest entered the field, those included that were there at the beginning.
+    pub guests_entered: u64,
+    /// How often a guest left the field.
+    pub guests_left: u64,
 }
 
 /// Counts of one robot.
@@ -97,6 +101,8 @@ impl Counts {
             }
             Event::CommandDelayed { from, to, .. } => self.link(from, to).delayed += 1,
             Event::CommandDuplicated { from, to, .. } => self.link(from, to).duplicated += 1,
+            Event::GuestEntered { .. } => self.guests_entered += 1,
+            Event::GuestLeft { .. } => self.guests_left += 1,
             Event::Init { .. }
             | Event::Lost { .. }
             | Event::DoneLate { .. }
@@ -107,8 +113,6 @@ impl Counts {
             | Event::Changed { .. }
             | Event::Say { .. }
             | Event::Guest { .. }
-            | Event::GuestEntered { .. }
-            | Event::GuestLeft { .. }
             | Event::SiteChanged { .. }
             | Event::SiteRefused { .. }
             | Event::LayerChanged { .. }

@@ -8,7 +8,7 @@ use protocol::{Event, RobotName, Seq, Tick};
 
 use crate::names::StateOrder;
 use crate::span::{
-    Absence, ChangeSpan, CommandEnd, CommandSpan, CutSpan, FaultSpan, GuestVisit, Joined,
+    Absence, ChangeSpan, CommandEnd, CommandSpan, CutSpan, FaultSpan, GuestVisit, Joined, Judged,
     MissedTicks, Period, QueriesLost, Span, StateKind, StateSpan,
 };
 
@@ -180,6 +180,16 @@ impl Timeline {
                 before: self.replace_setting(set),
                 set: set.clone(),
             })],
+            Event::Judged {
+                expectation,
+                verdict,
+                because,
+            } => vec![Span::Judged(Judged {
+                tick,
+                expectation: expectation.clone(),
+                verdict: *verdict,
+                because: because.clone(),
+            })],
             // Named one by one, so that a new event has to be decided about here. These say nothing
             // about what lasts.
             Event::Init { .. }
@@ -192,7 +202,6 @@ impl Timeline {
             | Event::LayerChanged { .. }
             | Event::LayerRefused { .. }
             | Event::Warned { .. }
-            | Event::Judged { .. }
             | Event::Tick { .. }
             | Event::End { .. } => Vec::new(),
         }

@@ -23,7 +23,7 @@ pub use decision::{
 pub use fold::Timeline;
 pub use names::StateOrder;
 pub use span::{
-    Absence, ChangeSpan, CommandEnd, CommandSpan, CutSpan, FaultSpan, GuestVisit, Joined,
+    Absence, ChangeSpan, CommandEnd, CommandSpan, CutSpan, FaultSpan, GuestVisit, Joined, Judged,
     MissedTicks, Period, QueriesLost, Span, StateKind, StateSpan,
 };
 

@@ -1,7 +1,7 @@
-//! What has a beginning in a run: spans, and the moments at which robots join and the scenario changes.
+//! What has a beginning in a run: spans, and the moments at which robots join, the scenario changes and an expectation is decided.
 
 use protocol::event::Cause;
-use protocol::messages::{FaultKind, Performative};
+use protocol::messages::{FaultKind, Performative, Verdict};
 use protocol::{Generation, RobotName, Seq, Tick};
 
 /// A period: from the tick in which something began up to the tick in which it was over, which is not part of it.
@@ -63,6 +63,8 @@ pub enum Span {
     Joined(Joined),
     /// The scenario changed: a moment.
     Change(ChangeSpan),
+    /// An expectation was decided: a moment.
+    Judged(Judged),
 }
 
 /// What a state is about.
@@ -228,4 +230,17 @@ pub struct ChangeSpan {
     pub set: String,
     /// The change before it of the same part of the scenario, if there was one.
     pub before: Option<String>,
+}
+
+/// The verdict about an expectation.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Judged {
+    /// The tick in which it was decided.
+    pub tick: Tick,
+    /// Name of the expectation.
+    pub expectation: String,
+    /// What was decided.
+    pub verdict: Verdict,
+    /// Why, in words.
+    pub because: String,
 }

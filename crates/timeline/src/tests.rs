@@ -148,6 +148,10 @@ fn in_words(span: &Span) -> String {
         Span::Guest(visit) => format!("guest {} {}", visit.guest, when(visit.period)),
         Span::Joined(joined) => format!("joined {:?} in {}", joined.generation, joined.tick),
         Span::Change(change) => format!("{} after {:?}", change.set, change.before),
+        Span::Judged(judged) => format!(
+            "{} {} in {}",
+            judged.expectation, judged.verdict, judged.tick
+        ),
     }
 }
 
@@ -319,12 +323,12 @@ fn counts_are_by_robot_and_by_link() {
         sent(2, "go"),
         delivered(1),
         dropped(2, Cause::Loss),
-        // What is of no robot and no link.
-        Event::Judged {
-            expectation: "x".to_owned(),
-            verdict: Verdict::Pass,
-            because: String::new(),
+        Event::GuestEntered {
+            guest: 0,
+            at: Default::default(),
         },
+        // What is of no robot, no link and no guest.
+        judged(),
         Event::End {
             reason: End::Finished,
             because: None,
@@ -347,6 +351,20 @@ fn counts_are_by_robot_and_by_link() {
     assert_eq!((other.received, other.dropped), (1, 1));
     let link = &counts.links[&(a(), name("B"))];
     assert_eq!((link.sent, link.delivered, link.lost()), (2, 1, 1));
+    assert_eq!((counts.guests_entered, counts.guests_left), (1, 0));
+}
+
+fn judged() -> Event {
+    Event::Judged {
+        expectation: "x".to_owned(),
+        verdict: Verdict::Pass,
+        because: String::new(),
+    }
+}
+
+#[test]
+fn a_verdict_is_a_moment() {
+    assert_eq!(spans(&[(3, judged())]), ["x pass in 3"]);
 }
 
 /// A robot without emotions reports an empty one.

@@ -99,8 +99,8 @@ impl Items {
             Span::Cut(cut) => self.cuts.push(cut),
             Span::QueriesLost(lost) => self.queries.push(lost),
             Span::Command(command) => self.commands.push(command),
-            // Guests have no line of their own in a diagram.
-            Span::Guest(_) => {}
+            // Guests and expectations have no line of their own in a diagram.
+            Span::Guest(_) | Span::Judged(_) => {}
             Span::Joined(joined) => self.joined.push(joined),
             Span::Change(change) => self.changes.push(change),
         }
