@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
-use std::io::{ErrorKind, Write};
+use std::io::Write;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -16,8 +16,6 @@ use lab::LabError;
 use lab::branch::{Branch, Trunk};
 use lab::run::RobotMaker;
 use protocol::{Event, RunName, Tick};
-use record::folder::check_no_links;
-use record::names::WHY;
 use record::{EpochFiles, RunFolder};
 use scenario::{ChanceKind, Scenario};
 use serde::{Deserialize, Serialize};
@@ -105,7 +103,7 @@ pub fn why(
     // The file is that of the question; the key in it tells whether what it has holds for this run and this program.
     let name = file_name(&asked.question);
     let key = key(&asked, &digest)?;
-    let place = folder.file(WHY);
+    let place = folder.make_why()?;
     let (outcomes, kept) = OutcomeFile::open(&place, &name, &key)?;
     let mut sampler = Sampler {
         asked: &asked,
@@ -212,13 +210,7 @@ struct PlayedFork {
 impl OutcomeFile {
     /// Opens the file of a question, and reads what was played for it before. A file of another version is begun anew.
     fn open(folder: &Path, name: &str, key: &str) -> Result<(Outcomes, Self), LabError> {
-        if let Err(error) = std::fs::create_dir(folder)
-            && error.kind() != ErrorKind::AlreadyExists
-        {
-            return Err(unwritable(folder, &error));
-        }
         let path = folder.join(format!("{name}.jsonl"));
-        check_no_links(folder).map_err(LabError::Record)?;
         let text = std::fs::read_to_string(&path).unwrap_or_default();
         let head = format!("{{\"key\":\"{key}\"}}\n");
 

@@ -419,14 +419,29 @@ impl RunFolder {
     /// # Errors
     /// [`RecordError`] if a file cannot be written.
     pub fn fill(&self, scenario: &Scenario) -> Result<(), RecordError> {
-        let logs = self.file(LOGS);
-        match std::fs::create_dir(&logs) {
-            Err(error) if error.kind() != ErrorKind::AlreadyExists => {
-                return Err(self.failed("make", &error));
-            }
-            _ => {}
-        }
+        self.make_within(LOGS)?;
         self.write_scenario(scenario)
+    }
+
+    /// The folder of the answers about the run, which is made if it is not there.
+    ///
+    /// # Errors
+    /// [`RecordError`] if it cannot be made, or is a link or has one.
+    pub fn make_why(&self) -> Result<PathBuf, RecordError> {
+        let why = self.make_within(WHY)?;
+        check_no_links(&why)?;
+        Ok(why)
+    }
+
+    /// Makes a folder in the folder, unless there is something with its name.
+    fn make_within(&self, name: &str) -> Result<PathBuf, RecordError> {
+        let folder = Self::at(self.file(name));
+        match std::fs::create_dir(&folder.path) {
+            Err(error) if error.kind() != ErrorKind::AlreadyExists => {
+                Err(folder.failed("make", &error))
+            }
+            _ => Ok(folder.path),
+        }
     }
 
     /// Makes the folder, which must not exist, with the scenario.
