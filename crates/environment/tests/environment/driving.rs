@@ -1,22 +1,17 @@
 //! Robots that drive like wheels: what they are told, what stops them, and what does not count.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests")]
-
-mod common;
-
 use std::collections::BTreeMap;
 use std::convert::Infallible;
 use std::f64::consts::FRAC_PI_4;
-use std::path::Path;
 use std::sync::Arc;
 
-use config::Source;
 use environment::{Event, Simulation, TickRecord};
 use lockstep::{Bulletin, Exchange, IncarnationNotice, TickOutcome};
+use protocol::Tick;
 use protocol::event::Blocker;
 use protocol::messages::{CommandText, Point, Pose, Report, TickUpdate, Velocity};
-use protocol::{RobotName, Tick};
-use scenario::Scenario;
+
+use crate::common::{name, report, scenario};
 
 /// Robots A and B that propose what a closure says, and the news of A. `None` is a tick without a report.
 struct Robots<F> {
@@ -42,7 +37,7 @@ impl<F: FnMut(&str, Tick, &mut Report) -> bool> Exchange<TickUpdate, Arc<Report>
             if robot == "A" {
                 self.news.push(news);
             }
-            let mut report = common::report(tick, here);
+            let mut report = report(tick, here);
             if (self.act)(robot, tick, &mut report) {
                 outcome.reports.insert(name, (Arc::new(report), Vec::new()));
             }
@@ -66,10 +61,6 @@ fn hall(drive: &str) -> String {
 
 const LIMITS: &str = "{ max_turn = \"90 deg/s\", max_acceleration = \"0.5 m/s2\" }";
 
-fn name(name: &str) -> RobotName {
-    RobotName::new(name).unwrap()
-}
-
 fn velocity(linear_mps: f64, angular_radps: f64) -> Option<Velocity> {
     Some(Velocity {
         linear_mps,
@@ -83,12 +74,7 @@ fn play(
     ticks: Tick,
     act: impl FnMut(&str, Tick, &mut Report) -> bool,
 ) -> (Simulation, Vec<TickUpdate>, Vec<TickRecord>) {
-    let source = Source {
-        name: "test".into(),
-        text: text.into(),
-    };
-    let scenario = Scenario::parse(&source, Path::new(".")).unwrap();
-    let mut simulation = Simulation::new(scenario, 1).unwrap();
+    let mut simulation = Simulation::new(scenario(text), 1).unwrap();
     let mut robots = Robots {
         act,
         news: Vec::new(),

@@ -1,12 +1,7 @@
 //! Payloads and broadcasts: what becomes of them, and what the record has of them.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests")]
-
-mod common;
-
 use std::collections::BTreeMap;
 use std::convert::Infallible;
-use std::path::Path;
 use std::sync::Arc;
 
 use environment::{Event, Simulation, TickRecord};
@@ -15,9 +10,9 @@ use protocol::event::Cause;
 use protocol::messages::{CommandText, MAX_PAYLOAD_BYTES, Payload, Report, Target, TickUpdate};
 use protocol::{RobotName, Tick, encode};
 use record::Entry;
-use scenario::Scenario;
-use scenario::diagnostic::Source;
 use serde_json::{Value, json};
+
+use crate::common::{report, scenario};
 
 type Commands = Vec<Sent<CommandText>>;
 
@@ -50,7 +45,7 @@ impl<F: Fn(&str, Tick) -> Commands> Exchange<TickUpdate, Arc<Report>, CommandTex
             let commands = (self.send)(name.as_str(), tick);
             let report = Report {
                 commands: commands.len() as u32,
-                ..common::report(tick, protocol::messages::Point::default())
+                ..report(tick, protocol::messages::Point::default())
             };
             outcome
                 .reports
@@ -85,13 +80,7 @@ fn simulation(robots: &[&str], network: &str) -> Simulation {
             1 + index
         );
     }
-    let source = Source {
-        name: "test".into(),
-        text,
-    };
-    let scenario = Scenario::parse(&source, Path::new("."));
-    let scenario = scenario.unwrap_or_else(|error| panic!("{}", error.in_words()));
-    Simulation::new(scenario, 1).unwrap()
+    Simulation::new(scenario(&text), 1).unwrap()
 }
 
 fn play<F: Fn(&str, Tick) -> Commands>(

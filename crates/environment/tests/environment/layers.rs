@@ -1,13 +1,5 @@
 //! Layers: how they change by themselves, what robots sense of them, what they do to them, and in which order.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests")]
-
-mod actors;
-mod common;
-
-use std::path::Path;
-
-use actors::Actors;
 use base64::Engine;
 use environment::layers::Layers;
 use environment::{Event, Simulation, recorded};
@@ -15,9 +7,10 @@ use proptest::prelude::*;
 use protocol::messages::{
     LayerAction, LayerFrame, LayerRefusal, LayerResult, MAX_SENSED_CELLS, Point, Report,
 };
-use protocol::{RobotName, RunName};
-use scenario::Scenario;
-use scenario::diagnostic::Source;
+use protocol::RunName;
+
+use crate::actors::Actors;
+use crate::common::{name, parse, scenario};
 
 /// A layer of 6 by 4 cells of 1 m, with a spike of 16 in column 2 and row 1, and one that no robot reaches.
 const FILE: &str = r#"
@@ -46,18 +39,6 @@ name = "C"
 at = ["5.5 m", "3.5 m"]
 "#;
 const COLUMNS: usize = 6;
-
-fn scenario(text: &str) -> Scenario {
-    let source = Source {
-        name: "test".into(),
-        text: text.into(),
-    };
-    Scenario::parse(&source, Path::new(".")).unwrap()
-}
-
-fn name(name: &str) -> RobotName {
-    RobotName::new(name).unwrap()
-}
 
 fn dust(layers: &Layers) -> Vec<f64> {
     layers.cells("dust").unwrap().to_vec()
@@ -420,8 +401,7 @@ proptest! {
             "[field]\nsize = [\"60 m\", \"60 m\"]\n[[layer]]\nname = \"dust\"\ncell = \"1 m\"\nrange = \"{cells_in_range} m\"\n\
              value = {spread:?}\n"
         );
-        let source = Source { name: "test".into(), text };
-        match Scenario::parse(&source, Path::new(".")) {
+        match parse(&text) {
             Ok(scenario) => {
                 let near = Layers::new(&scenario).near(Point::new(x, y));
                 let cells: usize = near.iter().map(|layer| layer.cells().count()).sum();

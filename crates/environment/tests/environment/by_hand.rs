@@ -1,12 +1,7 @@
 //! What a person does to a run in progress: it is said in the words of the scenario, and a record of it gives the same run again.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests")]
-
-mod common;
-
 use std::collections::BTreeMap;
 use std::convert::Infallible;
-use std::path::Path;
 use std::sync::Arc;
 
 use environment::{Event, Simulation, TickRecord};
@@ -17,31 +12,19 @@ use protocol::messages::{
 };
 use protocol::{RobotName, Tick};
 use scenario::Scenario;
-use scenario::diagnostic::Source;
+
+use crate::common::{self, name, report};
 
 const ROBOTS: &str = "[[robot]]\nname = \"A\"\nat = [\"2 m\", \"2 m\"]\n[[robot]]\nname = \"B\"\nat = [\"4 m\", \"2 m\"]\n\
                       [[robot]]\nname = \"C\"\nat = [\"6 m\", \"2 m\"]\n";
 const TICKS: Tick = 12;
 
-fn name(name: &str) -> RobotName {
-    RobotName::new(name).unwrap()
-}
-
 fn names(all: &[&str]) -> Vec<RobotName> {
     all.iter().copied().map(name).collect()
 }
 
-fn parse(text: String) -> Scenario {
-    let source = Source {
-        name: "test".to_owned(),
-        text,
-    };
-    let scenario = Scenario::parse(&source, Path::new("."));
-    scenario.unwrap_or_else(|error| panic!("{}", error.in_words()))
-}
-
 fn scenario(more: &str) -> Scenario {
-    parse(format!("duration = \"6 s\"\n{more}\n{ROBOTS}"))
+    common::scenario(&format!("duration = \"6 s\"\n{more}\n{ROBOTS}"))
 }
 
 /// Robots that stay; A sends B a command in every tick.
@@ -76,7 +59,7 @@ impl Exchange<TickUpdate, Arc<Report>, CommandText> for Robots {
             }
             let report = Report {
                 commands: commands.len() as u32,
-                ..common::report(tick, *at)
+                ..report(tick, *at)
             };
             outcome
                 .reports
@@ -270,7 +253,7 @@ fn links_are_cut_and_healed_one_by_one() {
 fn a_run_by_hand_can_be_told_as_a_scenario() {
     let (by_hand, records) = play_by_hand(scenario(""), &everything());
     let told = by_hand.scenario().to_toml().unwrap();
-    let (_, again) = play(parse(told.clone()), |_, _| ());
+    let (_, again) = play(common::scenario(&told), |_, _| ());
     assert_eq!(as_scripted(&records), as_scripted(&again), "{told}");
     assert!(told.contains("[[change]]"), "{told}");
 

@@ -1,13 +1,7 @@
 //! The simulated network: what it does is drawn from the seed, message by message, and told.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests")]
-
-mod commands;
-mod media;
-
 use std::collections::BTreeMap;
 use std::iter::zip;
-use std::path::Path;
 
 use environment::medium::{Medium, NetworkDecisions};
 use protocol::event::Cause;
@@ -15,22 +9,15 @@ use protocol::messages::Point;
 use protocol::random::{stream, unit};
 use protocol::{Event, RobotName};
 use scenario::Scenario;
-use scenario::diagnostic::{FileError, Source};
+use scenario::diagnostic::FileError;
 
-use commands::{command, name};
-use media::medium_of;
+use crate::common::{self, command, medium_of, name};
 
 const ROBOTS: &str = "[[robot]]\nname = \"A\"\nat = [\"2 m\", \"2 m\"]\n[[robot]]\nname = \"B\"\nat = [\"4 m\", \"2 m\"]\n\
                       [[robot]]\nname = \"C\"\nat = [\"6 m\", \"2 m\"]\n";
 
 fn parse(network: &str) -> Result<Scenario, FileError> {
-    Scenario::parse(
-        &Source {
-            name: "test".into(),
-            text: text(network),
-        },
-        Path::new("."),
-    )
+    common::parse(&text(network))
 }
 
 fn text(network: &str) -> String {
@@ -594,14 +581,7 @@ fn the_resolved_file_has_the_same_network() {
                    [[network.duplicate]]\nfrom = \"B\"\nto = \"C\"\nnumber = 2\n";
     let scenario = parse(network).unwrap();
     let text = scenario.to_toml().unwrap();
-    let again = Scenario::parse(
-        &Source {
-            name: "again".into(),
-            text,
-        },
-        Path::new("."),
-    )
-    .unwrap();
+    let again = common::scenario(&text);
 
     assert_eq!(again.network, scenario.network);
 }

@@ -1,10 +1,5 @@
 //! The radios of the simulated network: their models over commands and queries, and why messages are lost.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests")]
-
-mod commands;
-mod media;
-
 use std::collections::BTreeMap;
 
 use environment::medium::{ForcedVerdict, Medium, NetworkDecisions, NetworkVerdict, SentCommand};
@@ -14,8 +9,7 @@ use protocol::{Event, RobotName};
 use radio::outage;
 use world::Crossed;
 
-use commands::{command, name};
-use media::medium_of;
+use crate::common::{command, medium_of, name};
 
 /// Quantile of the normal distribution for bounds of 99 %.
 const Z_99: f64 = 2.576;

@@ -1,12 +1,7 @@
 //! One tick: the order of things, what robots are told, what is recorded. With robots made of closures.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests")]
-
-mod common;
-
 use std::collections::BTreeMap;
 use std::convert::Infallible;
-use std::path::Path;
 use std::sync::Arc;
 
 use environment::{Event, Simulation, TickRecord};
@@ -16,8 +11,8 @@ use protocol::messages::{
     CommandText, Delivery, End, Performative, Point, Report, SensedKind, TickUpdate,
 };
 use protocol::{RobotName, RunName, Tick};
-use scenario::Scenario;
-use scenario::diagnostic::Source;
+
+use crate::common::{name, report, scenario};
 
 /// News of a tick, by robot.
 type AllNews = BTreeMap<RobotName, TickUpdate>;
@@ -53,7 +48,7 @@ impl<F: FnMut(&RobotName, &mut Report, &mut Commands)> Puppets<F> {
         let corrected = news.get(name).and_then(|news| news.correction);
 
         let proposal = corrected.map_or(self.proposals[name], |correction| correction.location);
-        common::report(tick, proposal)
+        report(tick, proposal)
     }
 }
 
@@ -95,13 +90,7 @@ const TWO: &str = "duration = \"10 s\"\n[[robot]]\nname = \"A\"\nat = [\"2 m\", 
                    [[robot]]\nname = \"B\"\nat = [\"4 m\", \"2 m\"]\n";
 
 fn simulation(text: &str) -> Simulation {
-    let source = Source {
-        name: "test".into(),
-        text: text.into(),
-    };
-    let scenario = Scenario::parse(&source, Path::new(".")).unwrap();
-
-    Simulation::new(scenario, 1).unwrap()
+    Simulation::new(scenario(text), 1).unwrap()
 }
 
 fn play(
@@ -117,10 +106,6 @@ fn play(
     }
 
     (simulation, puppets.news, records)
-}
-
-fn name(name: &str) -> RobotName {
-    RobotName::new(name).unwrap()
 }
 
 fn command(to: &str, text: &str) -> Sent<CommandText> {

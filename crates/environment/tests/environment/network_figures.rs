@@ -2,10 +2,7 @@
 //!
 //! The assertions over more draws are in `crates/radio/tests` and `crates/environment/tests`; this one shows them.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests")]
-
-mod media;
-#[path = "../../pictures/tests/shipped/mod.rs"]
+#[path = "../../../pictures/tests/shipped/mod.rs"]
 mod shipped;
 
 use std::collections::BTreeSet;
@@ -17,8 +14,9 @@ use protocol::messages::{CommandText, Point};
 use protocol::random::{stream, unit};
 use radio::{SendQueue, Transmitter, outage};
 
-use media::medium_of;
 use shipped::assert_figure_is_shipped;
+
+use crate::common::medium_of;
 
 /// Quantile of the normal distribution for intervals of 99 %.
 const Z_99: f64 = 2.576;

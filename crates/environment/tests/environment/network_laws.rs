@@ -1,13 +1,9 @@
 //! The simulated network against the laws of its models and of protocols over it: retries, bursts, maximum consensus, rumors.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests")]
 #![expect(clippy::print_stdout, reason = "a test prints what it measures")]
-
-mod common;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::convert::Infallible;
-use std::path::Path;
 use std::sync::Arc;
 
 use environment::Simulation;
@@ -18,7 +14,8 @@ use protocol::random::{stream, unit};
 use protocol::{RobotName, Tick};
 use radio::{outage, regularized_gamma};
 use scenario::Scenario;
-use scenario::diagnostic::Source;
+
+use crate::common::{self, report};
 
 /// Quantile of the normal distribution for bounds of 99 %.
 const Z_99: f64 = 2.576;
@@ -30,11 +27,7 @@ fn scenario(network: &str, places: &[(f64, f64)]) -> Scenario {
     for (index, (x, y)) in places.iter().enumerate() {
         text += &format!("[[robot]]\nname = \"R{index:02}\"\nat = [\"{x} m\", \"{y} m\"]\n");
     }
-    let source = Source {
-        name: "test".into(),
-        text,
-    };
-    Scenario::parse(&source, Path::new(".")).unwrap_or_else(|error| panic!("{}", error.in_words()))
+    common::scenario(&text)
 }
 
 /// Places of robots in rows, 2 m apart.
@@ -138,7 +131,7 @@ where
                     });
                 }
             }
-            let mut report = common::report(tick, self.places[index]);
+            let mut report = report(tick, self.places[index]);
             report.commands = commands.len() as u32;
             outcome
                 .reports

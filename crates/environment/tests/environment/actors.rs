@@ -9,7 +9,7 @@ use lockstep::{Bulletin, Exchange, IncarnationNotice, TickOutcome};
 use protocol::RobotName;
 use protocol::messages::{CommandText, Point, Report, TickUpdate};
 
-use crate::common;
+use crate::common::report;
 
 /// Robots that stay and do this in these ticks, and the news they got.
 pub(crate) struct Actors<A> {
@@ -53,7 +53,7 @@ impl<A: Clone> Exchange<TickUpdate, Arc<Report>, CommandText> for Actors<A> {
 
         let mut outcome = TickOutcome::default();
         for (name, place) in &self.places {
-            let mut report = common::report(tick, *place);
+            let mut report = report(tick, *place);
             let actions = self.actions.get(&(tick, name.clone()));
             (self.put)(&mut report, actions.cloned().unwrap_or_default());
             let answer = (Arc::new(report), Vec::new());

@@ -1,7 +1,5 @@
 //! Scenario files with odd values: either an error with file, line and caret, or a run. Never a panic.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests")]
-
 use std::convert::Infallible;
 use std::path::Path;
 use std::sync::Arc;

@@ -1,14 +1,7 @@
 //! Sites: what robots sense of them, what they do to them, and in which order.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests")]
-
-mod actors;
-mod common;
-
 use std::collections::BTreeMap;
-use std::path::Path;
 
-use actors::Actors;
 use environment::sites::{SiteOrders, Sites};
 use environment::{Event, Simulation};
 use lockstep::IncarnationNotice;
@@ -18,8 +11,9 @@ use protocol::messages::{
     StateVariables, Variable,
 };
 use protocol::{RobotName, RunName};
-use scenario::Scenario;
-use scenario::diagnostic::Source;
+
+use crate::actors::Actors;
+use crate::common::{name, scenario};
 
 /// Two robots within 1 m of a task at 2 m, 2 m, one that is not, and a site far away.
 const FILE: &str = r#"
@@ -46,18 +40,6 @@ range = "1 m"
 on_conflict = "refuse"
 state = { stock = { start = 2, min = 0 }, done = false }
 "#;
-
-fn scenario(text: &str) -> Scenario {
-    let source = Source {
-        name: "test".into(),
-        text: text.into(),
-    };
-    Scenario::parse(&source, Path::new(".")).unwrap()
-}
-
-fn name(name: &str) -> RobotName {
-    RobotName::new(name).unwrap()
-}
 
 /// What a robot does, as it stands within range of T and U.
 type Orders = Vec<(RobotName, Vec<SiteAction>)>;

@@ -1,17 +1,12 @@
 //! Sensing: field of view, walls that hide, misses, noise, and rays.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests")]
-
-mod actors;
-mod common;
-
-use std::path::Path;
-
-use actors::Actors;
 use environment::Simulation;
 use protocol::messages::{Point, SensedKind, TickUpdate};
 use scenario::Scenario;
-use scenario::diagnostic::{FileError, Source};
+use scenario::diagnostic::FileError;
+
+use crate::actors::Actors;
+use crate::common::parse;
 
 /// A at 2 m, 2 m looks around; B is 2 m to its right, behind an obstacle; C is 2 m above it; a site is at C.
 const FILE: &str = r#"
@@ -39,14 +34,6 @@ range = "3 m"
 
 fn scenario(sensing: &str) -> Result<Scenario, FileError> {
     parse(&format!("{FILE}{sensing}\n"))
-}
-
-fn parse(file: &str) -> Result<Scenario, FileError> {
-    let source = Source {
-        name: "test".into(),
-        text: file.to_owned(),
-    };
-    Scenario::parse(&source, Path::new("."))
 }
 
 /// The news of A in ticks 0 to `ticks`, while it looks in a direction.
@@ -192,11 +179,7 @@ fn rules_of_sensing_are_kept_and_checked() {
     let text = "field_of_view = \"120 deg\"\nwalls_hide = true\nmisses = 0.1\nnoise = \"0.1 m\"\nrays = { count = 720 }";
     let first = scenario(text).unwrap();
     assert_eq!(first.sensing.rays.unwrap().range_m, 3.0);
-    let source = Source {
-        name: "again".into(),
-        text: first.to_toml().unwrap(),
-    };
-    let again = Scenario::parse(&source, Path::new(".")).unwrap();
+    let again = parse(&first.to_toml().unwrap()).unwrap();
     assert_eq!(again.sensing, first.sensing);
     // What is not used is not written: the records of older scenarios keep their bytes.
     let plain = scenario("").unwrap().to_toml().unwrap();
