@@ -1,7 +1,10 @@
-//! The folder of a run: one function makes it. It never follows or replaces a link, and never takes what another command made.
+//! The folder of a run and its files. No link is followed or replaced.
 //!
-//! A folder is made by one call of the system, so two processes never get the same one. It is in use while one of its two locks is
-//! held: that of the process that writes the record, and that of the launcher, which outlives it.
+//! A folder is in use while one of its two locks is held: that of the process that writes the record, and that of the launcher, which
+//! outlives it.
+
+pub(crate) mod new_run;
+mod replaced;
 
 use std::ffi::OsStr;
 use std::fs::File;
@@ -49,48 +52,6 @@ const LOG_ENDING: &str = ".log";
 pub const CONSOLE_KEPT: &str = "console.kept";
 /// Name of the file in which the console reads why the run has failed, among the logs.
 pub const FAILED: &str = "failed.json";
-/// Where the record of a run is that another one replaces, until that one has begun.
-const REPLACED: &str = ".replaced";
-/// The same while its files are moved, to there or back: both places together have the record.
-const MOVED: &str = ".replaced-moved";
-
-/// What a new run does where an entry with its name exists.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum IfTaken {
-    /// It takes the next free name, as in `hall-2`.
-    #[default]
-    Number,
-    /// It replaces the record of a run that is over. Anything else is an error.
-    Replace,
-    /// It is an error: other processes know the run by its name.
-    Refuse,
-    /// The folder was made for it by [`RunFolder::make`], in another process.
-    Reserved,
-}
-
-/// The folder of a new run.
-#[derive(Debug)]
-pub struct NewRun {
-    /// The name of the run, which may be another one than was asked for.
-    pub run: RunName,
-    /// Its folder.
-    pub folder: RunFolder,
-    /// While it is held, no other process writes a record into the folder.
-    pub lock: RunLock,
-    /// A sentence for people, if the name is another one than was asked for.
-    pub notice: Option<String>,
-    /// Where the link to the latest run led before.
-    latest: Option<PathBuf>,
-}
-
-/// The folder of a new run that another process is to take.
-#[derive(Debug)]
-pub struct Reserved {
-    /// The name of the run.
-    pub run: RunName,
-    /// Its folder.
-    pub folder: RunFolder,
-}
 
 /// The folder of a run: `OUT/NAME`.
 #[derive(Debug, Clone)]
@@ -172,214 +133,6 @@ impl RunFolder {
         })
     }
 
-    /// Makes the folder of a new run under `out`, without content. Where a run that is over is to be replaced, its record is kept aside
-    /// until the new run has begun ([`Self::forget_replaced`]), or is put back ([`Self::restore_replaced`]).
-    ///
-    /// # Errors
-    /// [`RecordError`] if the folder cannot be made, or the name is taken and `if_taken` does not help.
-    pub fn make(out: &Path, run: &RunName, if_taken: IfTaken) -> Result<NewRun, RecordError> {
-        std::fs::create_dir_all(out).map_err(|error| {
-            RecordError::folder(format!("cannot make the folder {}: {error}", out.display()))
-        })?;
-
-        let folder = Self::new(out, run);
-
-        match if_taken {
-            IfTaken::Reserved => {
-                let lock = folder.take_reserved()?;
-                return Ok(NewRun::named(run, folder, lock));
-            }
-            IfTaken::Replace if folder.is_taken() => {
-                let lock = folder.take_over()?;
-                return Ok(NewRun::named(run, folder, lock));
-            }
-            IfTaken::Replace | IfTaken::Refuse | IfTaken::Number => {}
-        }
-
-        // One call of the system tells whether the name was free. To look first would let two processes
-        // find it so.
-        if let Some(lock) = folder.try_make()? {
-            return Ok(NewRun::named(run, folder, lock));
-        }
-        if if_taken != IfTaken::Number {
-            let place = folder.path.display();
-            return Err(
-                RecordError::folder(format!("{place} exists already")).with_help(
-                    "choose another --run or --out; --replace replaces a run that is over",
-                ),
-            );
-        }
-        Self::make_numbered(out, run)
-    }
-
-    fn make_numbered(out: &Path, asked: &RunName) -> Result<NewRun, RecordError> {
-        let mut number = 2;
-        loop {
-            let run = asked.numbered(number);
-            let folder = Self::new(out, &run);
-            if let Some(lock) = folder.try_make()? {
-                let taken = out.join(asked.as_str());
-                return Ok(NewRun {
-                    notice: Some(format!(
-                        "the run is {run}: {} exists already, and only --replace replaces a run that is over",
-                        taken.display()
-                    )),
-                    ..NewRun::named(&run, folder, lock)
-                });
-            }
-
-            // Another process may have taken this one as well. Then the next one is tried.
-            number += 1;
-        }
-    }
-
-    /// The name that a new run would get now.
-    #[must_use]
-    pub fn next_name(out: &Path, run: &RunName, if_taken: IfTaken) -> RunName {
-        let is_free = |run: &RunName| !Self::new(out, run).is_taken();
-        if if_taken != IfTaken::Number || is_free(run) {
-            return run.clone();
-        }
-        let mut names = (2..).map(|number| run.numbered(number));
-        names.find(is_free).unwrap_or_else(|| run.clone())
-    }
-
-    /// Whether there is anything at the path, also a link that leads nowhere.
-    #[must_use]
-    pub fn is_taken(&self) -> bool {
-        self.path.symlink_metadata().is_ok()
-    }
-
-    /// Makes the folder and locks it; `None` if there is anything at the path.
-    fn try_make(&self) -> Result<Option<RunLock>, RecordError> {
-        match std::fs::create_dir(&self.path) {
-            Ok(()) => {}
-            Err(error) if error.kind() == ErrorKind::AlreadyExists => return Ok(None),
-            Err(error) => return Err(self.failed("make", &error)),
-        }
-        self.lock().map(Some)
-    }
-
-    /// Takes a folder that another process made for this one: it has no record.
-    fn take_reserved(&self) -> Result<RunLock, RecordError> {
-        self.check_itself()?;
-        self.check_links()?;
-        // Links are looked for before anything is opened for writing, the lock included.
-        let lock = self.lock()?;
-        // Under the lock: no other process can begin a record any more.
-        if self.file(EVENTS).exists() {
-            let place = self.path.display();
-            return Err(RecordError::folder(format!("{place} has a run already")));
-        }
-        Ok(lock)
-    }
-
-    /// Takes the folder of a run that is over, and puts its record aside. Files that no run makes stay.
-    fn take_over(&self) -> Result<RunLock, RecordError> {
-        let place = self.path.display();
-        let is_folder = self.path.symlink_metadata().is_ok_and(|at| at.is_dir());
-        if !is_folder || !(self.has_record() || self.has_replaced()) {
-            let error =
-                RecordError::folder(format!("{place} is there and is not the folder of a run"));
-            return Err(error.with_help("choose another --run or --out, or move it away"));
-        }
-        self.check_links()?;
-
-        // First that of the launcher: its simulator may be about to take the other one.
-        let _launcher = self.lock_of_launcher()?;
-        let lock = self.lock()?;
-        // Under both locks: neither a launcher nor a simulator is at work in the folder. A launch that was killed may have left a
-        // record aside.
-        self.restore_replaced()?;
-        self.put_aside()
-            .map_err(|error| self.failed("replace the record in", &error))?;
-        Ok(lock)
-    }
-
-    fn put_aside(&self) -> std::io::Result<()> {
-        // File by file, under a name that does not claim that all are there. What a process that is killed here has moved is put back
-        // by the next one that takes the folder.
-        let moved = self.file(MOVED);
-        for file in self.files() {
-            let Ok(name) = file.strip_prefix(&self.path) else {
-                continue;
-            };
-            let aside = moved.join(name);
-            if file.symlink_metadata().is_ok() {
-                std::fs::create_dir_all(aside.parent().unwrap_or(&moved))?;
-                std::fs::rename(&file, aside)?;
-            }
-        }
-        // The new name states that the record is complete there.
-        match std::fs::rename(&moved, self.file(REPLACED)) {
-            Err(error) if error.kind() == ErrorKind::NotFound => Ok(()),
-            renamed => renamed,
-        }
-    }
-
-    /// Puts back the record that this run was to replace, unless the run has begun. Returns whether it did.
-    ///
-    /// # Errors
-    /// [`RecordError`] if a file cannot be moved.
-    pub fn restore_replaced(&self) -> Result<bool, RecordError> {
-        if self.file(REPLACED).is_dir() {
-            if self.has_begun() {
-                self.forget_replaced()?;
-                return Ok(false);
-            }
-            self.clear()?;
-        }
-        self.try_restore()
-            .map_err(|error| self.failed("put the record back into", &error))
-    }
-
-    fn try_restore(&self) -> std::io::Result<bool> {
-        // First the name, by one call of the system: a process that is killed here must not take what is back for a new record.
-        let moved = self.file(MOVED);
-        match std::fs::rename(self.file(REPLACED), &moved) {
-            Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
-            _ if !moved.is_dir() => return Ok(false),
-            _ => {}
-        }
-
-        // The inner folders first: a folder can be removed only when it is empty. A process that is killed in between leaves the rest
-        // under this name, and the next one goes on.
-        for folder in [moved.join(LOGS), moved.join(WHY), moved.clone()] {
-            let Ok(entries) = std::fs::read_dir(&folder) else {
-                continue; // A run without logs of processes, or without answers.
-            };
-            for entry in entries {
-                let file = entry?.path();
-                if let Ok(name) = file.strip_prefix(&moved)
-                    && !file.is_dir()
-                {
-                    std::fs::rename(&file, self.path.join(name))?;
-                }
-            }
-            std::fs::remove_dir(&folder)?;
-        }
-        Ok(true)
-    }
-
-    /// Removes the record that this run replaces, if there is one: the run has begun.
-    ///
-    /// # Errors
-    /// [`RecordError`] if a file cannot be removed.
-    pub fn forget_replaced(&self) -> Result<(), RecordError> {
-        match std::fs::remove_dir_all(self.file(REPLACED)) {
-            Err(error) if error.kind() != ErrorKind::NotFound => {
-                Err(self.failed("remove the record replaced in", &error))
-            }
-            _ => Ok(()),
-        }
-    }
-
-    fn has_replaced(&self) -> bool {
-        [REPLACED, MOVED]
-            .iter()
-            .any(|name| self.file(name).is_dir())
-    }
-
     /// Whether a tick of the run is complete. A run does not begin where a robot refuses its parameters, for example.
     #[must_use]
     pub fn has_begun(&self) -> bool {
@@ -442,23 +195,6 @@ impl RunFolder {
             }
             _ => Ok(folder.path),
         }
-    }
-
-    /// Makes the folder, which must not exist, with the scenario.
-    ///
-    /// # Errors
-    /// [`RecordError`] as [`Self::make`] and [`Self::fill`].
-    pub fn create(&self, scenario: &Scenario) -> Result<RunLock, RecordError> {
-        let out = self.path.parent().unwrap_or(Path::new(""));
-        let made = Self::make(out, &self.named()?, IfTaken::Refuse)?;
-        self.fill(scenario)?;
-        Ok(made.lock)
-    }
-
-    /// The name of a folder that may not exist yet.
-    fn named(&self) -> Result<RunName, RecordError> {
-        let name = self.path.file_name().unwrap_or_default().to_string_lossy();
-        RunName::new(&name).map_err(RecordError::folder)
     }
 
     /// Removes the record of a run.
@@ -543,16 +279,6 @@ impl RunFolder {
             }
         }
         Ok(())
-    }
-
-    fn discard(&self) {
-        let discarded = match self.restore_replaced() {
-            Ok(false) => self.remove(),
-            restored => restored.map(drop),
-        };
-        if let Err(error) = discarded {
-            tracing::warn!("{} could not be removed: {error}", self.path.display());
-        }
     }
 
     /// The logs that a launch has written.
@@ -820,63 +546,6 @@ impl RunFolder {
 
     fn failed(&self, doing: &str, error: &std::io::Error) -> RecordError {
         RecordError::folder(format!("cannot {doing} {}: {error}", self.path.display()))
-    }
-}
-
-impl NewRun {
-    /// A run whose name is the one that was asked for.
-    fn named(run: &RunName, folder: RunFolder, lock: RunLock) -> Self {
-        Self {
-            run: run.clone(),
-            latest: std::fs::read_link(folder.path.with_file_name(LATEST)).ok(),
-            folder,
-            lock,
-            notice: None,
-        }
-    }
-
-    /// Takes back what was made for a run that has failed before a tick was complete, such as one with parameters that a robot refuses.
-    pub fn undo_unless_begun(&self) {
-        if !self.folder.has_begun() {
-            self.undo();
-        }
-    }
-
-    /// Takes back what was made for a run that has failed: its folder goes, or has the record again that it was to replace, and the link
-    /// to the latest run leads where it did.
-    pub fn undo(&self) {
-        let folder = &self.folder;
-        folder.discard();
-
-        let link = folder.path.with_file_name(LATEST);
-        let is_own = std::fs::read_link(&link)
-            .is_ok_and(|target| Some(target.as_os_str()) == folder.path.file_name());
-        if !is_own {
-            return; // Another run has begun since.
-        }
-        match &self.latest {
-            Some(latest) if link.with_file_name(latest).exists() => folder.point_latest_to(latest),
-            _ => {
-                // Without the link, runs have to be named.
-                let _unlinked = std::fs::remove_file(&link);
-            }
-        }
-    }
-
-    /// Leaves the folder to another process, which takes it with [`IfTaken::Reserved`].
-    #[must_use]
-    pub fn reserve(self) -> Reserved {
-        Reserved {
-            run: self.run,
-            folder: self.folder,
-        }
-    }
-}
-
-impl Reserved {
-    /// Removes the folder of a run that does not begin, or puts back the record that it was to replace.
-    pub fn discard(&self) {
-        self.folder.discard();
     }
 }
 

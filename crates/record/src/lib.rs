@@ -9,7 +9,8 @@ pub mod seal;
 pub mod summary;
 
 pub use error::RecordError;
-pub use folder::{EpochFiles, IfTaken, NewRun, Reserved, RunFolder, RunLock};
+pub use folder::new_run::{IfTaken, NewRun, Reserved};
+pub use folder::{EpochFiles, RunFolder, RunLock};
 pub use read::{Entry, Record};
 /// Names of the files in the folder of a run.
 pub use scenario::files as names;

@@ -4,10 +4,10 @@ use base64::Engine;
 use environment::layers::Layers;
 use environment::{Event, Simulation, recorded};
 use proptest::prelude::*;
+use protocol::RunName;
 use protocol::messages::{
     LayerAction, LayerFrame, LayerRefusal, LayerResult, MAX_SENSED_CELLS, Point, Report,
 };
-use protocol::RunName;
 
 use crate::actors::Actors;
 use crate::common::{name, parse, scenario};
