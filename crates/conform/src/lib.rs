@@ -21,7 +21,6 @@ mod body;
 mod checks;
 mod comparison;
 mod fake_peers;
-mod findings;
 mod flushing;
 mod harness;
 mod kit;
@@ -29,23 +28,22 @@ mod load;
 mod patience;
 mod process;
 mod reading;
-mod report;
-mod rules;
 mod script;
 mod seen;
 mod setting;
-mod stdio;
 mod transcript;
 mod wire;
+
+use verdicts::{findings, report, rules, stdio};
 
 pub use checks::check;
 pub use flushing::unflushed;
 pub use kit::CannotRun;
-pub use report::{
+pub use setting::{CheckSetting, PlayedLayer, RosterRobot};
+pub use verdicts::report::{
     AnswerTimes, CheckReport, KitPart, PlayedRun, RuleFailure, RuleOutcome, RuleVerdict,
 };
-pub use rules::{
+pub use verdicts::rules::{
     PAGE, ProtocolRule, RULES, STDIO_END, STDIO_FIELDS, STDIO_LOG, STDIO_RULES, rules,
 };
-pub use setting::{CheckSetting, PlayedLayer, RosterRobot};
-pub use stdio::{STDIO_VARIABLE, StdioLine};
+pub use verdicts::stdio::{STDIO_VARIABLE, StdioLine};

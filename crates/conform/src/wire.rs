@@ -67,12 +67,6 @@ impl Joining {
     }
 }
 
-impl From<BusError> for RuleFailure {
-    fn from(error: BusError) -> Self {
-        Self::new("the kit's own bus works", error.to_string())
-    }
-}
-
 /// The declarations of one run, and the queue of what arrives.
 pub(crate) struct Wire {
     bus: Bus,

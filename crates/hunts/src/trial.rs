@@ -15,7 +15,7 @@ use observe::Observation;
 use protocol::messages::{End, Verdict};
 use protocol::{Event, RobotName, RunName, Tick};
 use scenario::Scenario;
-use timeline::{CommandSpan, Judged, Span, Timeline};
+use timeline::{CommandSpan, ExpectationSpan, Span, Timeline};
 
 use super::case::FaultCase;
 use super::coverage::{CommandFate, Feature};
@@ -467,8 +467,8 @@ impl TrialNotes {
         }
     }
 
-    fn note_verdict(&mut self, judged: Judged) {
-        let Judged {
+    fn note_verdict(&mut self, judged: ExpectationSpan) {
+        let ExpectationSpan {
             tick,
             expectation,
             verdict,

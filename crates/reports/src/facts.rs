@@ -12,8 +12,8 @@ use record::EpochFiles;
 use record::Record;
 use recording::{RecordedTick, Recording, RecordingError};
 use timeline::{
-    Counts, Judged, LinkCounts, Period, RobotCounts, Span, StateKind, StateOrder, StateSpan,
-    Timeline,
+    Counts, ExpectationSpan, LinkCounts, Period, RobotCounts, Span, StateKind, StateOrder,
+    StateSpan, Timeline,
 };
 
 use super::loss::LossByDistance;
@@ -53,7 +53,7 @@ pub(super) struct RunFacts {
     /// Faults, absences, cuts and changes, in the order of their beginnings.
     pub(super) disturbances: Vec<ScenarioEffect>,
     /// The verdicts about expectations, in the order in which they were decided.
-    pub(super) judged: Vec<Judged>,
+    pub(super) judged: Vec<ExpectationSpan>,
     /// The emotions and behaviors of its robots.
     pub(super) names: StateOrder,
     /// Where the robots were, if it was recorded.

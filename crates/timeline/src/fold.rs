@@ -8,8 +8,8 @@ use protocol::{Event, RobotName, Seq, Tick};
 
 use crate::names::StateOrder;
 use crate::span::{
-    Absence, ChangeSpan, CommandEnd, CommandSpan, CutSpan, FaultSpan, GuestVisit, Joined, Judged,
-    MissedTicks, Period, QueriesLost, Span, StateKind, StateSpan,
+    Absence, ChangeSpan, CommandEnd, CommandSpan, CutSpan, ExpectationSpan, FaultSpan, GuestVisit,
+    Joined, MissedTicks, Period, QueriesLost, Span, StateKind, StateSpan,
 };
 
 /// What is in progress after an event of a run. Memory is bounded by what is in progress, whatever the length of the run.
@@ -184,7 +184,7 @@ impl Timeline {
                 expectation,
                 verdict,
                 because,
-            } => vec![Span::Judged(Judged {
+            } => vec![Span::Judged(ExpectationSpan {
                 tick,
                 expectation: expectation.clone(),
                 verdict: *verdict,

@@ -23,8 +23,8 @@ pub use decision::{
 pub use fold::Timeline;
 pub use names::StateOrder;
 pub use span::{
-    Absence, ChangeSpan, CommandEnd, CommandSpan, CutSpan, FaultSpan, GuestVisit, Joined, Judged,
-    MissedTicks, Period, QueriesLost, Span, StateKind, StateSpan,
+    Absence, ChangeSpan, CommandEnd, CommandSpan, CutSpan, ExpectationSpan, FaultSpan, GuestVisit,
+    Joined, MissedTicks, Period, QueriesLost, Span, StateKind, StateSpan,
 };
 
 #[cfg(test)]

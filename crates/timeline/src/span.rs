@@ -64,7 +64,7 @@ pub enum Span {
     /// The scenario changed: a moment.
     Change(ChangeSpan),
     /// An expectation was decided: a moment.
-    Judged(Judged),
+    Judged(ExpectationSpan),
 }
 
 /// What a state is about.
@@ -234,7 +234,7 @@ pub struct ChangeSpan {
 
 /// The verdict about an expectation.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Judged {
+pub struct ExpectationSpan {
     /// The tick in which it was decided.
     pub tick: Tick,
     /// Name of the expectation.

@@ -246,7 +246,9 @@ fn limits_times_and_version_are_those_of_the_code() {
         MAX_LAYER_ACTIONS.to_string(),
         format!("{MAX_NAME_LEN} bytes"),
         format!("{MAX_TEXT_BYTES} bytes"),
+        format!("{MAX_TEXT_BYTES} bytes"),
         format!("{MAX_LINE_BYTES} bytes"),
+        MAX_ENTRIES.to_string(),
         MAX_ENTRIES.to_string(),
         format!(
             "{MAX_PAYLOAD_BYTES} bytes, {MAX_PAYLOAD_DEPTH} lists and objects within one another"

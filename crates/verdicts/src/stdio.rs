@@ -56,7 +56,7 @@ impl StdioLine {
 
 /// What was reported of all processes of the robot.
 #[derive(Default)]
-pub(crate) struct StdioReports(Mutex<Reported>);
+pub struct StdioReports(Mutex<Reported>);
 
 #[derive(Default)]
 struct Reported {
@@ -66,7 +66,7 @@ struct Reported {
 
 impl StdioReports {
     /// Takes what a process of the robot has printed. Of a robot that `cars exec` does not run, nothing is taken.
-    pub(crate) fn take(&self, output: &str) {
+    pub fn take(&self, output: &str) {
         let mut reported = self.lock();
         for line in lines(output) {
             match line {
@@ -80,12 +80,12 @@ impl StdioReports {
     }
 
     /// Whether the robot is a program that `cars exec` runs; known from its first process on.
-    pub(crate) fn is_program(&self) -> bool {
+    pub fn is_program(&self) -> bool {
         self.lock().is_program
     }
 
     /// How the rule was broken, if it was.
-    pub(crate) fn failure(&self, rule: ProtocolRule) -> Option<RuleFailure> {
+    pub fn failure(&self, rule: ProtocolRule) -> Option<RuleFailure> {
         self.lock()
             .faults
             .get(rule.name)
@@ -99,7 +99,7 @@ impl StdioReports {
 }
 
 /// The fault of one process by this rule, in what it has printed.
-pub(crate) fn fault_in(output: &str, rule: &str) -> Option<RuleFailure> {
+pub fn fault_in(output: &str, rule: &str) -> Option<RuleFailure> {
     lines(output).into_iter().find_map(|line| match line {
         StdioLine::Fault { rule: broken, came } if broken == rule => Some(failure(rule, &came)),
         _ => None,
@@ -116,7 +116,7 @@ fn failure(rule: &str, came: &str) -> RuleFailure {
 }
 
 /// What a robot has printed for people: without the reports to the kit.
-pub(crate) fn without_reports(output: &str) -> String {
+pub fn without_reports(output: &str) -> String {
     let for_people: Vec<&str> = output
         .lines()
         .filter(|line| serde_json::from_str::<StdioLine>(line).is_err())

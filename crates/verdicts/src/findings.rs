@@ -5,22 +5,22 @@ use std::collections::BTreeMap;
 use crate::report::{KitPart, RuleFailure, RuleVerdict};
 
 /// What was found, by rule.
-pub(crate) type VerdictsByRule = BTreeMap<&'static str, RuleVerdict>;
+pub type VerdictsByRule = BTreeMap<&'static str, RuleVerdict>;
 
 /// What one check finds.
 #[derive(Default)]
-pub(crate) struct Findings(pub(crate) VerdictsByRule);
+pub struct Findings(pub VerdictsByRule);
 
 impl Findings {
     /// The rule is broken. The first failure of a rule is the one that is reported.
-    pub(crate) fn fail(&mut self, rule: &'static str, failure: RuleFailure) {
+    pub fn fail(&mut self, rule: &'static str, failure: RuleFailure) {
         if !self.has_failed(rule) {
             self.0.insert(rule, RuleVerdict::Failed(failure));
         }
     }
 
     /// The failures among them, as those of a part.
-    pub(crate) fn of_part(mut self, of: KitPart) -> Self {
+    pub fn of_part(mut self, of: KitPart) -> Self {
         self.0.retain(|_, verdict| match verdict {
             RuleVerdict::Failed(failure) => {
                 failure.part = of;
@@ -32,18 +32,18 @@ impl Findings {
     }
 
     /// Whether any rule was found broken.
-    pub(crate) fn is_broken(&self) -> bool {
+    pub fn is_broken(&self) -> bool {
         let mut verdicts = self.0.values();
         verdicts.any(|verdict| matches!(verdict, RuleVerdict::Failed(_)))
     }
 
     /// Whether the rule was found broken.
-    pub(crate) fn has_failed(&self, rule: &'static str) -> bool {
+    pub fn has_failed(&self, rule: &'static str) -> bool {
         matches!(self.0.get(rule), Some(RuleVerdict::Failed(_)))
     }
 
     /// Nothing is known of rules whose checks presume another one, of the second place, that is broken.
-    pub(crate) fn presume(&mut self, presumed: &[(&'static str, &'static str)]) {
+    pub fn presume(&mut self, presumed: &[(&'static str, &'static str)]) {
         for (rule, other) in presumed {
             if self.has_failed(other) && self.has_failed(rule) {
                 self.0.remove(rule);
@@ -53,12 +53,12 @@ impl Findings {
     }
 
     /// The rule holds, unless it was found broken.
-    pub(crate) fn pass(&mut self, rule: &'static str) {
+    pub fn pass(&mut self, rule: &'static str) {
         self.0.entry(rule).or_insert(RuleVerdict::Passed);
     }
 
     /// The rule holds, or is broken.
-    pub(crate) fn settle(&mut self, rule: &'static str, result: Result<(), RuleFailure>) {
+    pub fn settle(&mut self, rule: &'static str, result: Result<(), RuleFailure>) {
         match result {
             Ok(()) => self.pass(rule),
             Err(failure) => self.fail(rule, failure),
@@ -66,14 +66,14 @@ impl Findings {
     }
 
     /// This robot gives no occasion to see it.
-    pub(crate) fn skip(&mut self, rule: &'static str, reason: &str) {
+    pub fn skip(&mut self, rule: &'static str, reason: &str) {
         self.0.entry(rule).or_insert_with(|| RuleVerdict::Skipped {
             reason: reason.to_owned(),
         });
     }
 
     /// Adds what another check found: the worse verdict counts.
-    pub(crate) fn merge(&mut self, other: Self) {
+    pub fn merge(&mut self, other: Self) {
         for (rule, verdict) in other.0 {
             match verdict {
                 RuleVerdict::Failed(failure) => self.fail(rule, failure),
@@ -89,7 +89,7 @@ impl Findings {
 
     /// A check of these rules came to its end, or broke off: then the first rule gets the reason, and nothing is known of
     /// the others.
-    pub(crate) fn close(&mut self, rules: &[&'static str], end: Result<(), RuleFailure>) {
+    pub fn close(&mut self, rules: &[&'static str], end: Result<(), RuleFailure>) {
         let failure = match end {
             Ok(()) => {
                 rules.iter().for_each(|rule| self.pass(rule));

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use bus::BusError;
 use protocol::{RobotName, Tick};
 use serde::Serialize;
 
@@ -50,12 +51,19 @@ pub struct RuleFailure {
 }
 
 impl RuleFailure {
-    pub(crate) fn new(expected: impl Into<String>, came: impl Into<String>) -> Self {
+    /// A rule that is broken: what it demands, and what came instead. It is of the part in which the robot is alone.
+    pub fn new(expected: impl Into<String>, came: impl Into<String>) -> Self {
         Self {
             part: KitPart::Alone,
             expected: expected.into(),
             came: came.into(),
         }
+    }
+}
+
+impl From<BusError> for RuleFailure {
+    fn from(error: BusError) -> Self {
+        Self::new("the kit's own bus works", error.to_string())
     }
 }
 
@@ -101,7 +109,7 @@ pub struct AnswerTimes {
 
 impl AnswerTimes {
     /// The distribution of these times, if there are any.
-    pub(crate) fn of(mut times_ms: Vec<f64>) -> Option<Self> {
+    pub fn of(mut times_ms: Vec<f64>) -> Option<Self> {
         times_ms.sort_by(f64::total_cmp);
 
         Some(Self {
