@@ -114,7 +114,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "timeline",
         ],
     ),
-    ("conform", &["bus", "lockstep", "protocol"]),
+    ("verdicts", &["bus", "protocol"]),
+    ("conform", &["bus", "lockstep", "protocol", "verdicts"]),
     (
         "launch",
         &[
