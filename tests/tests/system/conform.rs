@@ -252,7 +252,7 @@ const OTHERWISE_ON_THE_WIRE: [&str; 14] = [
 ];
 
 /// How many kits run at the same time: their robots mostly wait.
-const KITS: usize = 10;
+const KITS: usize = 5;
 
 /// The rule that a robot breaks, from the way in which it does.
 fn rule_of(how: &str) -> &str {

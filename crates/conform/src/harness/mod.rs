@@ -74,8 +74,9 @@ pub(crate) struct HarnessOptions {
 impl Default for HarnessOptions {
     fn default() -> Self {
         Self {
-            patience_s: 20,
-            gone_patience_s: 20,
+            // So long that no machine uses it up.
+            patience_s: 120,
+            gone_patience_s: 120,
             has_extras: false,
             writes_integers: false,
             is_followed: false,
