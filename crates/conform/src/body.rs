@@ -34,6 +34,14 @@ impl RobotBody {
         }
     }
 
+    /// A correction that says where it stands anyway.
+    pub(crate) fn confirmed(&self) -> Correction {
+        Correction {
+            location: self.stands,
+            blocked: false,
+        }
+    }
+
     /// Where the robot wants to be, by its report. One that drives moves straight along its heading, and then turns: how exactly it
     /// moves is the simulator's affair.
     pub(crate) fn propose(&mut self, report: &Report, welcome: &Welcome) {
@@ -73,10 +81,7 @@ impl RobotBody {
             }
 
             self.stands = placed;
-            return Some(Correction {
-                location: self.stands,
-                blocked: false,
-            });
+            return Some(self.confirmed());
         }
 
         if tick % ROUND == REFUSED || !is_free(self.proposal, welcome) {

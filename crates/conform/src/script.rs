@@ -1,7 +1,7 @@
 //! The ticks that a robot is taken through: what happens to it is a function of the tick and of what it proposed, so that
 //! the same robot meets the same again.
 
-use protocol::messages::{Correction, Delivery, Payload, Performative, TickUpdate};
+use protocol::messages::{Delivery, Payload, Performative, TickUpdate};
 use protocol::{RobotName, Tick};
 
 use crate::body::{ROUND, RobotBody};
@@ -36,6 +36,16 @@ impl ArrivingCommand {
             text: text.to_owned(),
             payload: None,
             tick,
+        }
+    }
+
+    /// As news list it.
+    pub(crate) fn delivery(&self) -> Delivery {
+        Delivery {
+            from: self.from.clone(),
+            performative: Performative::Achieve,
+            command: self.text.clone(),
+            payload: self.payload.clone(),
         }
     }
 }
@@ -125,12 +135,7 @@ impl PlayScript {
         let mut deliveries = Vec::new();
         for arrival in &self.arrivals {
             if arrival.tick == tick {
-                deliveries.push(Delivery {
-                    from: arrival.from.clone(),
-                    performative: Performative::Achieve,
-                    command: arrival.text.clone(),
-                    payload: arrival.payload.clone(),
-                });
+                deliveries.push(arrival.delivery());
             }
         }
         deliveries.sort_by(|one, other| one.from.cmp(&other.from));
@@ -224,20 +229,14 @@ fn news_of(harness: &mut Harness<'_>, script: &PlayScript, tick: Tick) -> TickUp
     let start = RobotBody::at(harness.template.location, harness.kit.heading_rad());
     if harness.takes_over() {
         harness.body = start;
-        news.correction = Some(Correction {
-            location: harness.body.stands,
-            blocked: false,
-        });
+        news.correction = Some(harness.body.confirmed());
     } else if tick == 0 {
         harness.body = start;
     } else {
         news.correction = harness.body.advance(tick, &harness.template);
         // What it proposed is not where it drove.
         if drives && news.correction.is_none() {
-            news.correction = Some(Correction {
-                location: harness.body.stands,
-                blocked: false,
-            });
+            news.correction = Some(harness.body.confirmed());
         }
         if tick % ROUND == SENSES {
             news.sensed = harness.fake_peers.sensed(epoch, tick).into_iter().collect();

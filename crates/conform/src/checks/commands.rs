@@ -43,6 +43,22 @@ fn commanded_by(
     )
 }
 
+/// Plays these commands of two senders, in the order in which news list those.
+fn commanded_by_two(kit: &Kit, commands: [(&str, Tick); 2]) -> Result<Transcript, RuleFailure> {
+    let mut arrivals = Vec::new();
+    for (from, (text, tick)) in two_senders(kit).iter().zip(commands) {
+        arrivals.push(ArrivingCommand::new(from, text, tick));
+    }
+    played(kit, &PlayScript::with(TICKS, arrivals))
+}
+
+/// A robot and the operator, in the order in which news list their commands.
+fn two_senders(kit: &Kit) -> [RobotName; 2] {
+    let mut senders = [kit.sender(), RobotName::operator()];
+    senders.sort();
+    senders
+}
+
 fn arrivals<'t>(
     from: &RobotName,
     commands: impl IntoIterator<Item = (&'t str, Tick)>,
@@ -113,15 +129,10 @@ pub(super) fn order(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailur
 
 /// The same of commands from two senders, of which news list that of the first one before that of the second one.
 fn order_of_senders(kit: &Kit, one: &str, two: &str) -> Result<(), RuleFailure> {
-    let mut senders = [kit.sender(), RobotName::operator()];
-    senders.sort();
-    let [first, second] = senders;
+    let [first, second] = two_senders(kit);
     let play = |one_at: Tick, two_at: Tick| {
-        let arrivals = vec![
-            ArrivingCommand::new(&first, one, one_at),
-            ArrivingCommand::new(&second, two, two_at),
-        ];
-        played(kit, &PlayScript::with(TICKS, arrivals)).map(|played| values(&played))
+        let played = commanded_by_two(kit, [(one, one_at), (two, two_at)]);
+        played.map(|played| values(&played))
     };
 
     let votes = vote(
@@ -270,7 +281,7 @@ fn twice(
             };
 
             // Only a variable that counts commands shows whether there were two executions.
-            let is_counter = first != before && first - before == second - first;
+            let is_counter = counts(before, first, second);
             if is_counter && came == second {
                 votes.right += 1;
             } else if is_counter && came == first {
@@ -306,25 +317,15 @@ fn from_two(
     none: &BTreeMap<String, f64>,
     once: &BTreeMap<String, f64>,
 ) -> Result<(), RuleFailure> {
-    let senders = [kit.sender(), RobotName::operator()];
-    let play = |ticks: [Tick; 2]| {
-        let arrivals = senders
-            .iter()
-            .zip(ticks)
-            .map(|(from, tick)| ArrivingCommand::new(from, text, tick))
-            .collect();
-        played(kit, &PlayScript::with(TICKS, arrivals)).map(|played| numbers(&played))
-    };
-
-    let apart = play([LAST - 1, LAST])?;
-    let together = play([LAST, LAST])?;
+    let apart = numbers(&commanded_by_two(kit, [(text, LAST - 1), (text, LAST)])?);
+    let together = numbers(&commanded_by_two(kit, [(text, LAST), (text, LAST)])?);
     for (name, first) in once {
         let (Some(before), Some(second), Some(came)) =
             (none.get(name), apart.get(name), together.get(name))
         else {
             continue;
         };
-        let is_counter = first != before && first - before == second - first;
+        let is_counter = counts(before, first, second);
         if is_counter && came == first {
             return Err(RuleFailure::new(
                 format!("{text:?} from two senders in the news of a tick is executed twice"),
@@ -333,6 +334,11 @@ fn from_two(
         }
     }
     Ok(())
+}
+
+/// Whether a variable with these values after no command, after one and after two counts commands.
+fn counts(none: &f64, one: &f64, two: &f64) -> bool {
+    one != none && one - none == two - one
 }
 
 /// As many executions as the news list, also where that is more than a few. A counter that stops early is not one of commands.
@@ -425,7 +431,7 @@ fn demand_any(kit: &Kit) -> Result<(), RuleFailure> {
         let (Some(before), Some(second)) = (none.get(name), apart.get(name)) else {
             continue;
         };
-        let is_counter = first != before && first - before == second - first;
+        let is_counter = counts(before, first, second);
         for (text, came) in &any {
             let came = came.get(name);
             if is_counter && came == Some(before) {

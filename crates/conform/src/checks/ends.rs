@@ -67,12 +67,7 @@ fn demand_end(harness: &mut Harness<'_>, end: End, when: &str) -> Result<(), Rul
 fn demand_ended(harness: &mut Harness<'_>, clock: &Clock, when: &str) -> Result<(), RuleFailure> {
     let end = clock.end.unwrap_or(End::Stopped);
     let expected = format!("its process ends after a clock with end {end:?} {when}");
-    let status = harness.until_put(
-        &expected,
-        PATIENCE,
-        |harness| harness.put_clock(clock),
-        |harness| harness.process.ended(),
-    )?;
+    let status = harness.until_ended_by(clock, &expected)?;
     if status.code() != Some(0) {
         return Err(RuleFailure::new(
             format!("exit status 0 after a clock with end {end:?} {when}"),

@@ -2,9 +2,7 @@
 
 use std::time::Duration;
 
-use protocol::messages::{
-    Clock, Delivery, JoinRequest, Performative, Point, StreamReseed, TickUpdate,
-};
+use protocol::messages::{Clock, JoinRequest, Point, StreamReseed, TickUpdate};
 use protocol::{Epoch, Tick};
 
 use super::waiting;
@@ -14,7 +12,7 @@ use crate::harness::{Harness, HarnessOptions};
 use crate::kit::Kit;
 use crate::patience::PATIENCE;
 use crate::report::RuleFailure;
-use crate::script::{Disturbance, PlayScript, Straight, play, usual, with_robot};
+use crate::script::{ArrivingCommand, Disturbance, PlayScript, Straight, play, usual, with_robot};
 use crate::transcript::PlayedTick;
 use crate::wire::Joining;
 
@@ -100,8 +98,7 @@ pub(super) fn streams(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFail
         findings.fail("determinism.seed", RuleFailure::new(&expected, came));
     }
     if are_all_different(&by_seed) {
-        let judged = demand_reseeded(&mut harness, seed, &stream)?;
-        findings.settle("determinism.seed", judged);
+        demand_reseeded(&mut harness, findings, seed, &stream)?;
     }
     Ok(())
 }
@@ -109,9 +106,10 @@ pub(super) fn streams(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFail
 /// In the middle of an epoch a robot draws from another stream, if its welcome says so, and up to there as if it did not.
 fn demand_reseeded(
     harness: &mut Harness<'_>,
+    findings: &mut Findings,
     seed: u64,
     stream: &str,
-) -> Result<Result<(), RuleFailure>, RuleFailure> {
+) -> Result<(), RuleFailure> {
     let straight = moves(harness, seed, stream.to_owned())?;
     harness.template.reseeds = vec![StreamReseed {
         tick: RESEEDED,
@@ -124,33 +122,36 @@ fn demand_reseeded(
     let at = RESEEDED as usize;
     // It does not start over: that is another rule's matter.
     if straight.len().min(reseeded.len()).min(of_other.len()) <= at {
-        return Ok(Ok(()));
+        return Ok(());
     }
     let what = format!("the seed {} from tick {RESEEDED} on", seed + 1);
+    let mut fail = |expected: String, came: &str| {
+        findings.fail("determinism.seed", RuleFailure::new(expected, came));
+    };
     if straight[..at] != reseeded[..at] {
-        return Ok(Err(RuleFailure::new(
-            format!("up to tick {RESEEDED} the same moves as without {what}"),
-            "others",
-        )));
+        let expected = format!("up to tick {RESEEDED} the same moves as without {what}");
+        fail(expected, "others");
     }
+
     // One that turns in each tick draws in each; of others it is not known when they draw.
     let turns = straight[at - 1..]
         .windows(2)
         .all(|pair| pair[0].2 != pair[1].2);
     if turns && straight[at..] == reseeded[at..] {
-        return Ok(Err(RuleFailure::new(
-            format!("other moves with {what} (`reseeds` of its welcome)"),
-            "the same",
-        )));
+        let expected = format!("other moves with {what} (`reseeds` of its welcome)");
+        fail(expected, "the same");
     }
-    let directions = |moves: &Moves| -> Vec<f64> { moves[at..].iter().map(|one| one.2).collect() };
-    if turns && directions(&reseeded) == directions(&of_other) {
-        return Ok(Err(RuleFailure::new(
+    let has_same_turns = reseeded[at..]
+        .iter()
+        .zip(&of_other[at..])
+        .all(|(one, other)| one.2 == other.2);
+    if turns && has_same_turns {
+        fail(
             format!("other moves with {what} for another stream"),
             "the same",
-        )));
+        );
     }
-    Ok(Ok(()))
+    Ok(())
 }
 
 fn are_all_the_same(moves: &[Moves]) -> bool {
@@ -216,12 +217,7 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     harness.put_news(&TickUpdate {
         epoch: 1,
         tick: harness.next_tick(),
-        commands: vec![Delivery {
-            from: kit.sender(),
-            performative: Performative::Achieve,
-            command: text,
-            payload: None,
-        }],
+        commands: vec![ArrivingCommand::new(&kit.sender(), &text, harness.next_tick()).delivery()],
         ..TickUpdate::default()
     })?;
     let tokens_lost = harness.seen.tokens_lost;

@@ -71,10 +71,7 @@ fn all_flags(kit: &Kit) -> Result<(), RuleFailure> {
     harness.more_flags = u32::MAX;
     harness.withholds_news = true;
     harness.open(&TickUpdate {
-        correction: Some(Correction {
-            location: harness.body.stands,
-            blocked: false,
-        }),
+        correction: Some(harness.body.confirmed()),
         ..TickUpdate::default()
     })?;
     harness.settle(QUIET);

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use protocol::Tick;
-use protocol::messages::{Clock, Correction, Delivery, Performative, Report, TickUpdate};
+use protocol::messages::{Clock, Delivery, Report, TickUpdate};
 
 use super::{waiting, wire};
 use crate::comparison::demand_same;
@@ -13,7 +13,7 @@ use crate::harness::{Harness, HarnessOptions};
 use crate::kit::Kit;
 use crate::patience::PATIENCE;
 use crate::report::RuleFailure;
-use crate::script::{Disturbance, PlayScript, Straight, play, with_robot};
+use crate::script::{ArrivingCommand, Disturbance, PlayScript, Straight, play, with_robot};
 use crate::transcript::PlayedTick;
 
 /// What was put has arrived after this time, also at a robot that rests.
@@ -38,14 +38,9 @@ fn shorter(kit: &Kit) -> PlayScript {
 /// The clock has gone on twice: it answers the newest one, and never those before. What the news of those before list is lost.
 pub(super) fn newest(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     let [text, _] = kit.texts();
-    let command = Delivery {
-        from: kit.sender(),
-        performative: Performative::Achieve,
-        command: text,
-        payload: None,
-    };
+    let command = ArrivingCommand::new(&kit.sender(), &text, 0);
     let without = after_skipped(kit, &[])?;
-    let with = after_skipped(kit, &[command])?;
+    let with = after_skipped(kit, &[command.delivery()])?;
 
     if kit.is_deterministic.get() != Some(&false) && with != without {
         return Err(RuleFailure::new(
@@ -74,10 +69,7 @@ fn after_skipped(kit: &Kit, commands: &[Delivery]) -> Result<Vec<Report>, RuleFa
     };
     let news = TickUpdate {
         epoch: 1,
-        correction: Some(Correction {
-            location: harness.body.stands,
-            blocked: false,
-        }),
+        correction: Some(harness.body.confirmed()),
         ..TickUpdate::default()
     };
     let put_news = |harness: &Harness<'_>, tick: Tick, commands: &[Delivery]| {
@@ -148,10 +140,7 @@ pub(super) fn reply(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailur
     impl Disturbance for Peers {
         fn news(&mut self, harness: &Harness<'_>, news: &mut TickUpdate) {
             // It waits for news in each tick, so that what comes before them has come.
-            news.correction = news.correction.or(Some(Correction {
-                location: harness.body.stands,
-                blocked: false,
-            }));
+            news.correction = news.correction.or(Some(harness.body.confirmed()));
         }
 
         fn before(&mut self, harness: &mut Harness<'_>, tick: Tick) -> Result<(), RuleFailure> {
@@ -290,10 +279,7 @@ pub(super) fn newer(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     let news = TickUpdate {
         epoch: 1,
         tick,
-        correction: Some(Correction {
-            location: harness.body.stands,
-            blocked: false,
-        }),
+        correction: Some(harness.body.confirmed()),
         ..TickUpdate::default()
     };
 
@@ -361,10 +347,7 @@ pub(super) fn own_joined(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure>
                 return;
             }
             news.joined = self.names_it.then_some(1);
-            news.correction = news.correction.or(Some(Correction {
-                location: harness.body.stands,
-                blocked: false,
-            }));
+            news.correction = news.correction.or(Some(harness.body.confirmed()));
         }
     }
 

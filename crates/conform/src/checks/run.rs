@@ -10,7 +10,7 @@ use std::thread::Builder;
 use std::time::Duration;
 
 use nix::sys::signal::Signal;
-use protocol::messages::{Correction, TickUpdate};
+use protocol::messages::TickUpdate;
 use protocol::{RobotName, Tick};
 
 use super::{returns, ticks, wire};
@@ -19,7 +19,6 @@ use crate::fake_peers::Unhelpful;
 use crate::findings::Findings;
 use crate::harness::{Harness, HarnessOptions};
 use crate::kit::Kit;
-use crate::patience::PATIENCE;
 use crate::report::{KitPart, PlayedRun, RuleFailure};
 use crate::script::{Disturbance, PlayScript, step, with_robot};
 use crate::transcript::{PlayedTick, Transcript};
@@ -147,10 +146,7 @@ impl Disturbance for RunPlay {
         if kind == TickDisturbance::Quiet {
             return;
         }
-        news.correction = news.correction.or(Some(Correction {
-            location: harness.body.stands,
-            blocked: false,
-        }));
+        news.correction = news.correction.or(Some(harness.body.confirmed()));
         if kind == TickDisturbance::Joined && self.is_disturbed && !harness.takes_over() {
             let generation = harness.generation();
             news.joined = Some(generation.saturating_sub(1).max(1));
@@ -210,9 +206,7 @@ impl Disturbance for RunPlay {
                 harness.release_news()
             }
             TickDisturbance::LateAnswers => {
-                harness.until("a report or a query", PATIENCE, |harness| {
-                    (harness.fake_peers.has_held() || !harness.is_open()).then_some(())
-                })?;
+                harness.until_asking()?;
                 // The simulator is gone meanwhile: nothing else tells a robot that it may stop asking.
                 harness.show_simulator(false)?;
                 if harness.is_open() {

@@ -5,7 +5,7 @@ use protocol::messages::End;
 use crate::findings::Findings;
 use crate::harness::HarnessOptions;
 use crate::kit::Kit;
-use crate::patience::{PATIENCE, in_each_attempt};
+use crate::patience::in_each_attempt;
 use crate::report::RuleFailure;
 use crate::rules::{STDIO_END, STDIO_FIELDS, STDIO_LOG, STDIO_RULES};
 use crate::script::{PlayScript, Straight, play, with_robot};
@@ -53,11 +53,6 @@ fn ends_in_order(kit: &Kit, end: End, script: &PlayScript) -> Result<(), RuleFai
 
     let clock = harness.end(end);
     let expected = format!("`cars exec` ends after a clock with end {end:?}");
-    harness.until_put(
-        &expected,
-        PATIENCE,
-        |harness| harness.put_clock(&clock),
-        |harness| harness.process.ended(),
-    )?;
+    harness.until_ended_by(&clock, &expected)?;
     fault_in(&harness.process.output(), STDIO_END).map_or(Ok(()), Err)
 }

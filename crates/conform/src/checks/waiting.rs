@@ -8,7 +8,6 @@ use protocol::messages::{Correction, TickUpdate};
 use crate::comparison::demand_same;
 use crate::harness::{Harness, HarnessOptions};
 use crate::kit::Kit;
-use crate::patience::PATIENCE;
 use crate::report::RuleFailure;
 use crate::script::{Disturbance, PlayScript, Straight, play, with_robot};
 
@@ -42,9 +41,7 @@ pub(super) fn while_asking(
         }
 
         fn during(&mut self, harness: &mut Harness<'_>, _: Tick) -> Result<(), RuleFailure> {
-            harness.until("a report or a query", PATIENCE, |harness| {
-                (harness.fake_peers.has_held() || !harness.is_open()).then_some(())
-            })?;
+            harness.until_asking()?;
             if harness.is_open() {
                 (self.0)(harness)?;
                 harness.pass(UNDER_WAY);
@@ -94,9 +91,7 @@ pub(super) fn for_another(kit: &Kit) -> Result<(Harness<'_>, bool), RuleFailure>
     harness.fake_peers.hold();
     for _ in 0..TICKS {
         harness.open(&TickUpdate::default())?;
-        let came = harness.until("a report or a query", PATIENCE, |harness| {
-            (harness.fake_peers.has_held() || !harness.is_open()).then_some(())
-        });
+        let came = harness.until_asking();
         if harness.fake_peers.has_held() {
             harness.settle(UNDER_WAY);
             return Ok((harness, true));

@@ -530,6 +530,20 @@ impl<'k> Harness<'k> {
             .map_err(|_| RuleFailure::new(expected, self.process.fate()))
     }
 
+    /// The same for an end that this clock brings about.
+    pub(crate) fn until_ended_by(
+        &mut self,
+        clock: &Clock,
+        expected: &str,
+    ) -> Result<ExitStatus, RuleFailure> {
+        self.until_put(
+            expected,
+            PATIENCE,
+            |harness| harness.put_clock(clock),
+            |harness| harness.process.ended(),
+        )
+    }
+
     /// Waits until the robot's token is undeclared.
     pub(crate) fn until_gone(&mut self) -> Result<(), RuleFailure> {
         let mut limit = Limit::new(PATIENCE);

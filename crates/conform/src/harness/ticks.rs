@@ -124,6 +124,13 @@ impl Harness<'_> {
         }
     }
 
+    /// Waits until the robot has reported, or has asked another one that holds its answer back.
+    pub(crate) fn until_asking(&mut self) -> Result<(), RuleFailure> {
+        self.until("a report or a query", PATIENCE, |harness| {
+            (harness.fake_peers.has_held() || !harness.is_open()).then_some(())
+        })
+    }
+
     /// Waits until the open tick is complete.
     pub(crate) fn complete(&mut self) -> Result<CompleteTick, RuleFailure> {
         let tick = self.next.saturating_sub(1);
