@@ -465,10 +465,10 @@ impl<'k> Harness<'k> {
             }
             let has_ended = last_words.is_some_and(|since| since.elapsed() > LAST_WORDS);
             if has_ended || limit.is_over(&self.process) {
-                return Err(RuleFailure::new(
-                    expected,
-                    format!("it never came; {}", self.process.fate()),
-                ));
+                // It may have come since it was looked for: where the kit itself stood still, all in one moment.
+                return found(self).ok_or_else(|| {
+                    RuleFailure::new(expected, format!("it never came; {}", self.process.fate()))
+                });
             }
         }
     }
