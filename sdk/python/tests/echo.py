@@ -28,7 +28,8 @@ class Echo(CarsRobotInterface):
         self.heard += 1
         self.last = command
         try:
-            cars.set_robot_command(sender, f"echo {command}")
+            # A command has at most 4096 bytes, and what it heard may have as many.
+            cars.set_robot_command(sender, f"echo {command}".encode()[:4096].decode(errors="ignore"))
         except UnknownRobot:
             cars.log(f"no echo for {sender}")
 

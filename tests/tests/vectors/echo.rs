@@ -1,7 +1,7 @@
 //! The robot of the test vectors. Section "Test vectors" of `docs/protocol.md` says in words what it does, so that an
 //! author in any language can write it and compare every byte.
 
-use protocol::messages::{Point, StateVariables, Variable};
+use protocol::messages::{MAX_TEXT_BYTES, Point, StateVariables, Variable};
 use protocol::random::unit;
 use robot::{Action, BadParameters, CallError, Cars, ReceivedCommand, Robot};
 
@@ -76,7 +76,8 @@ impl Echo {
         self.last.clone_from(&command.text);
 
         // The operator is not in the roster and cannot receive an echo.
-        let echo = format!("echo {}", command.text);
+        let mut echo = format!("echo {}", command.text);
+        echo.truncate(echo.floor_char_boundary(MAX_TEXT_BYTES));
         let answered = cars.set_robot_command(command.from.as_str(), echo);
         if let Err(CallError::UnknownRobot(name)) = answered {
             cars.log(format!("no echo for {name}"));
