@@ -86,7 +86,8 @@ pub(crate) struct Straight;
 impl Disturbance for Straight {}
 
 impl PlayScript {
-    /// The usual ticks: a few commands among them.
+    /// The usual ticks: a few commands among them. Whichever of two words sends a robot to sleep, it is awake in some of the ticks in
+    /// which it cannot query others, and asleep in some.
     pub(crate) fn usual(kit: &Kit) -> Self {
         let [one, two] = kit.texts();
         let from = kit.sender();
@@ -95,10 +96,12 @@ impl PlayScript {
             ticks: kit.setting.ticks,
             arrivals: vec![
                 ArrivingCommand::new(&from, &one, 3),
-                ArrivingCommand::new(&from, &two, 7),
                 ArrivingCommand::new(&from, &one, 7),
+                ArrivingCommand::new(&from, &two, 7),
                 ArrivingCommand::new(&RobotName::operator(), &one, 10),
+                ArrivingCommand::new(&from, &two, 11),
                 ArrivingCommand::new(&from, &one, 20),
+                ArrivingCommand::new(&from, &two, 32),
             ],
         }
     }

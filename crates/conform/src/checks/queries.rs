@@ -9,13 +9,14 @@ use protocol::{Epoch, Tick, decode};
 
 use super::{computing, waiting, wire};
 use crate::comparison::demand_same;
+use crate::fake_peers::ReceivedQuery;
 use crate::findings::Findings;
 use crate::harness::{Harness, HarnessOptions};
 use crate::kit::Kit;
 use crate::patience::{PATIENCE, in_each_attempt};
 use crate::report::RuleFailure;
 use crate::script::{Disturbance, PlayScript, Straight, can_query, play, usual, with_robot};
-use crate::transcript::PlayedTick;
+use crate::transcript::{PlayedTick, Transcript};
 
 /// The kit's own limit where it waits until all replies are in.
 const ALL_REPLIES: Duration = Duration::from_secs(3);
@@ -456,16 +457,27 @@ fn reply_in(
 
 /// What it asks others: with tick and epoch, not at tick 0, not those that it cannot reach.
 pub(super) fn asking(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
-    let mut harness = waiting::of_queries(kit)?;
-    // Whichever of the words sends it to sleep, it is awake in some ticks in which others cannot be queried.
-    let script = PlayScript::in_turn(kit, &[kit.sender()], kit.setting.ticks);
-    let played = play(&mut harness, &script, &mut Straight)?;
-    let asked = harness.fake_peers.asked();
-    if asked.is_empty() {
+    let ticks = kit.setting.ticks;
+    // A robot that one of the words sends to sleep is awake where nothing is said, and one that a word wakes where it is.
+    let spoken = PlayScript::in_turn(kit, &[kit.sender()], ticks);
+    let mut has_asked = false;
+    for script in [spoken, PlayScript::quiet(ticks)] {
+        let mut harness = waiting::of_queries(kit)?;
+        let played = play(&mut harness, &script, &mut Straight)?;
+        let asked = harness.fake_peers.asked();
+        has_asked |= !asked.is_empty();
+        demand_allowed(asked, &played)?;
+    }
+
+    if !has_asked {
         findings.skip("query.asking", "the robot queried no other one");
         return demand_none_in_range(kit);
     }
+    Ok(())
+}
 
+/// Each query is one that the robot may make.
+fn demand_allowed(asked: Vec<ReceivedQuery>, played: &Transcript) -> Result<(), RuleFailure> {
     for query in asked {
         let (epoch, tick) = query.now;
         let came = format!(

@@ -65,7 +65,9 @@ impl Host {
         }
         if let Some((epoch, tick)) = self.last {
             let is_late_tick = clock.epoch == epoch && clock.tick < tick;
+            let is_awake = self.walker.as_ref().is_some_and(|walker| !walker.is_asleep);
             if self.wrong.is("clock.late") && is_late_tick
+                || self.wrong.is("clock.late:awake") && is_late_tick && is_awake
                 || self.wrong.is("clock.late:epoch") && clock.epoch < epoch
             {
                 let (_, _, report) = self.act(clock.epoch, clock.tick, &TickUpdate::default())?;

@@ -169,7 +169,7 @@ impl Host {
         {
             walker.random = stream(reseed.seed, &welcome.stream);
         }
-        let seen = self.ask_another(tick, epoch, news, &welcome)?;
+        let seen = self.ask_another(tick, epoch, news, &welcome, !walker.is_asleep)?;
         if tick == SLOW_TICK {
             std::thread::sleep(COMPUTES);
         }
@@ -268,6 +268,7 @@ impl Host {
         epoch: Epoch,
         news: &TickUpdate,
         welcome: &Welcome,
+        is_awake: bool,
     ) -> Result<Option<Point>, Failure> {
         let other = welcome.roster.iter().find(|name| **name != self.name);
         let Some(other) = other.cloned() else {
@@ -287,7 +288,9 @@ impl Host {
             return Ok(None);
         }
         if is_unreachable {
-            if self.wrong.is("query.asking:followed") {
+            let follows = self.wrong.is("query.asking:followed")
+                || is_awake && self.wrong.is("query.asking:followed-awake");
+            if follows {
                 if !std::mem::replace(&mut self.is_following, true) {
                     self.follow(&other)?;
                 }
@@ -299,7 +302,8 @@ impl Host {
             } else {
                 "query.asking:range"
             };
-            if self.wrong.is(wrong) {
+            let asks_awake = is_awake && is_cut && self.wrong.is("query.asking:awake");
+            if self.wrong.is(wrong) || asks_awake {
                 self.query(other, tick, epoch)?;
             }
             return Ok(None);
