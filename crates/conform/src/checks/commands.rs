@@ -395,22 +395,41 @@ pub(super) fn payload(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         json!([u64::MAX, i64::MIN, -0.0, 1e300, deepest]),
     ];
 
-    demand_any(kit)?;
-
-    for (payload, tick) in payloads.into_iter().zip(LAST - 2..) {
+    let with_payload = |text: &str, payload: &Value| {
         let arrival = ArrivingCommand {
-            payload: Payload::new(payload),
-            ..ArrivingCommand::new(&kit.sender(), &text, tick)
+            payload: Payload::new(payload.clone()),
+            ..ArrivingCommand::new(&kit.sender(), text, LAST)
         };
-        played(kit, &PlayScript::with(TICKS, vec![arrival]))?;
+        played(kit, &PlayScript::with(TICKS, vec![arrival]))
+    };
+    for payload in &payloads {
+        with_payload(&text, payload)?;
     }
-    Ok(())
+
+    // Of a text that the robot does not know, it expects no payload.
+    let short = "x".repeat(SHORT_TEXT);
+    let mut any = Vec::new();
+    let whats = [
+        "with a payload",
+        "with the largest payload",
+        "with the deepest payload and large numbers",
+    ];
+    for (payload, what) in payloads.iter().zip(whats) {
+        any.push((
+            format!("a text {what}"),
+            numbers(&with_payload(&short, payload)?),
+        ));
+    }
+    demand_any(kit, &short, any)
 }
 
-/// A long text, and one with all that JSON escapes, is read, and counted like a short one where a variable counts commands that the
-/// robot does not know.
-fn demand_any(kit: &Kit) -> Result<(), RuleFailure> {
-    let short = "x".repeat(SHORT_TEXT);
+/// A long text, and one with all that JSON escapes, is read. They are counted like a short one where a variable counts commands that
+/// the robot does not know, and so are `others`.
+fn demand_any(
+    kit: &Kit,
+    short: &str,
+    others: Vec<(String, BTreeMap<String, f64>)>,
+) -> Result<(), RuleFailure> {
     // Programs may quote it in a line of their log, which is not to be longer.
     let room = if kit.stdio.is_program() { QUOTED_BY } else { 0 };
     let longest = "x".repeat(MAX_TEXT_BYTES - room);
@@ -419,14 +438,13 @@ fn demand_any(kit: &Kit) -> Result<(), RuleFailure> {
     if kit.is_deterministic.get() == Some(&false) {
         return Ok(());
     }
-    let any = [
-        (format!("a text of {} bytes", longest.len()), numbers(&long)),
-        (format!("the text {ESCAPED_TEXT:?}"), numbers(&escaped)),
-    ];
+    let mut any = others;
+    any.push((format!("a text of {} bytes", longest.len()), numbers(&long)));
+    any.push((format!("the text {ESCAPED_TEXT:?}"), numbers(&escaped)));
 
     let none = numbers(&commanded(kit, &[])?);
-    let once = numbers(&commanded(kit, &[(&short, LAST)])?);
-    let apart = numbers(&commanded(kit, &[(&short, LAST - 1), (&short, LAST)])?);
+    let once = numbers(&commanded(kit, &[(short, LAST)])?);
+    let apart = numbers(&commanded(kit, &[(short, LAST - 1), (short, LAST)])?);
     for (name, first) in &once {
         let (Some(before), Some(second)) = (none.get(name), apart.get(name)) else {
             continue;

@@ -68,6 +68,7 @@ impl Host {
             let is_awake = self.walker.as_ref().is_some_and(|walker| !walker.is_asleep);
             if self.wrong.is("clock.late") && is_late_tick
                 || self.wrong.is("clock.late:awake") && is_late_tick && is_awake
+                || self.wrong.is("clock.late:quiet") && is_late_tick && clock.news & flag == 0
                 || self.wrong.is("clock.late:epoch") && clock.epoch < epoch
             {
                 let (_, _, report) = self.act(clock.epoch, clock.tick, &TickUpdate::default())?;
@@ -197,7 +198,11 @@ impl Host {
             ranges: false,
             sdk: "wrong robot".to_owned(),
         };
-        if is_again && self.wrong.is("epoch.init:token") {
+        let is_later = self.last_clock.epoch > epoch;
+        let renews_token = self.wrong.is("epoch.init:token")
+            || self.wrong.is("epoch.late:token") && is_later && self.last_clock.tick > 0
+            || self.wrong.is("return.rejoin:token") && !is_later;
+        if is_again && renews_token {
             self.token = None;
             self.declare_token()?;
         }

@@ -358,7 +358,9 @@ impl Host {
                     self.leave.get_or_insert(Leave::SimulatorGone);
                 }
                 let is_asking = self.shared.is_in(Phase::Asking);
-                self.has_given_up |= !is_present && is_asking && self.wrong.is("query.again:gone");
+                let gives_up =
+                    self.wrong.is("query.again:gone") || self.wrong.is("end.gone:asking");
+                self.has_given_up |= !is_present && is_asking && gives_up;
                 self.on_simulator(is_present);
                 self.drive(|machine, out| machine.simulator(is_present, out))
             }

@@ -5,12 +5,13 @@ use std::time::Duration;
 use lockstep::{Begin, Sent, Turn};
 use protocol::keys::STATE;
 use protocol::messages::{
-    CommandText, MAX_TEXT_BYTES, Point, PublicState, Report, StateVariables, TickUpdate, Variable,
-    Velocity, Welcome,
+    CommandText, Delivery, MAX_TEXT_BYTES, Point, PublicState, Report, StateVariables, TickUpdate,
+    Variable, Velocity, Welcome,
 };
 use protocol::plain::cut;
 use protocol::random::{stream, unit};
 use protocol::{Epoch, RobotName, Tick};
+use serde_json::Value;
 
 use crate::answering::{Phase, lock};
 use crate::host::{Event, Failure, Host};
@@ -26,6 +27,29 @@ const TEN: usize = 10;
 const SHORT_TEXT: usize = 100;
 /// The same for a robot that has more.
 const HUNDRED: usize = 100;
+
+/// So many lists and objects within one another are few.
+const DEPTH: usize = 32;
+
+/// Whether a command has a payload of which something holds.
+fn has_payload(delivery: &Delivery, holds: &dyn Fn(&Value) -> bool) -> bool {
+    let payload = delivery.payload.as_ref();
+    payload.is_some_and(|payload| holds(payload.value()))
+}
+
+/// Whether a list has an integer of 64 bits without a sign.
+fn has_large_number(value: &Value) -> bool {
+    let values = value.as_array();
+    values.is_some_and(|values| values.iter().any(|value| value.is_u64() && !value.is_i64()))
+}
+
+/// Whether there are more lists within one another.
+fn is_deep(value: &Value, depth: usize) -> bool {
+    let Some(values) = value.as_array() else {
+        return false;
+    };
+    depth == 0 || values.iter().any(|value| is_deep(value, depth - 1))
+}
 
 /// The results of a tick.
 pub(crate) type Outcome = (Vec<Sent<CommandText>>, PublicState, Report);
@@ -123,6 +147,15 @@ impl Host {
         if wrong.is("command.payload:long") {
             deliveries.retain(|delivery| delivery.command.len() <= SHORT_TEXT);
         }
+        if wrong.is("command.twice:senders") {
+            deliveries.dedup_by(|next, one| next.command == one.command && next.from != one.from);
+        }
+        if wrong.is("command.payload:numbers") {
+            deliveries.retain(|delivery| !has_payload(delivery, &has_large_number));
+        }
+        if wrong.is("command.payload:deep") {
+            deliveries.retain(|delivery| !has_payload(delivery, &|value| is_deep(value, DEPTH)));
+        }
         if wrong.is("command.twice") {
             deliveries.dedup();
         }
@@ -167,7 +200,12 @@ impl Host {
         if let Some(reseed) = reseeds.find(|reseed| reseed.tick == tick)
             && !wrong.is("determinism.seed:reseeds")
         {
-            walker.random = stream(reseed.seed, &welcome.stream);
+            let name = if wrong.is("determinism.seed:reseeds-stream") {
+                welcome.name.as_str()
+            } else {
+                &welcome.stream
+            };
+            walker.random = stream(reseed.seed, name);
         }
         let seen = self.ask_another(tick, epoch, news, &welcome, !walker.is_asleep)?;
         if tick == SLOW_TICK {

@@ -1,7 +1,7 @@
 //! What the robot does wrong.
 
 use protocol::{Message, decode};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 /// What it does wrong: a rule, or a rule and a way to break it.
 #[derive(Clone)]
@@ -27,26 +27,35 @@ impl Wrong {
 
         let raw: Value = serde_json::from_slice(bytes).ok()?;
         let known = serde_json::from_slice(&message.to_json()).ok()?;
-        let is_refused = self.is("compat.unknown-fields") && has_unknown_fields(&raw, &known)
+        let refuses_unknown = self.is("compat.unknown-fields");
+        let refuses_defaults = self.is("compat.unknown-fields:defaults") && key.ends_with("/news");
+        let is_refused = refuses_unknown && has_fields(&raw, &known, &|_| true)
+            || refuses_defaults && has_fields(&raw, &known, &is_default)
             || self.is("number.integers:refused") && has_integers_for_floats(&raw, &known);
         (!is_refused).then_some(message)
     }
 }
 
-/// Whether a message has fields that its type does not have.
-fn has_unknown_fields(raw: &Value, known: &Value) -> bool {
+/// Whether a message has such fields that its type does not have, or that are left out when it is written.
+fn has_fields(raw: &Value, known: &Value, are_such: &dyn Fn(&Value) -> bool) -> bool {
     match (raw, known) {
         (Value::Object(raw), Value::Object(known)) => raw.iter().any(|(name, value)| {
-            known
-                .get(name)
-                .is_none_or(|known| has_unknown_fields(value, known))
+            known.get(name).map_or_else(
+                || are_such(value),
+                |known| has_fields(value, known, are_such),
+            )
         }),
         (Value::Array(raw), Value::Array(known)) => raw
             .iter()
             .zip(known)
-            .any(|(raw, known)| has_unknown_fields(raw, known)),
+            .any(|(raw, known)| has_fields(raw, known, are_such)),
         _ => false,
     }
+}
+
+/// Whether a value is one that fields have by default.
+fn is_default(value: &Value) -> bool {
+    *value == json!([]) || *value == json!(false) || *value == json!("achieve")
 }
 
 /// Whether a number of a message that may have a fraction is written as an integer.
