@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use bus::{Bus, BusError, Declared, Publisher, QUERY_TIMEOUT, Qos, Query, Reply};
 use protocol::keys::{Keys, STATE};
-use protocol::messages::JoinRequest;
-use protocol::{RobotName, decode};
+use protocol::messages::{Command, JoinRequest};
+use protocol::{RobotName, decode, encode};
 
 use crate::report::RuleFailure;
 
@@ -102,6 +102,12 @@ impl Wire {
     /// Keeps further declarations until the run is over.
     pub(crate) fn keep(&mut self, declared: impl IntoIterator<Item = Declared>) {
         self.declared.extend(declared);
+    }
+
+    /// Puts a command on a key from which the medium takes it.
+    pub(crate) fn put_command(&self, key: &str, command: &Command) -> Result<(), RuleFailure> {
+        self.bus.put(key, encode(command))?;
+        Ok(())
     }
 
     /// Deletes the keys of the clock and of a robot's news, as a tool may do.

@@ -246,12 +246,15 @@ const OTHERWISE: [&str; 98] = [
 ];
 
 /// Further ways that are about how a message is written or put.
-const OTHERWISE_ON_THE_WIRE: [&str; 14] = [
+const OTHERWISE_ON_THE_WIRE: [&str; 17] = [
     "wire.keys:simulator",
     "wire.keys:news",
     "wire.keys:report",
     "wire.keys:state",
     "wire.keys:viewer",
+    "wire.keys:operator",
+    "wire.keys:commands",
+    "wire.keys:outboxes",
     "end.gone:status",
     "robust.malformed:silent",
     "number.integers:command",

@@ -423,7 +423,7 @@ pub(super) fn payload(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     demand_any(kit, &short, any)
 }
 
-/// A long text, and one with all that JSON escapes, is read. They are counted like a short one where a variable counts commands that
+/// A long text, several of them in one tick, and one with all that JSON escapes, are read. They are counted like a short one where a variable counts commands that
 /// the robot does not know, and so are `others`.
 fn demand_any(
     kit: &Kit,
@@ -434,6 +434,8 @@ fn demand_any(
     let room = if kit.stdio.is_program() { QUOTED_BY } else { 0 };
     let longest = "x".repeat(MAX_TEXT_BYTES - room);
     let long = commanded(kit, &[(&longest, LAST)])?;
+    // Together they are longer than a text may be.
+    commanded(kit, &[(longest.as_str(), LAST); 4])?;
     let escaped = commanded(kit, &[(ESCAPED_TEXT, LAST)])?;
     if kit.is_deterministic.get() == Some(&false) {
         return Ok(());

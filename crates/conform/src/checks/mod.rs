@@ -43,7 +43,7 @@ const fn rules(
 }
 
 /// Checks that need nothing but the usual ticks before; those that take longest begin.
-const CHECKS: [Check; 38] = [
+const CHECKS: [Check; 39] = [
     rules(&["join.refused"], joining::refused),
     rules(&["end.gone"], ends::gone_for_a_while),
     rules(&["end.gone"], ends::gone_forever),
@@ -88,6 +88,7 @@ const CHECKS: [Check; 38] = [
     rules(&["compat.unknown-fields"], tolerance::unknown_fields),
     rules(&["number.integers"], tolerance::integers),
     rules(&["robust.malformed"], tolerance::malformed),
+    rules(&["wire.keys"], tolerance::commands_of_others),
     rules(&["tick.answer"], ticks::unasked),
     rules(&["epoch.init", "determinism.seed"], epochs::streams),
 ];

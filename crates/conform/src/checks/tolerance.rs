@@ -74,6 +74,24 @@ pub(super) fn malformed(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> 
     Ok(())
 }
 
+/// Commands on their way to the medium are not the robot's: it executes those in its news only.
+pub(super) fn commands_of_others(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
+    struct Sending;
+    impl Disturbance for Sending {
+        fn before(&mut self, harness: &mut Harness<'_>, tick: Tick) -> Result<(), RuleFailure> {
+            if tick % 4 != 1 {
+                return Ok(());
+            }
+            harness.send_to_medium()
+        }
+    }
+
+    let mut harness = with_robot(kit, HarnessOptions::default())?;
+    let played = play(&mut harness, &PlayScript::usual(kit), &mut Sending)?;
+    let cause = "a command that others put for the medium, and that is not in its news";
+    demand_same(kit, cause, usual(kit)?, &played)
+}
+
 /// Not JSON, not an object, not all of it, not the right kinds.
 fn common() -> Vec<Vec<u8>> {
     let texts = [

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 use std::time::Instant;
 
 use lockstep::LatePolicy;
-use protocol::Tick;
-use protocol::messages::{Clock, End, OnLate, Report, TickUpdate};
+use protocol::messages::{Clock, Command, End, OnLate, Report, Target, TickUpdate};
+use protocol::{RobotName, Tick};
 
 use super::{CompleteTick, Harness, patient};
 use crate::flushing;
@@ -56,6 +56,38 @@ impl Harness<'_> {
     /// Puts something else on the key of its news.
     pub(crate) fn put_as_news(&self, bytes: &[u8]) -> Result<(), RuleFailure> {
         self.wire.put_news(&self.kit.subject(), bytes.to_vec())
+    }
+
+    /// Puts commands to the robot as the operator and another robot do, for the medium, which here delivers none of them.
+    pub(crate) fn send_to_medium(&self) -> Result<(), RuleFailure> {
+        let subject = self.kit.subject();
+        let sender = self.kit.sender();
+        for text in self.kit.texts() {
+            let command = Command {
+                command: text,
+                ..Command::default()
+            };
+            self.wire.put_command(
+                &self.keys.command(&subject, &RobotName::operator()),
+                &command,
+            )?;
+
+            let stamped = Command {
+                epoch: self.epoch,
+                tick: self.next,
+                generation: 1,
+                number: 1,
+                to: Some(Target::Robot(subject.clone())),
+                ..command
+            };
+            for key in [
+                self.keys.command(&subject, &sender),
+                self.keys.outbox(&sender),
+            ] {
+                self.wire.put_command(&key, &stamped)?;
+            }
+        }
+        Ok(())
     }
 
     /// Deletes the keys of clocks and of the robot's news.

@@ -10,7 +10,10 @@ use std::time::{Duration, Instant};
 use bus::{Bus, BusError, Declared, Qos, Reply, Role, WatchedPublisher};
 use lockstep::{Leave, ParticipantOutput, RobotTimer, Timeouts};
 use protocol::keys::{Keys, QUERIES, STATE};
-use protocol::messages::{Clock, CommandText, PublicState, Report, TickUpdate, Waiting, Welcome};
+use protocol::messages::{
+    Clock, Command, CommandText, Delivery, PublicState, Report, Target, TickUpdate, Waiting,
+    Welcome,
+};
 use protocol::{Epoch, RobotName, RunName, Tick, encode};
 
 use crate::answering::{Machine, Phase, Shared, lock};
@@ -35,6 +38,8 @@ pub(crate) enum Event {
     Simulator(bool),
     Reply(RobotName, Option<Reply>),
     State(Box<PublicState>),
+    /// A command on its way to the medium.
+    Sent(Box<Delivery>),
 }
 
 /// The robot's process.
@@ -60,6 +65,8 @@ pub(crate) struct Host {
     pub(crate) last_clock: Clock,
     /// All news that arrived, if the robot is to keep them.
     pub(crate) strays: Vec<TickUpdate>,
+    /// Commands that were not for it yet, if it is to take them.
+    pub(crate) intercepted: Vec<Delivery>,
     /// The number of the last command of the first epoch.
     pub(crate) numbered: u32,
     /// Whether it has run a tick as what it was admitted as.
@@ -137,6 +144,7 @@ impl Host {
             last: None,
             last_clock: Clock::default(),
             strays: Vec::new(),
+            intercepted: Vec::new(),
             numbered: 0,
             has_begun: false,
             starts_over: false,
@@ -234,6 +242,39 @@ impl Host {
             }
         })?;
         self.declared.push(news);
+        self.intercept()
+    }
+
+    /// Listens to what others send to it, if it is to.
+    fn intercept(&mut self) -> Result<(), BusError> {
+        let on_its_key = self.keys.command(&self.name, &RobotName::operator());
+        for (how, keys) in [
+            ("wire.keys:operator", on_its_key),
+            ("wire.keys:commands", self.keys.commands()),
+            ("wire.keys:outboxes", self.keys.outboxes()),
+        ] {
+            if !self.wrong.is(how) {
+                continue;
+            }
+            let (name, queue, wrong) = (self.name.clone(), self.queue.clone(), self.wrong.clone());
+            let sent = self.bus.subscribe(&keys, move |key, bytes| {
+                let of_key = Keys::robot_of(key).unwrap_or_default();
+                let from = RobotName::new(Keys::command_sender(key).unwrap_or(of_key));
+                let Some(command) = wrong.read::<Command>(key, bytes) else {
+                    return;
+                };
+                let to = command.to.as_ref().map_or(of_key, Target::as_str);
+                if to == name.as_str() {
+                    let _ = queue.send(Event::Sent(Box::new(Delivery {
+                        from: from.unwrap_or_else(|_| RobotName::operator()),
+                        performative: command.performative,
+                        command: command.command,
+                        payload: command.payload,
+                    })));
+                }
+            })?;
+            self.declared.push(sent);
+        }
         Ok(())
     }
 
@@ -366,6 +407,10 @@ impl Host {
             }
             Event::State(state) => {
                 self.newest = Some(*state);
+                Ok(())
+            }
+            Event::Sent(delivery) => {
+                self.intercepted.push(*delivery);
                 Ok(())
             }
             Event::Reply(of, reply) => {

@@ -126,6 +126,7 @@ impl Host {
         };
 
         let mut deliveries = news.commands.clone();
+        deliveries.append(&mut self.intercepted);
         if wrong.is("command.order") {
             deliveries.reverse();
         }
