@@ -2,6 +2,7 @@
 //! author in any language can write it and compare every byte.
 
 use protocol::messages::{MAX_TEXT_BYTES, Point, StateVariables, Variable};
+use protocol::plain::cut;
 use protocol::random::unit;
 use robot::{Action, BadParameters, CallError, Cars, ReceivedCommand, Robot};
 
@@ -77,7 +78,7 @@ impl Echo {
 
         // The operator is not in the roster and cannot receive an echo.
         let mut echo = format!("echo {}", command.text);
-        echo.truncate(echo.floor_char_boundary(MAX_TEXT_BYTES));
+        cut(&mut echo, MAX_TEXT_BYTES);
         let answered = cars.set_robot_command(command.from.as_str(), echo);
         if let Err(CallError::UnknownRobot(name)) = answered {
             cars.log(format!("no echo for {name}"));
