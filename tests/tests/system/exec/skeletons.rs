@@ -103,7 +103,12 @@ impl Robot {
     /// The conformance kit, called as its README says, finds no fault.
     fn conforms(&self) {
         let readme = std::fs::read_to_string(self.folder.join("README.md")).unwrap();
-        let command = readme
+        self.conforms_as(&readme, Path::new("."));
+    }
+
+    /// The same, called in a folder as a page says.
+    fn conforms_as(&self, page: &str, folder: &Path) {
+        let command = page
             .lines()
             .find(|line| line.starts_with("cars conform "))
             .unwrap();
@@ -114,6 +119,7 @@ impl Robot {
 
         let output = Command::new("sh")
             .args(["-c", command])
+            .current_dir(folder)
             .env("PATH", std::env::join_paths(path).unwrap())
             .env("PYTHONPATH", python_path())
             .output()
@@ -126,6 +132,25 @@ impl Robot {
             "{command}: {printed}\n{}",
             String::from_utf8_lossy(&output.stderr)
         );
+    }
+
+    /// Replaces methods of a robot in Python with those of a text.
+    fn replace_methods(&self, text: &str) {
+        let file = self.folder.join("robot.py");
+        let mut robot = std::fs::read_to_string(&file).unwrap();
+        for method in methods(text) {
+            let (head, _) = method.split_once('\n').unwrap();
+            let robot_before = robot.clone();
+            let old: Vec<String> = methods(&robot_before)
+                .into_iter()
+                .filter(|old| old.starts_with(&format!("{head}\n")))
+                .collect();
+            let [old] = &old[..] else {
+                panic!("{} methods begin with {head:?}", old.len())
+            };
+            robot = robot.replace(old, &method);
+        }
+        std::fs::write(file, robot).unwrap();
     }
 
     fn obeys(&self, language: &str) {
@@ -170,6 +195,24 @@ impl Robot {
             "{language}"
         );
     }
+}
+
+/// The methods of a text in Python, each with what is indented below it.
+fn methods(text: &str) -> Vec<String> {
+    let mut methods: Vec<String> = Vec::new();
+    let mut is_within = false;
+    for line in text.lines() {
+        let begins = line.starts_with("    def ");
+        is_within = begins || is_within && line.starts_with("        ");
+        if begins {
+            methods.push(String::new());
+        }
+        if let Some(method) = methods.last_mut().filter(|_| is_within) {
+            method.push_str(line);
+            method.push('\n');
+        }
+    }
+    methods
 }
 
 /// Where Python finds the SDK: that of the project first.
@@ -380,6 +423,32 @@ fn a_new_robot_is_the_same_in_every_language_that_counts_alike() {
             ("Python", &Robot::new("python").plays("python")),
         );
     }
+}
+
+/// As the page has it made and changed.
+#[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
+fn the_robot_of_the_page_of_python_conforms() {
+    let mut python = Command::new("python3");
+    python
+        .args(["-c", "import cars"])
+        .env("PYTHONPATH", python_path());
+    if !has("Python", &mut python, "install Python 3.9 or later") {
+        return;
+    }
+
+    let page = std::fs::read_to_string(root().join("docs/python-robot.md")).unwrap();
+    let (_, rest) = page.split_once("```python\n").unwrap();
+    let (change, _) = rest.split_once("```").unwrap();
+    let robot = Robot::new("python");
+    robot.replace_methods(change);
+
+    let run = "new-python-of-the-page";
+    robot.start(run, &[]).finish();
+    nobody_is_left(run);
+    let log = robot.cars_log(run);
+    assert!(log.contains("-> RESIGNED"), "{log}");
+    robot.conforms_as(&page, robot.lab.out());
 }
 
 #[test]
