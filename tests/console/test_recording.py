@@ -1,12 +1,15 @@
 """A recorded run."""
 
+import csv
+import json
 import re
 import signal
+import subprocess
 
 import pytest
 from playwright.sync_api import expect
 
-from lab import PATIENCE_S, eventually, newest, scrub, start_console, until
+from lab import BIN, PATIENCE_S, ROOT, eventually, newest, scrub, start_console, until
 
 pytestmark = pytest.mark.thorough
 
@@ -184,3 +187,91 @@ def test_a_tick_has_the_same_pixels_live_and_recorded(launch, open_page, screens
     scrub(recorded, tick - 1)
     expect(recorded.get_by_test_id("tick")).to_have_text(str(tick - 1))
     eventually("other pixels", lambda: {"#plan", "#panels"} <= set(differing(live, recorded, screenshots)))
+
+
+KINDS = ("emotion", "behavior")
+FAULTS = """fault=[
+    { robot = "Leguin", do = "crash", at = "10 s", until = "25 s" },
+    { robot = "Butler", do = "hang", at = "30 s", until = "34 s" },
+    { robot = "Leguin", do = "crash", at = "2090 s", until = "2110 s" },
+    { robot = "Leguin", do = "crash", at = "2900 s" },
+]"""
+PARTITION = 'network.partition=[{ groups = [["Butler"], ["Leguin"]], from = "36 s", until = "46 s" }]'
+
+
+@pytest.fixture
+def faulty(tmp_path):
+    """The folder of a run of 6000 ticks, of which not all are samples of charts, in which robots crash and hang."""
+    scenario = ROOT / "configs" / "hors_doeuvres.toml"
+    settings = ("--set", FAULTS, "--set", PARTITION, "--set", "on_late=continue")
+    run = [BIN / "cars", "run", scenario, "--run", "faulty", "--duration", "3000 s", *settings, "--out", tmp_path, "--quiet"]
+    # The verdict is another test's.
+    assert subprocess.run(run, timeout=PATIENCE_S, check=False).returncode in (0, 1)
+    return tmp_path / "faulty"
+
+
+def stays(folder):
+    """State, begin and end in ticks of each stay by robot and kind, from the events of a run; and which robots are lost in which ticks."""
+    events = [json.loads(line) for line in (folder / "events.jsonl").read_text().splitlines()]
+    last = max(event["tick"] for event in events)
+    found, states, lost, absences = {}, {}, {}, []
+
+    def end(robot, kind, tick):
+        state, begin = states.get((robot, kind), (None, tick))
+        if (begin < tick or tick == last) and robot not in lost:
+            found.setdefault((robot, kind), []).append([state, begin, tick])
+
+    for event in events:
+        robot, tick = event.get("robot"), event["tick"]
+        if event["event"] in KINDS:
+            end(robot, event["event"], tick)
+            states[robot, event["event"]] = (event["to"], tick)
+        elif event["event"] == "lost":
+            for kind in KINDS:
+                end(robot, kind, tick)
+            lost[robot] = tick
+        elif event["event"] == "joined" and robot in lost:
+            absences.append((robot, lost.pop(robot), tick))
+            for kind in KINDS:
+                states[robot, kind] = (states[robot, kind][0], tick)
+    for robot, kind in states:
+        end(robot, kind, last)
+    absences += [(robot, tick, last + 1) for robot, tick in lost.items()]
+    return found, absences
+
+
+def test_bands_are_the_stays_of_the_record(faulty, processes, open_page):
+    expected, absences = stays(faulty)
+    assert [robot for robot, *_ in absences] == ["Leguin"] * 3
+    assert all(len(expected[robot, kind]) > 20 for robot in ("Butler", "Leguin") for kind in KINDS)
+
+    page = open_page(start_console(processes, "--recording", faulty))
+    page.get_by_test_id("tab-charts").click()
+
+    def bands():
+        states = page.evaluate("[...window.carsConsole.history().states]")
+        ticks = lambda span: [span["state"], span["from_s"] * 2, span["to_s"] * 2]
+        return {(robot, kind): [ticks(span) for span in of[kind]] for robot, of in states for kind in KINDS}
+
+    eventually("the whole record", lambda: page.evaluate("window.carsConsole.history().known_s") == 3000)
+    assert bands() == expected
+
+    # Those that are drawn say so; what is too narrow is not drawn.
+    drawn = page.locator("#bands .band title")
+    eventually("the bands", lambda: drawn.count() > 20)
+    for title in drawn.all_text_contents():
+        robot, kind, state, begin_s, end_s = re.fullmatch(r"(\S+), (\S+) (\S+), (\S+) s to (\S+) s", title).groups()
+        assert [state, float(begin_s) * 2, float(end_s) * 2] in expected[robot, kind], title
+
+    # The exported table has the same, but nothing of what a robot would have said in a tick that it missed.
+    tables = faulty.parent / "tables"
+    subprocess.run([BIN / "cars", "export", faulty, "--csv", "-o", tables], timeout=PATIENCE_S, check=True)
+    rows = list(csv.DictReader((tables / "states.csv").open()))
+    assert len(rows) == 2 * 6001
+    for row in rows:
+        robot, tick = row["robot"], int(row["tick"])
+        is_lost = any(robot == one and begin <= tick < end for one, begin, end in absences)
+        for kind in KINDS:
+            states = [state for state, begin, end in expected[robot, kind] if begin <= tick < end]
+            if tick < 6000 and (is_lost or row["missed"] == "false"):
+                assert states == ([] if is_lost else [row[kind]]), row

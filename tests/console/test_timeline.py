@@ -776,32 +776,62 @@ def test_lines_that_arrive_while_the_tick_moves_are_shown_once(page):
     assert found == [[], [0, 2, 4], [0, 2, 4, 6, 8], [0, 2, 4, 6, 8, 9], [0, 2]]
 
 
-def test_samples_of_the_record_replace_what_was_seen(page):
+def test_what_is_recorded_replaces_what_was_seen(page):
     found = run_module(
         page,
         """
-        const robot = (emotion, value) => [{name: 'B', location: {x: value, y: 0}, emotion_state: emotion, behavior_state: 'S', state_variables: {v: value}}];
+        const robot = (emotion, value, presence = 'here') =>
+          [{name: 'B', location: {x: value, y: 0}, presence, emotion_state: emotion, behavior_state: 'S', state_variables: {v: value}}];
+        const stay = (state, begin, end, kind = 'emotion') => ({robot: 'B', kind, state, begin, end});
         const history = new History();
-        history.add(0, robot('A', 0));
-        history.add(10, robot('C', 10));
-        history.add(20, robot('C', 20), true);
-        const gap = [history.times_s.slice(), history.variables.get('v').get('B').slice(), structuredClone(history.states.get('B').emotion)];
-        history.cutFrom(5);
-        for (const [time, emotion] of [[5, 'A'], [7, 'B'], [10, 'C'], [15, 'C'], [20, 'C']]) history.add(time, robot(emotion, time));
-        const exact = [history.times_s.slice(), history.variables.get('v').get('B').slice(), structuredClone(history.states.get('B').emotion)];
+        const spans = () => structuredClone(history.states.get('B').emotion.map(({state, from_s, to_s}) => [state, from_s, to_s]));
+        const now = () => [history.times_s.slice(), history.variables.get('v').get('B').slice(), spans()];
+        const seen = [];
+        history.see(0, 1, robot('A', 0));
+        history.see(10, 1, robot('C', 10));
+        history.see(21, 1, robot('C', 21));
+        seen.push(now());
+
         history.cutFrom(0);
-        const empty = [history.times_s.length, history.states.get('B').emotion.length];
-        for (let i = 0; i < 50000; i += 1) history.add(i, robot(`E${i}`, i));
-        return [gap, exact, empty, history.times_s.length, history.states.get('B').emotion.length];
+        seen.push([history.times_s.length, spans()]);
+        // The end of the first ticks is within a stay.
+        history.record({end: 8, ticks: [0, 5].map((tick) => ({tick, robots: robot('X', tick)})), spans: [stay('A', 0, 6), stay('B', 6, null)]}, 1);
+        seen.push(now());
+        history.see(9, 1, robot('C', 9));
+        history.see(10, 1, robot('C', 10));
+        seen.push(now());
+        history.cutFrom(8);
+        history.record({end: 15, ticks: [{tick: 10, robots: robot('X', 10)}], spans: [stay('B', 6, 8), stay('C', 8, 12), stay('D', 12, null)]}, 1);
+        // A frame that the record has overtaken is a sample, and changes no stay.
+        history.see(13, 1, robot('C', 13));
+        seen.push(now());
+
+        // A robot that is lost is in no state, and begins its state anew when it is back.
+        for (const [time, presence] of [[15, 'here'], [16, 'lost'], [17, 'lost'], [18, 'here'], [19, 'here']]) history.see(time, 1, robot('D', time, presence));
+        seen.push(spans());
+        history.cutFrom(15);
+        history.record({end: 17, ticks: [], spans: [stay('D', 12, 16)]}, 1);
+        history.see(17, 1, robot('D', 17, 'lost'));
+        history.see(18, 1, robot('D', 18));
+        seen.push(spans(), [...history.emotions]);
+
+        for (let i = 20; i < 50000; i += 1) history.see(i, 1, robot(`E${i}`, i));
+        const all = [...Array(50000).keys()].map((i) => stay('E', i, i + 1, 'behavior'));
+        history.record({end: 50000, ticks: [], spans: all}, 1);
+        const { emotion, behavior } = history.states.get('B');
+        return [...seen, [history.times_s.length, emotion.length, behavior.length, history.emotions.size]];
         """,
     )
-    gap, exact, empty, most_samples, most_spans = found
-    assert gap[0] == [0, 10, 10.01, 20] and gap[1] == [0, 10, None, 20]
-    assert [[span["state"], span["from_s"], span["to_s"]] for span in gap[2]] == [["A", 0, 10], ["C", 10, 10], ["C", 20, 20]]
-    assert exact[0] == [0, 5, 7, 10, 15, 20] and exact[1] == exact[0]
-    assert [[span["state"], span["from_s"], span["to_s"]] for span in exact[2]] == [["A", 0, 7], ["B", 7, 10], ["C", 10, 20]]
-    assert empty == [0, 0]
-    assert most_samples <= 6000 and most_spans <= 4000
+    gap, empty, first, further, exact, back, lost, emotions, counts = found
+    assert gap == [[0, 10, 10.011, 21], [0, 10, None, 21], [["A", 0, 10], ["C", 10, 10], ["C", 21, 21]]]
+    assert empty == [0, []]
+    assert first == [[0, 5], [0, 5], [["A", 0, 6], ["B", 6, 7]]]
+    assert further == [[0, 5, 9, 10], [0, 5, 9, 10], [["A", 0, 6], ["B", 6, 9], ["C", 9, 10]]]
+    assert exact == [[0, 5, 10, 13], [0, 5, 10, 13], [["A", 0, 6], ["B", 6, 8], ["C", 8, 12], ["D", 12, 14]]]
+    assert back[3:] == [["D", 12, 16], ["D", 18, 19]]
+    assert lost[3:] == [["D", 12, 16], ["D", 18, 18]]
+    assert emotions == ["A", "C", "B", "D"], "of stays, not of samples"
+    assert counts[0] <= 6000 and counts[1:] == [4000, 4000, 64]
 
 
 def test_the_newest_tick_is_a_sample_also_of_a_long_run(page):
@@ -811,7 +841,7 @@ def test_the_newest_tick_is_a_sample_also_of_a_long_run(page):
         const robots = [{name: 'B', location: {x: 0, y: 0}, emotion_state: 'A', behavior_state: 'S', state_variables: {}}];
         const store = new Store();
         store.live = {tick: 7, time_s: 3.5, robots};
-        store.refill(0, 3.5, [0, 2, 4, 6].map((tick) => ({time_s: tick / 2, robots})), 7);
+        store.refill(0, {end: 8, ticks: [0, 2, 4, 6].map((tick) => ({tick, robots})), spans: []}, 0.5);
         return store.liveHistory.times_s;
         """,
     )
@@ -853,7 +883,8 @@ def test_gaps_stay_gaps(page):
         const robots = [{name: 'B', location: {x: 0, y: 0}, emotion_state: 'A', behavior_state: 'S', state_variables: {v: 1}}];
         const store = new Store();
         store.live = {tick: 100, time_s: 50, tick_s: 0.5, robots};
-        store.refill(0, 20, [0, 20, 40].map((tick) => ({time_s: tick / 2, robots})), 40);
+        const spans = [{robot: 'B', kind: 'emotion', state: 'A', begin: 0, end: null}];
+        store.refill(0, {end: 41, ticks: [0, 20, 40].map((tick) => ({tick, robots})), spans}, 0.5);
         const read = [store.history.times_s.slice(), store.history.states.get('B').emotion.map(({from_s, to_s}) => [from_s, to_s])];
 
         const history = new History();

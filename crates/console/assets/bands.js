@@ -68,10 +68,16 @@ export class Bands {
 
   words() {
     const now = [...this.store.history.states].filter(([robot]) => this.isShown(robot)).map(([robot, { emotion, behavior }]) =>
-      [robot, emotion.at(-1)?.state, behavior.at(-1)?.state].join(" "),
+      [robot, lastOf(emotion), lastOf(behavior)].join(" "),
     );
     return `Emotion and behavior over time; last: ${now.join("; ")}`;
   }
+}
+
+/** The state at the end; "" if there is none. @param {Span[]} spans */
+function lastOf(spans) {
+  const last = spans.at(-1);
+  return last?.goesOn ? last.state : "";
 }
 
 /**
@@ -84,8 +90,8 @@ export class Bands {
  */
 export function visible(spans, first_s, last_s, x, least_px) {
   let end = -Infinity;
-  return spans.filter(({ state, from_s, to_s }) => {
-    if (state === "" || to_s < first_s || from_s > last_s || x(to_s) - end < least_px) return false;
+  return spans.filter(({ from_s, to_s }) => {
+    if (to_s < first_s || from_s > last_s || x(to_s) - end < least_px) return false;
     end = x(to_s);
     return true;
   });

@@ -1,10 +1,12 @@
 // @ts-check
-// The robots over simulated time, in bounded memory: the data of charts, bands and trails.
+// The robots over simulated time, in bounded memory: the data of charts, bands and trails. What is recorded has spans of emotions
+// and behaviors; those of the newest ticks, which are not recorded yet, are made of frames.
 
 /** @typedef {import("./types/messages.js").WorldFrame} WorldFrame */
 /** @typedef {import("./types/messages.js").RobotFrame} RobotFrame */
 
-/** A period of time in one state, or in none, which is "". @typedef {{state: string, from_s: number, to_s: number}} Span */
+/** A stay in a state; the last one of a list may go on after what is known. @typedef {{state: string, from_s: number, to_s: number, goesOn: boolean}} Span */
+/** @typedef {Pick<RobotFrame, "name" | "location" | "presence" | "emotion_state" | "behavior_state" | "state_variables">} SampledRobot */
 /** Places at the times of the history. @typedef {{x_m: (number | null)[], y_m: (number | null)[]}} Track */
 
 /** Most samples; beyond, older ones are dropped where they are close together, so that the whole run stays visible. */
@@ -12,6 +14,7 @@ const MAX_SAMPLES = 6000;
 /** Most numbers of all series together: with many robots there are fewer samples of each, and no robot is left out. */
 const MAX_NUMBERS = 3_000_000;
 const MAX_SPANS = 4000;
+const KINDS = /** @type {const} */ (["emotion", "behavior"]);
 /** Samples that are further apart than this many ticks have a gap between them: what was in between was not seen. */
 const SEEN_TICKS = 10;
 /** Most variables of all robots: a robot can publish any number of names. */
@@ -51,21 +54,50 @@ export class History {
   }
 
   /**
-   * Adds a sample that was seen. There is a gap before it if the ticks before were not.
+   * Adds a frame that was seen. There is a gap before it if the ticks before were not.
    * @param {number} time_s
    * @param {number} tick_s length of a tick
-   * @param {Parameters<History["add"]>[1]} robots
+   * @param {SampledRobot[]} robots
    * @param {Parameters<History["add"]>[3]} [measures]
    */
   see(time_s, tick_s, robots, measures) {
-    const last_s = Math.max(this.known_s, this.times_s.at(-1) ?? Infinity);
-    this.add(time_s, robots, time_s - last_s > (SEEN_TICKS + 0.5) * tick_s, measures);
+    const before_s = this.times_s.at(-1) ?? -Infinity;
+    const last_s = Math.max(this.known_s, before_s);
+    const isBroken = before_s > -Infinity && time_s - last_s > (SEEN_TICKS + 0.5) * tick_s;
+    this.add(time_s, robots, isBroken, measures);
+    if (time_s <= last_s) return;
+    for (const robot of robots) {
+      for (const kind of KINDS) {
+        // A frame has what a robot that is lost reported last.
+        const state = robot.presence === "lost" ? "" : robot[`${kind}_state`];
+        const last = isBroken ? undefined : this.spansOf(robot.name)[kind].at(-1);
+        if (last?.goesOn) {
+          last.to_s = time_s;
+          last.goesOn = last.state === state;
+        }
+        if (state && !last?.goesOn) this.push(robot.name, kind, { state, from_s: time_s, to_s: time_s, goesOn: true });
+      }
+    }
+  }
+
+  /**
+   * Adds ticks that are recorded, which follow on those before.
+   * @param {Pick<import("./recording.js").Chunk, "ticks" | "spans" | "end">} range
+   * @param {number} tick_s length of a tick
+   */
+  record({ ticks, spans, end }, tick_s) {
+    for (const { tick, robots, measures } of ticks) this.add(tick * tick_s, robots, false, measures);
+    this.known_s = (end - 1) * tick_s;
+    for (const { robot, kind, state, begin, end: over } of spans) {
+      const to_s = over === null ? this.known_s : over * tick_s;
+      this.push(robot, kind, { state, from_s: begin * tick_s, to_s, goesOn: over === null });
+    }
   }
 
   /**
    * Adds a sample; one that is not later than the last is ignored.
    * @param {number} time_s
-   * @param {Pick<RobotFrame, "name" | "location" | "presence" | "emotion_state" | "behavior_state" | "state_variables">[]} robots
+   * @param {SampledRobot[]} robots
    * @param {boolean} isBroken whether nothing is known of the time before
    * @param {Record<string, number>} measures of the run
    */
@@ -85,7 +117,7 @@ export class History {
     this.dropped = 0;
     for (const robot of robots) {
       this.place(robot);
-      this.note(robot, time_s, isBroken);
+      this.spansOf(robot.name);
       for (const [variable, value] of Object.entries(robot.state_variables)) {
         if (typeof value === "number") this.series(variable, robot.name)?.push(value);
       }
@@ -128,19 +160,25 @@ export class History {
     return new Array(this.times_s.length - 1).fill(null);
   }
 
+  /** @param {string} robot */
+  spansOf(robot) {
+    const spans = this.states.get(robot) ?? { emotion: [], behavior: [] };
+    this.states.set(robot, spans);
+    return spans;
+  }
+
   /**
-   * @param {Pick<RobotFrame, "name" | "presence" | "emotion_state" | "behavior_state">} robot
-   * @param {number} time_s
-   * @param {boolean} isBroken
+   * Adds a span, in place of what was known of it.
+   * @param {string} robot
+   * @param {"emotion" | "behavior"} kind
+   * @param {Span} span
    */
-  note({ name, presence, emotion_state, behavior_state }, time_s, isBroken) {
-    const states = this.states.get(name) ?? { emotion: [], behavior: [] };
-    this.states.set(name, states);
-    if (this.emotions.size < MAX_EMOTIONS) this.emotions.add(emotion_state);
-    // A robot that takes no part is in no state.
-    const isLost = presence === "lost";
-    extend(states.emotion, isLost ? "" : emotion_state, time_s, isBroken);
-    extend(states.behavior, isLost ? "" : behavior_state, time_s, isBroken);
+  push(robot, kind, span) {
+    const spans = this.spansOf(robot)[kind];
+    if (spans.at(-1)?.from_s === span.from_s) spans.pop();
+    if (kind === "emotion" && this.emotions.size < MAX_EMOTIONS) this.emotions.add(span.state);
+    spans.push(span);
+    if (spans.length > MAX_SPANS) spans.shift();
   }
 
   /**
@@ -225,18 +263,4 @@ export function spread(times) {
     if (isKept) last = times[i];
     return isKept;
   });
-}
-
-/**
- * @param {Span[]} spans
- * @param {string} state
- * @param {number} time_s
- * @param {boolean} isBroken whether the state before is not known
- */
-function extend(spans, state, time_s, isBroken) {
-  const last = isBroken ? undefined : spans.at(-1);
-  if (last) last.to_s = time_s;
-  if (last?.state === state) return;
-  spans.push({ state, from_s: time_s, to_s: time_s });
-  if (spans.length > MAX_SPANS) spans.shift();
 }

@@ -29,7 +29,8 @@ import { hasGuessedNames, orderNames } from "./palette.js";
  *   layers: WorldFrame["layers"], measures?: Record<string, number>}} RecordedTick
  */
 /** A panel and its tick. @typedef {{tick: number, robot: string, panel: Panel}} RecordedPanel */
-/** Ticks before `end`; `earlier_flights` are of commands that the first ones show, too. @typedef {{end: number, ticks: RecordedTick[], panels: RecordedPanel[], earlier_flights: Flight[], flights: Flight[],
+/** A stay in an emotion or behavior, up to the tick `end`, which is null if it goes on. @typedef {{robot: string, kind: "emotion" | "behavior", state: string, begin: number, end: number | null}} RecordedStay */
+/** Ticks before `end`; `earlier_flights` are of commands that the first ones show, too, and `spans` are with samples. @typedef {{end: number, ticks: RecordedTick[], spans: RecordedStay[], panels: RecordedPanel[], earlier_flights: Flight[], flights: Flight[],
  *   log: LogRecord[]}} Chunk */
 
 /** Ticks in a chunk: few, because a seek waits for a whole one. */
@@ -40,7 +41,7 @@ const MAX_NUMBERS = 12_000_000;
 const MAX_CHUNKS = 2000;
 /** Ticks of which charts and log are read at once. */
 const READ_AT_ONCE = 4096;
-/** About as many ticks of an epoch are in charts, beside those in which a robot's state changed. */
+/** About as many ticks of an epoch are in charts. */
 const SAMPLES = 3000;
 /** Lines of earlier epochs are read as long as there are fewer. */
 const ENOUGH_LINES = 10_000;
@@ -318,9 +319,8 @@ export class Player {
       if (this.readTo + 1 !== from || this.store.live?.epoch !== epoch.epoch) return;
       if (range.end <= from) return;
 
-      const times = range.ticks.map(({ tick, robots, measures }) => ({ time_s: tick * epoch.tick_s, robots, measures }));
       this.readTo = range.end - 1;
-      this.store.refill(from * epoch.tick_s, this.readTo * epoch.tick_s, times, this.readTo);
+      this.store.refill(from, range, epoch.tick_s);
       this.store.addRecorded(range.log);
       this.store.memory.forget(this.readTo);
       this.store.emit("live");
@@ -350,7 +350,7 @@ export class Player {
     for (let from = 0; from <= epoch.ticks && isWanted(); ) {
       const range = await samples(epoch, from, history ? undefined : epoch.ticks + 1);
       if (range.end <= from) return;
-      for (const { tick, robots, measures } of range.ticks) history?.add(tick * epoch.tick_s, robots, false, measures);
+      history?.record(range, epoch.tick_s);
       this.store.addRecorded(range.log);
       this.store.emit("live");
       from = range.end;

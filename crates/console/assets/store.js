@@ -259,17 +259,14 @@ export class Store {
 
   /**
    * Takes in ticks of the epoch in progress that have been recorded, in place of what was seen of them.
-   * @param {number} from_s when they begin
-   * @param {number} to_s when they end
-   * @param {{time_s: number, robots: import("./types/messages.js").RobotFrame[], measures?: Record<string, number>}[]} samples
-   * @param {number} last tick of the samples
+   * @param {number} from the first one
+   * @param {import("./recording.js").Chunk} range
+   * @param {number} tick_s length of a tick
    */
-  refill(from_s, to_s, samples, last) {
-    this.liveHistory.cutFrom(from_s);
-    for (const { time_s, robots, measures } of samples) this.liveHistory.add(time_s, robots, false, measures);
-    // What is recorded is known to its last tick, which of a long run need not be a sample.
-    this.liveHistory.known_s = to_s;
-    for (const { time_s, tick_s, robots, measures } of this.memory.after(last)) this.liveHistory.see(time_s, tick_s, robots, measures);
+  refill(from, range, tick_s) {
+    this.liveHistory.cutFrom(from * tick_s);
+    this.liveHistory.record(range, tick_s);
+    for (const { time_s, robots, measures } of this.memory.after(range.end - 1)) this.liveHistory.see(time_s, tick_s, robots, measures);
     if (this.live) this.liveHistory.see(this.live.time_s, this.live.tick_s, this.live.robots, this.live.measures);
   }
 

@@ -8,7 +8,7 @@ use protocol::messages::{Flight, HeldProcess, LogRecord, Point, Presence};
 use protocol::{Epoch, Event, RobotName, Tick};
 use recording::{Header, Json, PlacedRobot, RawTick, RecordingError, Timelines};
 use serde::Serialize;
-use timeline::{RunDecision, StateKind, Timeline};
+use timeline::{RunDecision, Span, StateKind, Timeline};
 
 use crate::diagrams::{self, DiagramError, WindowQuery};
 
@@ -18,6 +18,8 @@ pub(crate) const MAX_TICKS: u64 = 512;
 pub(crate) const MAX_SAMPLED_TICKS: u64 = 4096;
 /// Most bytes in one answer, as they are recorded; an answer has at least one tick.
 const MAX_BYTES: u64 = 32 << 20;
+/// An answer has no further ticks once this many stays in an emotion or behavior are over in it.
+const MAX_STAYS: usize = 32_768;
 
 /// Why a recording cannot be shown.
 #[derive(Debug, thiserror::Error)]
@@ -83,6 +85,8 @@ struct EncodedRange {
     end: Tick,
     /// Elements of a list: each tick as a frame of a run in progress shows it.
     ticks: List,
+    /// Emotions and behaviors of robots.
+    spans: List,
     /// Panels of these ticks.
     panels: List,
     /// What is known of commands before the range.
@@ -113,8 +117,8 @@ pub(crate) struct Wanted {
     pub(crate) from: Tick,
     /// Number of ticks.
     pub(crate) count: u64,
-    /// If set, samples for charts: of the ticks those that this number divides, and those in which a robot changed its state, was
-    /// lost or joined, without guests, layers, panels and commands. The log is complete.
+    /// If set, samples for charts: the ticks that this number divides, without guests, layers, panels and commands. The log is
+    /// complete, and with it are all stays in an emotion or behavior that were over in these ticks or go on after them.
     pub(crate) every: Option<u64>,
 }
 
@@ -125,21 +129,6 @@ impl Wanted {
             None => self.count <= MAX_TICKS,
             Some(every) => every > 0 && self.count <= MAX_SAMPLED_TICKS,
         }
-    }
-
-    fn is_sampled(&self, recorded: &RawTick) -> bool {
-        let changes = |event: &Event| {
-            matches!(
-                event,
-                Event::Emotion { .. }
-                    | Event::Behavior { .. }
-                    | Event::Lost { .. }
-                    | Event::Joined { .. }
-            )
-        };
-        self.every.is_none_or(|every| {
-            recorded.tick().is_multiple_of(every) || recorded.events.iter().any(changes)
-        })
     }
 }
 
@@ -237,10 +226,12 @@ impl RecordedEpoch {
             timeline
         };
         let mut last_reports = BTreeMap::new();
+        let mut stays = 0;
         for mut recorded in file.read_raw(from, to)? {
             let tick = recorded.tick();
-            timeline.tick(tick, &recorded.events);
+            let over = timeline.tick(tick, &recorded.events);
             if every.is_some() {
+                stays += range.add_stays(&over);
                 recorded.panels.clear();
                 recorded.frame.guests_mm.clear();
                 recorded.frame.guest_numbers.clear();
@@ -255,9 +246,17 @@ impl RecordedEpoch {
                 }
             }
             range.log.extend(recorded.log(&self.header));
-            if wanted.is_sampled(&recorded) {
-                add_tick(&file, recorded, &timeline, &mut last_reports, &mut range)?;
+            last_reports.append(&mut recorded.reports);
+            if every.is_none_or(|every| tick.is_multiple_of(every)) {
+                add_tick(&file, &recorded, &timeline, &mut last_reports, &mut range)?;
             }
+            if stays >= MAX_STAYS {
+                range.end = tick.saturating_add(1);
+                break;
+            }
+        }
+        if every.is_some() {
+            range.add_stays(&timeline.in_progress());
         }
         Ok(range.into_json())
     }
@@ -285,18 +284,15 @@ impl RecordedEpoch {
     }
 }
 
-/// Adds a tick as the page shows it. `last_reports` has the last report of each robot in the ticks before, as far as they
-/// have been read.
+/// Adds a tick as the page shows it. `last_reports` has the last report of each robot up to this tick, as far as ticks have
+/// been read.
 fn add_tick(
     file: &recording::Recording,
-    mut recorded: RawTick,
+    recorded: &RawTick,
     timeline: &Timeline,
     last_reports: &mut BTreeMap<RobotName, Json>,
     range: &mut EncodedRange,
 ) -> Result<(), RecordingError> {
-    let tick = recorded.tick();
-    last_reports.append(&mut recorded.reports);
-
     let mut robots = List::default();
     for robot in &recorded.frame.robots {
         let last_report = robot.missed.and_then(|missed| missed.last_report);
@@ -328,7 +324,7 @@ fn add_tick(
         .collect();
 
     range.ticks.add_object(&[
-        ("tick", &to_json(&tick)),
+        ("tick", &to_json(&recorded.tick())),
         ("robots", &robots.into_json()),
         ("guests_mm", &to_json(&recorded.frame.guests_mm)),
         ("guest_numbers", &to_json(&recorded.frame.guest_numbers)),
@@ -350,6 +346,27 @@ fn add_tick(
 }
 
 impl EncodedRange {
+    /// Adds the stays among these spans. Returns how many there are.
+    fn add_stays(&mut self, spans: &[Span]) -> usize {
+        let stays = spans.iter().filter_map(|span| match span {
+            Span::Stay(stay) => Some(stay),
+            _ => None,
+        });
+        let mut count = 0;
+        for stay in stays {
+            self.spans.add_object(&[
+                ("robot", &to_json(&stay.robot)),
+                ("kind", &to_json(&word(stay.kind))),
+                ("state", &to_json(&stay.name)),
+                ("begin", &to_json(&stay.period.begin)),
+                // None if it goes on after the range.
+                ("end", &to_json(&stay.period.end)),
+            ]);
+            count += 1;
+        }
+        count
+    }
+
     /// Adds a panel with the tick in which it arrived.
     fn add_panel(&mut self, tick: Tick, robot: &RobotName, panel: &Json) {
         self.panels.add_object(&[
@@ -364,6 +381,7 @@ impl EncodedRange {
         range.add_object(&[
             ("end", &to_json(&self.end)),
             ("ticks", &self.ticks.into_json()),
+            ("spans", &self.spans.into_json()),
             ("panels", &self.panels.into_json()),
             ("earlier_flights", &to_json(&self.earlier_flights)),
             ("flights", &to_json(&self.flights)),
@@ -420,6 +438,13 @@ impl List {
         list.insert(0, b'[');
         list.push(b']');
         list
+    }
+}
+
+fn word(kind: StateKind) -> &'static str {
+    match kind {
+        StateKind::Emotion => "emotion",
+        StateKind::Behavior => "behavior",
     }
 }
 

@@ -14,6 +14,7 @@ use protocol::{Event, RobotName, RunName};
 use recording::content::Missed;
 use recording::{Frame, Header, PlacedRobot, RecordedTick, WallTimes, Writer};
 use serde_json::{Value, json};
+use timeline::{Span, StateKind, StateSpan, Timeline};
 
 use crate::client::{Console, fails};
 
@@ -722,39 +723,226 @@ fn without_its_folder_a_run_in_progress_has_no_past() {
     }
 }
 
+fn emotion(name: &str, to: &str) -> Event {
+    let (robot, to) = (robot(name), to.to_owned());
+    let from = None;
+    Event::Emotion { robot, from, to }
+}
+
+fn behavior(name: &str, to: &str) -> Event {
+    let (robot, to) = (robot(name), to.to_owned());
+    let from = None;
+    Event::Behavior { robot, from, to }
+}
+
 #[test]
-fn samples_have_every_change_of_state_and_the_whole_log() {
+fn samples_have_the_whole_log_and_the_last_reports() {
     let folder = tempfile::tempdir().unwrap();
-    let ticks_with_changes = (0..9000).map(|tick| {
+    let recorded = (0..9000).map(|tick| {
         let mut recorded = recorded_tick(tick);
         if tick == 1234 {
-            Arc::make_mut(&mut recorded.events).push(Event::Emotion {
-                robot: robot("Butler"),
-                from: Some("HAPPY".to_owned()),
-                to: "ANGRY".to_owned(),
-            });
+            Arc::make_mut(&mut recorded.events).push(emotion("Butler", "ANGRY"));
+        }
+        if tick > 1250 {
+            recorded.reports.clear();
+            let last_report = Some(1250);
+            recorded.frame.robots[0].missed = Some(Missed { last_report });
         }
         recorded
     });
-    write(&file(folder.path()), ticks_with_changes);
+    write(&file(folder.path()), recorded);
     let console = open(folder.path());
 
     let range = console
         .get("recording/ticks?from=1000&count=4096&every=500")
         .json();
-    let expected = [1000, 1234, 1500, 2000, 2500, 3000, 3500, 4000, 4500, 5000];
+    let expected = [1000, 1500, 2000, 2500, 3000, 3500, 4000, 4500, 5000];
     assert_eq!(ticks(&range["ticks"]), expected);
     assert_eq!(range["end"], 5096);
-    let tick = &range["ticks"][0];
-    assert_eq!(tick["guests_mm"], json!([]));
-    assert_eq!(tick["robots"][0]["state_variables"]["treats"], 1000.0);
+    let sample = &range["ticks"][0];
+    assert_eq!(sample["guests_mm"], json!([]));
+    let treats = |index: usize| &range["ticks"][index]["robots"][0]["state_variables"]["treats"];
+    assert_eq!(treats(0), 1000.0);
+    assert_eq!(treats(1), 1250.0, "also of a tick that is no sample");
     assert_eq!(range["flights"], json!([]));
     // A line of each tick, the commands, and the change.
     assert_eq!(ticks(&range["log"]).len(), 4096 + 410 + 1);
+    let stay =
+        json!({"robot": "Butler", "kind": "emotion", "state": "ANGRY", "begin": 1234, "end": null});
+    assert_eq!(range["spans"], json!([stay]));
 
     for query in ["count=4097&every=9", "count=9&every=0", "count=9&every=-1"] {
         let answer = console.get(&format!("recording/ticks?from=0&{query}"));
         assert_eq!(answer.status, 400, "{query}: {answer:?}");
+    }
+}
+
+/// Two robots that change their states every few ticks. One crashes twice and comes back once, the other one hangs, and a link is
+/// cut.
+fn eventful(tick: u64, epoch: u64) -> Vec<Event> {
+    let joined = |name: &str, generation| Event::Joined {
+        robot: robot(name),
+        generation,
+        at: Point::new(1.0, 1.0),
+    };
+    let lost = |name: &str| Event::Lost { robot: robot(name) };
+    let hang = |begins| Event::Fault {
+        robot: robot("Butler"),
+        kind: FaultKind::Hang,
+        begins,
+    };
+    let (from, to) = (robot("Butler"), robot("Leguin"));
+
+    let mut events = match tick {
+        0 => vec![joined("Butler", None), joined("Leguin", None)],
+        41 | 200 => vec![lost("Leguin")],
+        90 => vec![joined("Leguin", Some(2))],
+        120 => vec![hang(true)],
+        128 => vec![hang(false)],
+        150 => vec![Event::LinkCut {
+            from,
+            to,
+            commands: true,
+            queries: true,
+        }],
+        170 => vec![Event::LinkHealed { from, to }],
+        _ => Vec::new(),
+    };
+    let hangs = (120..128).contains(&tick);
+    if hangs {
+        let robot = robot("Butler");
+        events.push(Event::Missed { robot });
+    }
+    let is_lost = (41..90).contains(&tick) || tick >= 200;
+    let names = ["HAPPY", "BUSY", "", "LONELY"];
+    for (name, every, is_there) in [("Butler", 7, !hangs), ("Leguin", 11, !is_lost)] {
+        let turn = |every| names[((tick / every + epoch) % 4) as usize];
+        if is_there && tick.is_multiple_of(every) {
+            events.push(emotion(name, turn(every)));
+        }
+        if is_there && tick.is_multiple_of(every + 3) {
+            events.push(behavior(name, turn(every + 3)));
+        }
+    }
+    events
+}
+
+/// The stays of a run, as the timeline over all of its ticks has them; without an end, they go on after the last one.
+fn stays(ticks: u64, events: impl Fn(u64) -> Vec<Event>) -> Vec<StateSpan> {
+    let mut timeline = Timeline::new(&header().robots);
+    let mut spans = Vec::new();
+    for tick in 0..ticks {
+        spans.extend(timeline.tick(tick, &events(tick)));
+    }
+    spans.extend(timeline.in_progress());
+    let stays = spans.into_iter().filter_map(|span| match span {
+        Span::Stay(stay) => Some(stay),
+        _ => None,
+    });
+    stays.collect()
+}
+
+/// What an answer says of the stays of a run, in any order.
+fn told(stays: &[StateSpan], from: u64, end: u64) -> Vec<String> {
+    let mut told = Vec::new();
+    for stay in stays {
+        if stay.period.begin < end && stay.period.lasts_to(from) {
+            let kind = match stay.kind {
+                StateKind::Emotion => "emotion",
+                StateKind::Behavior => "behavior",
+            };
+            let end = stay.period.end.filter(|over| *over < end);
+            let begin = stay.period.begin;
+            let stay = json!({"robot": stay.robot, "kind": kind, "state": stay.name, "begin": begin, "end": end});
+            told.push(stay.to_string());
+        }
+    }
+    told.sort();
+    told
+}
+
+fn spans_of(range: &Value) -> Vec<String> {
+    let spans = range["spans"].as_array().unwrap().iter();
+    let mut spans: Vec<String> = spans.map(Value::to_string).collect();
+    spans.sort();
+    spans
+}
+
+#[test]
+fn spans_are_those_of_the_timeline_of_the_whole_epoch_in_any_pieces() {
+    let lengths = [(2, 130), (3, 1300)];
+    let folder = tempfile::tempdir().unwrap();
+    for (epoch, length) in lengths {
+        let name = if epoch == 2 {
+            "run-epoch2.mcap"
+        } else {
+            "run.mcap"
+        };
+        let recorded = (0..length).map(|tick| RecordedTick {
+            events: eventful(tick, epoch).into(),
+            ..recorded_tick(tick)
+        });
+        let header = Header {
+            epoch: u32::try_from(epoch).unwrap(),
+            ..header()
+        };
+        let mut writer = Writer::create(&folder.path().join(name), &header, "").unwrap();
+        for tick in recorded {
+            writer.tick(tick).unwrap();
+        }
+        writer.finish().unwrap();
+    }
+    let console = open(folder.path());
+
+    for (epoch, length) in lengths {
+        let stays = stays(length, |tick| eventful(tick, epoch));
+        assert!(stays.len() > 20);
+        for (count, every) in [(4096, 1), (4096, 5000), (512, 10), (41, 3), (1, 7)] {
+            let mut from = 0;
+            while from < length.min(300 * count) {
+                let query = format!("from={from}&count={count}&every={every}&epoch={epoch}");
+                let range = console.get(&format!("recording/ticks?{query}")).json();
+                let end = range["end"].as_u64().unwrap();
+                assert_eq!(end, length.min(from + count), "{query}");
+                assert_eq!(spans_of(&range), told(&stays, from, end), "{query}");
+                from = end;
+            }
+        }
+    }
+
+    let whole = get_range(&console, 0, 300);
+    assert_eq!(whole["spans"], json!([]), "they are with samples");
+}
+
+#[test]
+fn an_answer_has_fewer_ticks_if_it_has_many_spans() {
+    let every_tick = |tick: u64| {
+        let to = ["ONE", "OTHER"][(tick % 2) as usize];
+        let names = ["A", "B", "C", "D", "E"];
+        let events = names.map(|name| [emotion(name, to), behavior(name, to)]);
+        events.concat()
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let recorded = (0..4096).map(|tick| RecordedTick {
+        events: every_tick(tick).into(),
+        ..recorded_tick(tick)
+    });
+    write(&file(folder.path()), recorded);
+    let console = open(folder.path());
+    let stays = stays(4096, every_tick);
+
+    let mut from = 0;
+    for expected in [3278, 4096] {
+        let query = format!("recording/ticks?from={from}&count=4096&every=1000");
+        let range = console.get(&query).json();
+        // Ten stays are over in each tick but the first: with the 3277th such tick there are 32,768, and ten go on.
+        let end = range["end"].as_u64().unwrap();
+        assert_eq!(end, expected);
+        let spans = spans_of(&range);
+        assert!(spans.len() <= 32_768 + 20, "{}", spans.len());
+        assert_eq!(spans, told(&stays, from, end));
+        assert_eq!(ticks(&range["log"]).last(), Some(&(end - 1)));
+        from = end;
     }
 }
 
