@@ -5,6 +5,7 @@ use protocol::messages::{Delivery, Payload, Performative, TickUpdate};
 use protocol::{RobotName, Tick};
 
 use crate::body::{ROUND, RobotBody};
+use crate::comparison::demand_same;
 use crate::harness::{Harness, HarnessOptions};
 use crate::kit::Kit;
 use crate::report::RuleFailure;
@@ -179,6 +180,17 @@ pub(crate) fn play(
     }
 
     Ok(transcript)
+}
+
+/// Plays the usual ticks to a robot that has joined, and demands that it goes through them as without `disturbance`.
+pub(crate) fn demand_usual(
+    harness: &mut Harness<'_>,
+    what: &str,
+    disturbance: &mut dyn Disturbance,
+) -> Result<(), RuleFailure> {
+    let kit = harness.kit;
+    let played = play(harness, &PlayScript::usual(kit), disturbance)?;
+    demand_same(kit, what, usual(kit)?, &played)
 }
 
 /// Plays the next tick.

@@ -390,11 +390,16 @@ pub(super) fn payload(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     // As deep as a payload may be.
     let deepest = (2..MAX_PAYLOAD_DEPTH).fold(json!([]), |inner, _| json!([inner]));
     let payloads = [
-        json!({ "task": 3, "bid": 0.1, "of": ["A", null, true] }),
-        json!(largest),
-        json!([u64::MAX, i64::MIN, -0.0, 1e300, deepest]),
+        (
+            "a payload",
+            json!({ "task": 3, "bid": 0.1, "of": ["A", null, true] }),
+        ),
+        ("the largest payload", json!(largest)),
+        (
+            "the deepest payload and large numbers",
+            json!([u64::MAX, i64::MIN, -0.0, 1e300, deepest]),
+        ),
     ];
-
     let with_payload = |text: &str, payload: &Value| {
         let arrival = ArrivingCommand {
             payload: Payload::new(payload.clone()),
@@ -402,48 +407,41 @@ pub(super) fn payload(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         };
         played(kit, &PlayScript::with(TICKS, vec![arrival]))
     };
-    for payload in &payloads {
+    for (_, payload) in &payloads {
         with_payload(&text, payload)?;
     }
 
-    // Of a text that the robot does not know, it expects no payload.
-    let short = "x".repeat(SHORT_TEXT);
-    let mut any = Vec::new();
-    let whats = [
-        "with a payload",
-        "with the largest payload",
-        "with the deepest payload and large numbers",
-    ];
-    for (payload, what) in payloads.iter().zip(whats) {
-        any.push((
-            format!("a text {what}"),
-            numbers(&with_payload(&short, payload)?),
-        ));
-    }
-    demand_any(kit, &short, any)
-}
-
-/// A long text, several of them in one tick, and one with all that JSON escapes, are read. They are counted like a short one where a variable counts commands that
-/// the robot does not know, and so are `others`.
-fn demand_any(
-    kit: &Kit,
-    short: &str,
-    others: Vec<(String, BTreeMap<String, f64>)>,
-) -> Result<(), RuleFailure> {
     // Programs may quote it in a line of their log, which is not to be longer.
     let room = if kit.stdio.is_program() { QUOTED_BY } else { 0 };
     let longest = "x".repeat(MAX_TEXT_BYTES - room);
-    let long = commanded(kit, &[(&longest, LAST)])?;
     // Together they are longer than a text may be.
     commanded(kit, &[(longest.as_str(), LAST); 4])?;
-    let escaped = commanded(kit, &[(ESCAPED_TEXT, LAST)])?;
+
+    // Of a text that the robot does not know, it expects no payload.
+    let short = "x".repeat(SHORT_TEXT);
+    let mut unknown = Vec::new();
+    for (what, payload) in payloads {
+        let played = with_payload(&short, &payload)?;
+        unknown.push((format!("a text with {what}"), played));
+    }
+    for (what, text) in [
+        (format!("a text of {} bytes", longest.len()), &*longest),
+        (format!("the text {ESCAPED_TEXT:?}"), ESCAPED_TEXT),
+    ] {
+        unknown.push((what, commanded(kit, &[(text, LAST)])?));
+    }
+    demand_counted(kit, &short, &unknown)
+}
+
+/// Where a variable counts commands that the robot does not know, it counts the one in each of these plays like a short one.
+fn demand_counted(
+    kit: &Kit,
+    short: &str,
+    plays: &[(String, Transcript)],
+) -> Result<(), RuleFailure> {
     if kit.is_deterministic.get() == Some(&false) {
         return Ok(());
     }
-    let mut any = others;
-    any.push((format!("a text of {} bytes", longest.len()), numbers(&long)));
-    any.push((format!("the text {ESCAPED_TEXT:?}"), numbers(&escaped)));
-
     let none = numbers(&commanded(kit, &[])?);
     let once = numbers(&commanded(kit, &[(short, LAST)])?);
     let apart = numbers(&commanded(kit, &[(short, LAST - 1), (short, LAST)])?);
@@ -452,9 +450,8 @@ fn demand_any(
             continue;
         };
         let is_counter = counts(before, first, second);
-        for (text, came) in &any {
-            let came = came.get(name);
-            if is_counter && came == Some(before) {
+        for (text, play) in plays {
+            if is_counter && numbers(play).get(name) == Some(before) {
                 return Err(RuleFailure::new(
                     format!("{text} counts as one of {SHORT_TEXT} bytes: {name} = {first}"),
                     format!("{name} = {before}"),

@@ -6,13 +6,12 @@ use nix::sys::signal::Signal;
 use protocol::messages::{Clock, End};
 
 use super::waiting;
-use crate::comparison::demand_same;
 use crate::findings::Findings;
 use crate::harness::{Harness, HarnessOptions};
 use crate::kit::Kit;
 use crate::patience::{PATIENCE, in_each_attempt};
 use crate::report::RuleFailure;
-use crate::script::{Disturbance, PlayScript, Straight, play, step, usual, with_robot};
+use crate::script::{Disturbance, PlayScript, Straight, demand_usual, play, step, with_robot};
 use crate::transcript::PlayedTick;
 
 /// A process ends within this time after SIGTERM. The page allows 2 s; signals and the kernel need some, too.
@@ -126,9 +125,8 @@ pub(super) fn gone_for_a_while(kit: &Kit, _: &mut Findings) -> Result<(), RuleFa
         ..HarnessOptions::default()
     };
     let mut harness = with_robot(kit, options)?;
-    let played = play(&mut harness, &PlayScript::usual(kit), &mut SimulatorAway)?;
     let what = format!("that the simulator was gone for {} s", CUT.as_secs());
-    demand_same(kit, &what, usual(kit)?, &played)?;
+    demand_usual(&mut harness, &what, &mut SimulatorAway)?;
     waiting::while_asking(
         kit,
         "that the simulator was gone while it waits for an answer",

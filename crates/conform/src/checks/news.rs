@@ -5,12 +5,11 @@ use std::time::Duration;
 use protocol::Tick;
 use protocol::messages::{Correction, Point, TickUpdate};
 
-use crate::comparison::demand_same;
 use crate::findings::Findings;
 use crate::harness::{Harness, HarnessOptions};
 use crate::kit::Kit;
 use crate::report::RuleFailure;
-use crate::script::{Disturbance, PlayScript, Straight, play, usual, with_robot};
+use crate::script::{Disturbance, PlayScript, Straight, demand_usual, play, with_robot};
 
 /// A report that must not come has come after this time.
 const QUIET: Duration = Duration::from_millis(150);
@@ -52,13 +51,8 @@ pub(super) fn wait(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         }
     }
     let mut harness = with_robot(kit, HarnessOptions::default())?;
-    let played = play(&mut harness, &PlayScript::usual(kit), &mut LateNews)?;
-    demand_same(
-        kit,
-        "that its news come after the clock",
-        usual(kit)?,
-        &played,
-    )?;
+    let what = "that its news come after the clock";
+    demand_usual(&mut harness, what, &mut LateNews)?;
 
     all_flags(kit)?;
     others_flags(kit)

@@ -8,14 +8,13 @@ use protocol::messages::{Answer, Point, PublicState, TickUpdate};
 use protocol::{Epoch, Tick, decode};
 
 use super::{computing, waiting, wire};
-use crate::comparison::demand_same;
 use crate::fake_peers::ReceivedQuery;
 use crate::findings::Findings;
 use crate::harness::{Harness, HarnessOptions};
 use crate::kit::Kit;
 use crate::patience::{PATIENCE, in_each_attempt};
 use crate::report::RuleFailure;
-use crate::script::{Disturbance, PlayScript, Straight, can_query, play, usual, with_robot};
+use crate::script::{Disturbance, PlayScript, Straight, can_query, demand_usual, play, with_robot};
 use crate::transcript::{PlayedTick, Transcript};
 
 /// The kit's own limit where it waits until all replies are in.
@@ -517,13 +516,8 @@ pub(super) fn unreachable(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure
     }
 
     let mut harness = with_robot(kit, HarnessOptions::default())?;
-    let played = play(&mut harness, &PlayScript::usual(kit), &mut Misplaced)?;
-    demand_same(
-        kit,
-        "what robots put that are unreachable, or not in range",
-        usual(kit)?,
-        &played,
-    )
+    let what = "what robots put that are unreachable, or not in range";
+    demand_usual(&mut harness, what, &mut Misplaced)
 }
 
 /// A robot that queries nobody does not do so only because its news list nobody: all are in range where they have no list.
@@ -664,6 +658,5 @@ pub(super) fn unknown(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     }
 
     let mut harness = with_robot(kit, HarnessOptions::default())?;
-    let asked = play(&mut harness, &PlayScript::usual(kit), &mut Odd)?;
-    demand_same(kit, "a query for what does not exist", usual(kit)?, &asked)
+    demand_usual(&mut harness, "a query for what does not exist", &mut Odd)
 }

@@ -7,13 +7,12 @@ use protocol::messages::{Clock, Correction, Point, TickUpdate};
 use protocol::{Epoch, Tick};
 
 use super::waiting;
-use crate::comparison::demand_same;
 use crate::findings::Findings;
 use crate::harness::{Harness, HarnessOptions};
 use crate::kit::Kit;
 use crate::patience::PATIENCE;
 use crate::report::RuleFailure;
-use crate::script::{Disturbance, PlayScript, play, usual, with_robot};
+use crate::script::{Disturbance, demand_usual, with_robot};
 use crate::seen::{ReceivedReport, ReportedCommand};
 use crate::transcript::PlayedTick;
 
@@ -41,8 +40,7 @@ pub(super) fn duplicate(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> 
     }
     let mut harness = with_robot(kit, HarnessOptions::default())?;
     harness.doubles_news = true;
-    let repeated = play(&mut harness, &PlayScript::usual(kit), &mut Again)?;
-    demand_same(kit, "a clock that comes again", usual(kit)?, &repeated)?;
+    demand_usual(&mut harness, "a clock that comes again", &mut Again)?;
     waiting::while_asking(
         kit,
         "a clock that comes again, with its news, while it waits for an answer",
@@ -209,11 +207,6 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         }
     }
     let mut harness = with_robot(kit, HarnessOptions::default())?;
-    let played = play(&mut harness, &PlayScript::usual(kit), &mut Late(Vec::new()))?;
-    demand_same(
-        kit,
-        "a clock of an earlier tick or epoch",
-        usual(kit)?,
-        &played,
-    )
+    let what = "a clock of an earlier tick or epoch";
+    demand_usual(&mut harness, what, &mut Late(Vec::new()))
 }

@@ -3,12 +3,11 @@
 use protocol::Tick;
 use protocol::messages::MAX_TEXT_BYTES;
 
-use crate::comparison::demand_same;
 use crate::findings::Findings;
 use crate::harness::{Harness, HarnessOptions};
 use crate::kit::Kit;
 use crate::report::RuleFailure;
-use crate::script::{Disturbance, PlayScript, Straight, play, usual, with_robot};
+use crate::script::{Disturbance, Straight, demand_usual, with_robot};
 
 /// Later versions of the contract add fields: everything that the robot receives carries some.
 pub(super) fn unknown_fields(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
@@ -19,8 +18,7 @@ pub(super) fn unknown_fields(kit: &Kit, _: &mut Findings) -> Result<(), RuleFail
             ..HarnessOptions::default()
         },
     )?;
-    let played = play(&mut harness, &PlayScript::usual(kit), &mut Straight)?;
-    demand_same(kit, "an unknown field", usual(kit)?, &played)
+    demand_usual(&mut harness, "an unknown field", &mut Straight)
 }
 
 /// JSON does not distinguish 7 from 7.0: everything that the robot receives has whole numbers without a fraction.
@@ -32,8 +30,7 @@ pub(super) fn integers(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
             ..HarnessOptions::default()
         },
     )?;
-    let played = play(&mut harness, &PlayScript::usual(kit), &mut Straight)?;
-    demand_same(kit, "that 7.0 is written as 7", usual(kit)?, &played)
+    demand_usual(&mut harness, "that 7.0 is written as 7", &mut Straight)
 }
 
 /// Messages that cannot be understood change nothing, and are reported.
@@ -57,13 +54,8 @@ pub(super) fn malformed(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> 
     let mut harness = with_robot(kit, HarnessOptions::default())?;
     // What it has printed when it started does not count.
     let before = harness.process.error_bytes();
-    let played = play(&mut harness, &PlayScript::usual(kit), &mut Rubbish)?;
-    demand_same(
-        kit,
-        "a message that cannot be understood",
-        usual(kit)?,
-        &played,
-    )?;
+    let what = "a message that cannot be understood";
+    demand_usual(&mut harness, what, &mut Rubbish)?;
 
     if harness.process.error_bytes() == before {
         return Err(RuleFailure::new(
@@ -87,9 +79,8 @@ pub(super) fn commands_of_others(kit: &Kit, _: &mut Findings) -> Result<(), Rule
     }
 
     let mut harness = with_robot(kit, HarnessOptions::default())?;
-    let played = play(&mut harness, &PlayScript::usual(kit), &mut Sending)?;
-    let cause = "a command that others put for the medium, and that is not in its news";
-    demand_same(kit, cause, usual(kit)?, &played)
+    let what = "a command that others put for the medium, and that is not in its news";
+    demand_usual(&mut harness, what, &mut Sending)
 }
 
 /// Not JSON, not an object, not all of it, not the right kinds.
