@@ -139,12 +139,9 @@ impl Robot {
         let file = self.folder.join("robot.py");
         let mut robot = std::fs::read_to_string(&file).unwrap();
         for method in methods(text) {
-            let (head, _) = method.split_once('\n').unwrap();
-            let robot_before = robot.clone();
-            let old: Vec<String> = methods(&robot_before)
-                .into_iter()
-                .filter(|old| old.starts_with(&format!("{head}\n")))
-                .collect();
+            let head = method.lines().next();
+            let mut old = methods(&robot);
+            old.retain(|old| old.lines().next() == head);
             let [old] = &old[..] else {
                 panic!("{} methods begin with {head:?}", old.len())
             };
