@@ -356,7 +356,7 @@ impl EncodedRange {
         for stay in stays {
             self.spans.add_object(&[
                 ("robot", &to_json(&stay.robot)),
-                ("kind", &to_json(&word(stay.kind))),
+                ("kind", &to_json(&stay.kind.as_str())),
                 ("state", &to_json(&stay.name)),
                 ("begin", &to_json(&stay.period.begin)),
                 // None if it goes on after the range.
@@ -438,13 +438,6 @@ impl List {
         list.insert(0, b'[');
         list.push(b']');
         list
-    }
-}
-
-fn word(kind: StateKind) -> &'static str {
-    match kind {
-        StateKind::Emotion => "emotion",
-        StateKind::Behavior => "behavior",
     }
 }
 

@@ -166,12 +166,8 @@ impl Diagram {
         let mut rows = Vec::new();
         for band in &items.bands {
             if let Some((begin, end)) = self.window.clip(band.period) {
-                let kind = match band.kind {
-                    StateKind::Emotion => "emotion",
-                    StateKind::Behavior => "behavior",
-                };
                 rows.push(vec![
-                    ("kind", kind.to_owned()),
+                    ("kind", band.kind.as_str().to_owned()),
                     ("robot", band.robot.to_string()),
                     ("state", band.name.clone()),
                     ("from_s", seconds(begin)),

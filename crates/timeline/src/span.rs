@@ -76,6 +76,17 @@ pub enum StateKind {
     Behavior,
 }
 
+impl StateKind {
+    /// How it is written.
+    #[must_use]
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Emotion => "emotion",
+            Self::Behavior => "behavior",
+        }
+    }
+}
+
 /// A time without a break in which a robot was in one state.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StateSpan {

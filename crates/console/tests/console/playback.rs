@@ -14,7 +14,7 @@ use protocol::{Event, RobotName, RunName};
 use recording::content::Missed;
 use recording::{Frame, Header, PlacedRobot, RecordedTick, WallTimes, Writer};
 use serde_json::{Value, json};
-use timeline::{Span, StateKind, StateSpan, Timeline};
+use timeline::{Span, StateSpan, Timeline};
 
 use crate::client::{Console, fails};
 
@@ -847,10 +847,7 @@ fn told(stays: &[StateSpan], from: u64, end: u64) -> Vec<String> {
     let mut told = Vec::new();
     for stay in stays {
         if stay.period.begin < end && stay.period.lasts_to(from) {
-            let kind = match stay.kind {
-                StateKind::Emotion => "emotion",
-                StateKind::Behavior => "behavior",
-            };
+            let kind = stay.kind.as_str();
             let end = stay.period.end.filter(|over| *over < end);
             let begin = stay.period.begin;
             let stay = json!({"robot": stay.robot, "kind": kind, "state": stay.name, "begin": begin, "end": end});

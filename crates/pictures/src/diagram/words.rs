@@ -6,7 +6,7 @@ use protocol::messages::FaultKind;
 use protocol::time::time_s;
 use timeline::{
     Absence, ChangeSpan, CommandSpan, CutSpan, FaultSpan, Joined, MissedTicks, Period, QueriesLost,
-    StateKind, StateSpan,
+    StateSpan,
 };
 
 use crate::diagram::items::{HeldTick, SiteMark};
@@ -76,10 +76,7 @@ impl Titles {
     }
 
     pub(crate) fn band(self, band: &StateSpan) -> String {
-        let kind = match band.kind {
-            StateKind::Emotion => "emotion",
-            StateKind::Behavior => "behavior",
-        };
+        let kind = band.kind.as_str();
         let name = shortened(&band.name, TITLE_LETTERS);
         let period = self.period(band.period);
         format!("{}: {kind} {name}, {period}", band.robot)
