@@ -220,7 +220,8 @@ impl FakePeers {
         let mut value = serde_json::from_slice(&bytes).unwrap_or(Value::Null);
         if self.has_extras {
             add_extras(&mut value);
-            add_defaults(".", &mut value);
+            let name = std::any::type_name::<M>().rsplit("::").next();
+            add_defaults(name.unwrap_or_default(), &mut value);
         }
         if self.writes_integers {
             write_integers(&mut value);
@@ -336,11 +337,20 @@ impl FakePeers {
     }
 }
 
-/// Fields that are left out where they have their default, by the list or object that they belong to; `.` is the message.
-const DEFAULTS: [(&str, &str, &str); 5] = [
-    (".", "commands", "[]"),
-    (".", "sensed", "[]"),
-    (".", "unreachable", "[]"),
+/// Fields that are left out where they have their default, by the type, list or object that they belong to.
+const DEFAULTS: [(&str, &str, &str); 6] = [
+    (
+        "JoinAnswer",
+        "known_sites earlier_parameters later_parameters reseeds",
+        "[]",
+    ),
+    ("Clock", "news", "0"),
+    ("Clock", "panels", "false"),
+    (
+        "TickUpdate",
+        "commands unreachable sensed bodies ranges sites site_results layers layer_results",
+        "[]",
+    ),
     ("correction", "blocked", "false"),
     ("commands", "performative", "\"achieve\""),
 ];
@@ -355,10 +365,10 @@ fn add_defaults(name: &str, value: &mut Value) {
             for (within, field) in fields.iter_mut() {
                 add_defaults(within, field);
             }
-            for (within, field, default) in DEFAULTS {
-                if within == name && !fields.contains_key(field) {
-                    let default = serde_json::from_str(default).unwrap_or(Value::Null);
-                    fields.insert(field.to_owned(), default);
+            for (_, names, default) in DEFAULTS.iter().filter(|(within, ..)| *within == name) {
+                for field in names.split(' ') {
+                    let default = || serde_json::from_str(default).unwrap_or(Value::Null);
+                    fields.entry(field).or_insert_with(default);
                 }
             }
         }
@@ -407,6 +417,9 @@ fn write_integers(value: &mut Value) {
 
 #[cfg(test)]
 mod tests {
+    use protocol::decode;
+    use protocol::messages::{Clock, TickUpdate};
+
     use super::*;
 
     #[test]
@@ -431,6 +444,20 @@ mod tests {
                 "{path}"
             );
         }
+    }
+
+    #[test]
+    fn defaults_that_are_written_out_are_those_of_the_messages() {
+        let peers = FakePeers::new(BTreeMap::new(), true, false);
+        let clock = Clock::default();
+        let update = TickUpdate::default();
+
+        let clock_bytes = peers.dress(&clock);
+        assert_eq!(decode::<Clock>("", "", &clock_bytes).unwrap(), clock);
+        let update_bytes = peers.dress(&update);
+        assert_eq!(decode::<TickUpdate>("", "", &update_bytes).unwrap(), update);
+        let written: Value = serde_json::from_slice(&update_bytes).unwrap();
+        assert_eq!(written["layer_results"], json!([]));
     }
 
     #[test]

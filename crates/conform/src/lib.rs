@@ -21,7 +21,6 @@ mod body;
 mod checks;
 mod comparison;
 mod fake_peers;
-mod flushing;
 mod harness;
 mod kit;
 mod load;
@@ -34,12 +33,12 @@ mod setting;
 mod transcript;
 mod wire;
 
-use verdicts::{findings, report, rules, stdio};
+use verdicts::{findings, flushing, report, rules, stdio};
 
 pub use checks::check;
-pub use flushing::unflushed;
 pub use kit::CannotRun;
 pub use setting::{CheckSetting, PlayedLayer, RosterRobot};
+pub use verdicts::flushing::unflushed;
 pub use verdicts::report::{
     AnswerTimes, CheckReport, KitPart, PlayedRun, RuleFailure, RuleOutcome, RuleVerdict,
 };

@@ -27,6 +27,9 @@ const DRAWS: u64 = 16;
 const DRAWN: Tick = 12;
 /// The tick from which on it draws from another stream in the same epoch.
 const RESEEDED: Tick = 4;
+const RESEEDED_AGAIN: Tick = 8;
+/// How far from its place in one epoch a robot is placed in a further one.
+const MOVED_M: f64 = 0.25;
 
 /// Another process, the same seed: the same reports.
 pub(super) fn same_seed(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
@@ -111,17 +114,24 @@ fn demand_reseeded(
     stream: &str,
 ) -> Result<(), RuleFailure> {
     let straight = moves(harness, seed, stream.to_owned())?;
-    harness.template.reseeds = vec![StreamReseed {
-        tick: RESEEDED,
-        seed: seed + 1,
-    }];
+    let at_tick = |tick, seed| StreamReseed { tick, seed };
+    harness.template.reseeds = vec![at_tick(RESEEDED, seed + 1)];
+    let once = moves(harness, seed, stream.to_owned())?;
+    harness
+        .template
+        .reseeds
+        .push(at_tick(RESEEDED_AGAIN, seed + 2));
     let reseeded = moves(harness, seed, stream.to_owned())?;
     let of_other = moves(harness, seed, format!("{stream}#{}", DRAWS + 1))?;
     harness.template.reseeds.clear();
 
-    let at = RESEEDED as usize;
+    let [at, again_at] = [RESEEDED, RESEEDED_AGAIN].map(|tick| tick as usize);
     // It does not start over: that is another rule's matter.
-    if straight.len().min(reseeded.len()).min(of_other.len()) <= at {
+    if [&straight, &once, &reseeded, &of_other]
+        .map(Vec::len)
+        .iter()
+        .any(|ticks| *ticks <= again_at)
+    {
         return Ok(());
     }
     let what = format!("the seed {} from tick {RESEEDED} on", seed + 1);
@@ -139,6 +149,11 @@ fn demand_reseeded(
         .all(|pair| pair[0].2 != pair[1].2);
     if turns && straight[at..] == reseeded[at..] {
         let expected = format!("other moves with {what} (`reseeds` of its welcome)");
+        fail(expected, "the same");
+    }
+    if turns && once[again_at..] == reseeded[again_at..] {
+        let expected =
+            format!("other moves from tick {RESEEDED_AGAIN} on with the second of two `reseeds`");
         fail(expected, "the same");
     }
     let has_same_turns = reseeded[at..]
@@ -220,7 +235,6 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         commands: vec![ArrivingCommand::new(&kit.sender(), &text, harness.next_tick()).delivery()],
         ..TickUpdate::default()
     })?;
-    let tokens_lost = harness.seen.tokens_lost;
 
     harness.begin_epoch(2);
     harness.keeps_requests = true;
@@ -229,12 +243,7 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     // wrong.
     demand_same_process(&harness)?;
     let again = again?;
-    if harness.seen.tokens_lost > tokens_lost {
-        return Err(RuleFailure::new(
-            "its token stays declared when an epoch begins",
-            "it was undeclared",
-        ));
-    }
+    harness.demand_token_kept("an epoch begins")?;
     demand_same(
         kit,
         "to start over in a further epoch instead of a new process",
@@ -260,16 +269,26 @@ pub(super) fn while_waiting(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailu
 
 /// A later epoch begins, not always the next one: the robot may have missed some.
 fn begin_later(harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
+    harness.template.location.x += MOVED_M;
     harness.begin_epoch(LATER);
-    let played = play(harness, &PlayScript::quiet(2), &mut Straight)?;
-    demand_epoch(&played, LATER)
+    let played = play(harness, &PlayScript::quiet(0), &mut Straight)?;
+    demand_epoch(&played, LATER)?;
+    let expected =
+        "at tick 0 of a further epoch it stands where its welcome of that epoch places it";
+    let shown = super::queries::state(harness.state_in(LATER, 1)?, expected)?.location;
+    if shown != harness.template.location {
+        return Err(RuleFailure::new(
+            expected,
+            format!("it stands at {shown:?}"),
+        ));
+    }
+    play(harness, &PlayScript::quiet(1), &mut Straight).map(drop)
 }
 
 /// A robot that has missed the beginning of an epoch joins again, too, and waits until it is named.
 pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     let mut harness = with_robot(kit, HarnessOptions::default())?;
     play(&mut harness, &PlayScript::quiet(3), &mut Straight)?;
-    let tokens_lost = harness.seen.tokens_lost;
 
     harness.begin_epoch(LATER);
     // Tick 0 goes on without it: from then on only its news can tell it that it takes part.
@@ -296,12 +315,7 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
 
     let transcript = play(&mut harness, &PlayScript::quiet(4), &mut Straight)?;
     demand_epoch(&transcript, LATER)?;
-    if harness.seen.tokens_lost > tokens_lost {
-        return Err(RuleFailure::new(
-            "its token stays declared when it joins a further epoch",
-            "it was undeclared",
-        ));
-    }
+    harness.demand_token_kept("it joins a further epoch")?;
     Ok(())
 }
 

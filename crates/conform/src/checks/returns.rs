@@ -35,22 +35,30 @@ fn state_of(entry: &PlayedTick) -> PublicState {
     }
 }
 
-/// A harness on which the robot has joined as a second incarnation, whose predecessor was gone after tick `last`.
-fn returned(kit: &Kit, last: Tick) -> Result<Harness<'_>, RuleFailure> {
+/// A harness on which the robot has joined in the place of incarnations that were gone after these ticks, of which the last one
+/// has reported this.
+fn returned<'k>(
+    kit: &'k Kit,
+    last_ticks: &[Tick],
+    reported: &[PlayedTick],
+) -> Result<Harness<'k>, RuleFailure> {
     let mut harness = Harness::open_run(kit, HarnessOptions::default())?;
     harness.prepare()?;
-    harness.play_predecessor(last)?;
-    bequeath(kit, &mut harness)?;
+    let mut generation = 1;
+    for last in last_ticks {
+        harness.play_predecessor(*last)?;
+        generation += 1;
+    }
+    inherit(&mut harness, reported, generation);
     harness.admit_first()?;
     Ok(harness)
 }
 
-/// Further welcomes are those of a second incarnation. Its predecessor has reported as usual, [`LAST`] being the last tick.
-fn bequeath(kit: &Kit, harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
+/// The usual ticks up to [`LAST`].
+fn first_ticks(kit: &Kit) -> Result<&[PlayedTick], RuleFailure> {
     let usual = usual(kit)?;
     let last = usual.iter().position(|entry| entry.tick == LAST);
-    inherit(harness, &usual[..=last.unwrap_or_default()], GENERATION);
-    Ok(())
+    Ok(&usual[..=last.unwrap_or_default()])
 }
 
 /// Further welcomes are those of an incarnation whose predecessor has reported this.
@@ -66,7 +74,7 @@ pub(super) fn inherit(harness: &mut Harness<'_>, reported: &[PlayedTick], genera
 
 /// It waits for the news that name it, shows meanwhile what its predecessor reported, and reports as what it is.
 pub(super) fn generation(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
-    let mut harness = returned(kit, LAST)?;
+    let mut harness = returned(kit, &[LAST], first_ticks(kit)?)?;
     // The last tick was its predecessor's; the next one may go on without it.
     harness.repeat();
     harness.put_clock(&Clock {
@@ -121,51 +129,67 @@ pub(super) fn generation(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure>
     }
 
     let transcript = play(&mut harness, &PlayScript::quiet(5), &mut Straight)?;
-    demand_generation(&transcript)
+    demand_generation(&transcript, GENERATION)
 }
 
-fn demand_generation(transcript: &[PlayedTick]) -> Result<(), RuleFailure> {
+fn demand_generation(transcript: &[PlayedTick], generation: Generation) -> Result<(), RuleFailure> {
     match transcript
         .iter()
-        .find(|entry| entry.report.generation != GENERATION)
+        .find(|entry| entry.report.generation != generation)
     {
         None => Ok(()),
         Some(entry) => {
             let came = format!("generation {}", entry.report.generation);
             Err(RuleFailure::new(
-                format!("reports of generation {GENERATION}"),
+                format!("reports of generation {generation}"),
                 came,
             ))
         }
     }
 }
 
-/// A robot that has missed a tick, and whose news ask it to join again. Its requests are kept.
-fn asked_again(kit: &Kit) -> Result<Harness<'_>, RuleFailure> {
+/// The clock has gone on without it: it joins again as the process that it is, and then does what a new process does. And once more.
+pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     let mut harness = with_robot(kit, HarnessOptions::default())?;
-    let usual = PlayScript::usual(kit);
+    let script = PlayScript::usual(kit);
     for _ in 0..=LAST {
-        step(&mut harness, &usual, &mut Straight)?;
+        step(&mut harness, &script, &mut Straight)?;
     }
-    // The welcome of the further incarnation is set before the barrier asks for it.
-    bequeath(kit, &mut harness)?;
-    harness.miss()?;
 
-    harness.keeps_requests = true;
-    harness.open(&TickUpdate::default())?;
-    Ok(harness)
+    let mut reported = first_ticks(kit)?.to_vec();
+    let mut last_ticks = Vec::new();
+    for generation in [GENERATION, GENERATION + 1] {
+        // The welcome of the further incarnation is set before the barrier asks for it.
+        inherit(&mut harness, &reported, generation);
+        join_again(&mut harness)?;
+        last_ticks.push(harness.next_tick() - 1);
+        // Its turn is the next tick, whose news name it.
+        harness.settle(QUIET);
+        let again = play(&mut harness, &PlayScript::quiet(5), &mut Straight)?;
+        demand_generation(&again, generation)?;
+        harness.demand_token_kept("it joins again")?;
+
+        // What a new process does in the same place is what it has to do.
+        let mut anew = returned(kit, &last_ticks, &reported)?;
+        let anew = play(&mut anew, &PlayScript::quiet(5), &mut Straight)?;
+        demand_same(kit, "to join again instead of a new process", &anew, &again)?;
+        reported = again;
+    }
+    Ok(())
 }
 
-/// The clock has gone on without it: it joins again as the process that it is, and then does what a new process does.
-pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
-    let mut harness = asked_again(kit)?;
-    let tokens_lost = harness.seen.tokens_lost;
+/// The robot misses a tick, its news ask it to join again, and it does, as the process that it is.
+fn join_again(harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
+    harness.miss()?;
+    harness.keeps_requests = true;
+    harness.open(&TickUpdate::default())?;
     let expected = "another request to join when its news have its generation as `rejoin`";
     let joining = harness
         .next_join(PATIENCE)
         .map_err(|failure| RuleFailure::new(expected, failure.came))?;
     harness.admit(joining);
     harness.keeps_requests = false;
+
     let mut instances = Vec::new();
     for request in harness.seen.requests.iter().flatten() {
         instances.push(&request.instance);
@@ -175,25 +199,7 @@ pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         let came = format!("{instances:?}");
         return Err(RuleFailure::new("the same instance in all requests", came));
     }
-
-    // Its turn is the next tick, whose news name it.
-    let last = harness.next_tick() - 1;
-    harness.settle(QUIET);
-    let again = play(&mut harness, &PlayScript::quiet(5), &mut Straight)?;
-    demand_generation(&again)?;
-    if harness.seen.tokens_lost > tokens_lost {
-        return Err(RuleFailure::new(
-            "its token stays declared when it joins again",
-            "it was undeclared",
-        ));
-    }
-    // What a new process does in the same place is what it has to do.
-    let anew = play(
-        &mut returned(kit, last)?,
-        &PlayScript::quiet(5),
-        &mut Straight,
-    )?;
-    demand_same(kit, "to join again instead of a new process", &anew, &again)
+    Ok(())
 }
 
 /// News that name a later incarnation: this one ends.

@@ -44,7 +44,7 @@ impl Harness<'_> {
         let roster = others.iter().cloned().chain([subject.clone()]);
         self.barrier = barrier(roster);
         for name in &others {
-            self.play(name);
+            self.play(name, OWN_INSTANCE);
         }
         // A token that was declared before the welcome is a flaw of its own, and hides nothing else.
         if self.is_present() {
@@ -56,9 +56,9 @@ impl Harness<'_> {
     }
 
     /// The kit plays this robot: it joins at once.
-    fn play(&mut self, name: &RobotName) {
+    fn play(&mut self, name: &RobotName, instance: &str) {
         self.drive(|barrier, out| {
-            let admission = barrier.join(name, OWN_INSTANCE, out);
+            let admission = barrier.join(name, instance, out);
             assert!(
                 admission.is_ok(),
                 "the name of a robot that is played is free"
@@ -76,16 +76,18 @@ impl Harness<'_> {
         self.drive(|barrier, out| barrier.gather(epoch, patient(), out));
     }
 
-    /// The predecessor of the robot's process, played by the kit, takes part up to this tick and is gone.
+    /// A predecessor of the robot's process, played by the kit, takes part up to this tick and is gone.
     pub(crate) fn play_predecessor(&mut self, last: Tick) -> Result<(), RuleFailure> {
         let subject = self.kit.subject();
-        self.play(&subject);
-        for tick in 0..=last {
+        // Each is a process of its own.
+        self.play(&subject, &format!("{OWN_INSTANCE} {last}"));
+        let (generation, _) = self.barrier.presence(&subject);
+        for tick in self.next..=last {
             self.open(&TickUpdate::default())?;
             let stamp = Stamp {
                 epoch: self.epoch,
                 tick,
-                generation: 1,
+                generation,
             };
             self.drive(|barrier, out| barrier.report(&subject, stamp, 0, usize::MAX, out));
             self.outcome = None;
@@ -100,7 +102,7 @@ impl Harness<'_> {
     pub(crate) fn play_successor(&mut self) {
         let subject = self.kit.subject();
         self.drive(|barrier, out| barrier.token(&subject, false, out));
-        self.play(&subject);
+        self.play(&subject, OWN_INSTANCE);
     }
 
     /// The next request to join.

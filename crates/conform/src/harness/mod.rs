@@ -216,6 +216,15 @@ impl<'k> Harness<'k> {
         self.seen.is_present(self.kit.subject().as_str())
     }
 
+    /// The robot's token has been declared without a break since it joined, also when something happened that it was to bear.
+    pub(crate) fn demand_token_kept(&self, when: &str) -> Result<(), RuleFailure> {
+        if self.seen.tokens_lost == 0 {
+            return Ok(());
+        }
+        let expected = format!("its token stays declared when {when}");
+        Err(RuleFailure::new(expected, "it was undeclared"))
+    }
+
     /// From now on the other robots put their states, or do not.
     pub(crate) fn set_puts_states(&mut self, puts_states: bool) {
         self.options.puts_states = puts_states;

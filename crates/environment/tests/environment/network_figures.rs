@@ -248,6 +248,7 @@ fn panel(heading: &str, x_axis: &str, y_axis: &str, measured: &[Measured]) -> Ch
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn the_figure_of_the_network_is_up_to_date() {
     let share = "Share that is lost";
     let distance = "Distance, m";

@@ -251,6 +251,7 @@ fn maximum_consensus_on_a_star_takes_the_longest_of_geometric_times() {
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn maximum_consensus_on_a_tree_takes_the_longest_way_down() {
     let loss = 0.3;
     let network = format!("commands.loss = {loss}");

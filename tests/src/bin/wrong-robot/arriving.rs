@@ -105,6 +105,14 @@ impl Host {
         if is_new {
             self.last_clock = clock;
         }
+        if !is_new && self.shared.is_in(Phase::AwaitingNews) && self.wrong.is("news.wait:repeated")
+        {
+            return self.on_news(TickUpdate {
+                epoch: clock.epoch,
+                tick: clock.tick,
+                ..TickUpdate::default()
+            });
+        }
         if is_new && clock.news & flag != 0 && self.shared.is_in(Phase::Idle) {
             self.shared.enter(Phase::AwaitingNews);
         }
@@ -153,7 +161,9 @@ impl Host {
         if takes_it && !self.has_begun && generation > 1 {
             news.joined = Some(generation);
         }
-        if self.wrong.is("return.rejoin") {
+        if self.wrong.is("return.rejoin")
+            || self.wrong.is("return.rejoin:once") && news.rejoin.is_some_and(|of| of > 1)
+        {
             news.rejoin = None;
         }
 
@@ -229,6 +239,15 @@ impl Host {
     pub(crate) fn on_welcome(&mut self, mut welcome: Welcome) -> Result<(), Failure> {
         if self.wrong.is("epoch.init:welcome") && self.last_clock.epoch > welcome.epoch {
             welcome.epoch = self.last_clock.epoch;
+        }
+        if self.wrong.is("return.rejoin:stream") && welcome.generation > 2 {
+            welcome.stream = format!("robot/{}#2", self.name);
+        }
+        if let Some(before) = &self.welcome
+            && self.wrong.is("epoch.init:location")
+            && before.epoch < welcome.epoch
+        {
+            welcome.location = before.location;
         }
         let admission = Admission::from(&welcome);
         let before = self.welcome.as_ref().map(Admission::from);

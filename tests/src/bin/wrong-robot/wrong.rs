@@ -28,7 +28,9 @@ impl Wrong {
         let raw: Value = serde_json::from_slice(bytes).ok()?;
         let known = serde_json::from_slice(&message.to_json()).ok()?;
         let refuses_unknown = self.is("compat.unknown-fields");
-        let refuses_defaults = self.is("compat.unknown-fields:defaults") && key.ends_with("/news");
+        let refuses_defaults_of = self.0.strip_prefix("compat.unknown-fields:");
+        let refuses_defaults =
+            refuses_defaults_of.is_some_and(|of| key.split('/').any(|part| part == of));
         let is_refused = refuses_unknown && has_fields(&raw, &known, &|_| true)
             || refuses_defaults && has_fields(&raw, &known, &is_default)
             || self.is("number.integers:refused") && has_integers_for_floats(&raw, &known);
@@ -55,7 +57,10 @@ fn has_fields(raw: &Value, known: &Value, are_such: &dyn Fn(&Value) -> bool) -> 
 
 /// Whether a value is one that fields have by default.
 fn is_default(value: &Value) -> bool {
-    *value == json!([]) || *value == json!(false) || *value == json!("achieve")
+    *value == json!([])
+        || *value == json!(false)
+        || *value == json!(0)
+        || *value == json!("achieve")
 }
 
 /// Whether a number of a message that may have a fraction is written as an integer.

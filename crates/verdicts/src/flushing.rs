@@ -78,7 +78,8 @@ pub fn unflushed(command: &[OsString]) -> String {
 }
 
 /// The program that `cars exec` runs, with its arguments, if a robot's command is `cars exec … -- PROGRAM …`.
-pub(crate) fn program_of(command: &Command) -> Option<Vec<OsString>> {
+#[must_use]
+pub fn program_of(command: &Command) -> Option<Vec<OsString>> {
     let mut arguments = command.get_args();
     arguments.find(|argument| *argument == "exec")?;
     arguments.find(|argument| *argument == "--")?;
