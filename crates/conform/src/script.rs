@@ -103,6 +103,8 @@ impl PlayScript {
                 ArrivingCommand::new(&from, &two, 11),
                 ArrivingCommand::new(&from, &one, 20),
                 ArrivingCommand::new(&from, &two, 32),
+                ArrivingCommand::new(&from, &one, 60),
+                ArrivingCommand::new(&from, &two, 61),
             ],
         }
     }

@@ -2,15 +2,18 @@
 
 use std::collections::BTreeMap;
 
-use protocol::messages::{MAX_PAYLOAD_BYTES, MAX_PAYLOAD_DEPTH, MAX_TEXT_BYTES, Payload, Variable};
+use protocol::messages::{
+    Correction, MAX_PAYLOAD_BYTES, MAX_PAYLOAD_DEPTH, MAX_TEXT_BYTES, Payload, TickUpdate, Variable,
+};
 use protocol::{RobotName, Tick};
 use serde_json::{Value, json};
 
 use crate::comparison::is_same;
 use crate::findings::Findings;
+use crate::harness::{Harness, HarnessOptions};
 use crate::kit::Kit;
 use crate::report::RuleFailure;
-use crate::script::{ArrivingCommand, PlayScript, played};
+use crate::script::{ArrivingCommand, Disturbance, PlayScript, play, played, with_robot};
 use crate::transcript::Transcript;
 
 /// The tick in whose news the last commands of these checks arrive, and the last tick.
@@ -41,6 +44,25 @@ fn commanded_by(
         kit,
         &PlayScript::with(TICKS, arrivals(from, commands.iter().copied())),
     )
+}
+
+/// Plays a command whose news say that the robot is blocked, where it stands.
+fn commanded_while_blocked(kit: &Kit, text: &str) -> Result<Transcript, RuleFailure> {
+    struct Blocked;
+    impl Disturbance for Blocked {
+        fn news(&mut self, harness: &Harness<'_>, news: &mut TickUpdate) {
+            if !news.commands.is_empty() {
+                let confirmed = news.correction.unwrap_or(harness.body.confirmed());
+                news.correction = Some(Correction {
+                    blocked: true,
+                    ..confirmed
+                });
+            }
+        }
+    }
+    let script = PlayScript::with(TICKS, arrivals(&kit.sender(), [(text, LAST)]));
+    let mut harness = with_robot(kit, HarnessOptions::default())?;
+    play(&mut harness, &script, &mut Blocked)
 }
 
 /// Plays these commands of two senders, in the order in which news list those.
@@ -147,6 +169,24 @@ fn order_of_senders(kit: &Kit, one: &str, two: &str) -> Result<(), RuleFailure> 
             ),
             "the effect of the other order",
         ));
+    }
+
+    // All of the first one, and then all of the second one.
+    let three = |ticks: [Tick; 3]| {
+        let mut arriving = arrivals(&first, [(one, ticks[0]), (two, ticks[1])]);
+        arriving.extend(arrivals(&second, [(one, ticks[2])]));
+        played(kit, &PlayScript::with(TICKS, arriving)).map(|played| values(&played))
+    };
+    let votes = vote(
+        &three([LAST; 3])?,
+        &three([LAST - 2, LAST - 1, LAST])?,
+        &three([LAST - 2, LAST, LAST - 1])?,
+    );
+    if votes.is_broken() {
+        let expected = format!(
+            "news that list {one:?} and {two:?} of {first} and then {one:?} of {second} have their effect in this order"
+        );
+        return Err(RuleFailure::new(expected, "the effect of them in turn"));
     }
     Ok(())
 }
@@ -268,8 +308,10 @@ fn twice(
     let none = numbers(&commanded(kit, &[])?);
     for [text, _] in kit.pairs() {
         let once = numbers(&commanded(kit, &[(&text, LAST)])?);
-        let apart = numbers(&commanded(kit, &[(&text, LAST - 1), (&text, LAST)])?);
+        let apart = numbers(&commanded(kit, &[(&text, LAST - 3), (&text, LAST)])?);
+        let adjacent = numbers(&commanded(kit, &[(&text, LAST - 1), (&text, LAST)])?);
         let doubled = numbers(&commanded(kit, &[(&text, LAST), (&text, LAST)])?);
+        let blocked = numbers(&commanded_while_blocked(kit, &text)?);
 
         let mut votes = Votes::default();
         let mut counter = String::new();
@@ -282,6 +324,19 @@ fn twice(
 
             // Only a variable that counts commands shows whether there were two executions.
             let is_counter = counts(before, first, second);
+            if is_counter && adjacent.get(name) == Some(first) {
+                let expected =
+                    format!("{text:?} in the news of two ticks in turn is executed twice");
+                return Err(RuleFailure::new(expected, format!("{name} counts it once")));
+            }
+            if is_counter && blocked.get(name) == Some(before) {
+                let expected =
+                    format!("{text:?} is executed in a tick whose news say that it is blocked");
+                return Err(RuleFailure::new(
+                    expected,
+                    format!("{name} does not count it"),
+                ));
+            }
             if is_counter && came == second {
                 votes.right += 1;
             } else if is_counter && came == first {
@@ -414,6 +469,8 @@ pub(super) fn payload(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     // Programs may quote it in a line of their log, which is not to be longer.
     let room = if kit.stdio.is_program() { QUOTED_BY } else { 0 };
     let longest = "x".repeat(MAX_TEXT_BYTES - room);
+    // Who cuts what it sends back counts bytes, and leaves no half of a character.
+    let two_bytes = "é".repeat(longest.len() / 2);
     // Together they are longer than a text may be.
     commanded(kit, &[(longest.as_str(), LAST); 4])?;
 
@@ -426,6 +483,13 @@ pub(super) fn payload(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     }
     for (what, text) in [
         (format!("a text of {} bytes", longest.len()), &*longest),
+        (
+            format!(
+                "a text of {} bytes, two for each character",
+                two_bytes.len()
+            ),
+            &two_bytes,
+        ),
         (format!("the text {ESCAPED_TEXT:?}"), ESCAPED_TEXT),
     ] {
         unknown.push((what, commanded(kit, &[(text, LAST)])?));

@@ -28,6 +28,8 @@ const DRAWN: Tick = 12;
 /// The tick from which on it draws from another stream in the same epoch.
 const RESEEDED: Tick = 4;
 const RESEEDED_AGAIN: Tick = 8;
+/// The tick of an epoch in which a robot asks to join it late.
+const FAR: Tick = 300;
 /// How far from its place in one epoch a robot is placed in a further one.
 const MOVED_M: f64 = 0.25;
 
@@ -86,7 +88,8 @@ pub(super) fn streams(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFail
             let expected = format!("another request to join for a clock of epoch {epoch}");
             return Err(RuleFailure::new(expected, harness.process.fate()));
         }
-        by_seed.push(moves(&mut harness, seed + number, stream.clone())?);
+        // Also a robot that keeps only 32 bits of a seed must be found.
+        by_seed.push(moves(&mut harness, seed + (number << 32), stream.clone())?);
     }
 
     // A robot that draws nothing moves the same way each time, which is right. Wrong is only one that
@@ -291,8 +294,10 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     play(&mut harness, &PlayScript::quiet(3), &mut Straight)?;
 
     harness.begin_epoch(LATER);
-    // Tick 0 goes on without it: from then on only its news can tell it that it takes part.
-    harness.miss()?;
+    // Ticks go on without it, more than a byte counts: from then on only its news can tell it that it takes part.
+    while harness.next_tick() < FAR {
+        harness.miss()?;
+    }
     harness.keeps_requests = true;
 
     // A clock that does not name the robot: what the barrier puts for a robot that has not reported names it.
@@ -300,7 +305,7 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     harness.open(&TickUpdate::default())?;
     harness.put_clock(&Clock {
         epoch: LATER,
-        tick: 1,
+        tick: FAR,
         ..Clock::default()
     })?;
     harness.is_cut_off = false;
@@ -310,7 +315,8 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     harness.keeps_requests = false;
     demand_same_process(&harness)?;
     harness.settle(QUIET);
-    let expected = "admitted in tick 1 of an epoch, no report before its news name its generation";
+    let expected =
+        "admitted in the middle of an epoch, no report before its news name its generation";
     demand_silence(&harness, expected)?;
 
     let transcript = play(&mut harness, &PlayScript::quiet(4), &mut Straight)?;

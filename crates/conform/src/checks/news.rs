@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use protocol::Tick;
 use protocol::messages::{Correction, Point, TickUpdate};
+use protocol::{Generation, Tick};
 
 use crate::findings::Findings;
 use crate::harness::{Harness, HarnessOptions};
@@ -15,6 +15,8 @@ use crate::script::{Disturbance, PlayScript, Straight, demand_usual, play, with_
 const QUIET: Duration = Duration::from_millis(150);
 /// It waits for news however long they take; a robot that goes on without them would do so within this time.
 const LONG: Duration = Duration::from_secs(6);
+/// A generation that no robot of these ticks has.
+const MAX_GENERATION: Generation = 9;
 /// Up to this tick, news come late.
 const LATE_UP_TO: Tick = 14;
 
@@ -91,9 +93,13 @@ fn put_stale(harness: &Harness<'_>, tick: Tick) -> Result<(), RuleFailure> {
     let of_other_epoch = (harness.epoch() - 1, tick);
     let of_other_tick = tick.checked_sub(1).map(|before| (harness.epoch(), before));
     for (epoch, tick) in of_other_tick.into_iter().chain([of_other_epoch]) {
+        // In another epoch the robot was another incarnation.
+        let is_of_other_epoch = epoch != harness.epoch();
         harness.put_news(&TickUpdate {
             epoch,
             tick,
+            joined: is_of_other_epoch.then_some(MAX_GENERATION),
+            rejoin: is_of_other_epoch.then_some(1),
             correction: elsewhere,
             ..TickUpdate::default()
         })?;

@@ -27,12 +27,19 @@ const COMMANDS_PATIENCE: Duration = Duration::from_secs(2);
 pub(super) fn duplicate(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     struct Again;
     impl Disturbance for Again {
+        fn before(&mut self, harness: &mut Harness<'_>, tick: Tick) -> Result<(), RuleFailure> {
+            harness.shows_panels = tick % 4 < 2;
+            Ok(())
+        }
+
         fn after(
             &mut self,
             harness: &mut Harness<'_>,
             entry: &PlayedTick,
         ) -> Result<(), RuleFailure> {
             if entry.tick.is_multiple_of(EVERY) || !entry.commands.is_empty() {
+                // An observer may have come since, or be gone.
+                harness.shows_panels = !harness.shows_panels;
                 repeat(harness, entry)?;
             }
             Ok(())

@@ -109,6 +109,8 @@ pub(crate) struct Harness<'k> {
     pub(crate) withholds_news: bool,
     /// Flags that clocks have in addition to the barrier's.
     pub(crate) more_flags: u32,
+    /// Clocks say that observers are shown their tick.
+    pub(crate) shows_panels: bool,
     /// Further incarnations are welcomed as if they had asked a tick earlier, when the body stood elsewhere.
     pub(crate) asks_early: bool,
     wire: Wire,
@@ -184,6 +186,7 @@ impl<'k> Harness<'k> {
             doubles_news: false,
             withholds_news: false,
             more_flags: 0,
+            shows_panels: false,
             asks_early: false,
             wire,
             tokens: Vec::new(),
@@ -447,6 +450,7 @@ impl<'k> Harness<'k> {
 
         self.put_clock(&Clock {
             news: clock.news | self.more_flags,
+            panels: clock.panels || self.shows_panels,
             ..*clock
         })
     }

@@ -23,6 +23,9 @@ impl Host {
             .as_ref()
             .map_or(0, |welcome| welcome.generation);
         let flag = self.welcome.as_ref().map_or(0, |welcome| welcome.news_flag);
+        if self.wrong.is("epoch.late:byte") {
+            clock.tick %= 256;
+        }
         let is_later = clock.epoch > own && own > 0;
         let is_of_other_epoch = clock.epoch != own && self.wrong.is("end.clock:epoch");
         if self.ignores(clock.end) || clock.end.is_some() && is_of_other_epoch {
@@ -105,6 +108,9 @@ impl Host {
         if is_new {
             self.last_clock = clock;
         }
+        if !is_new && clock.panels && self.wrong.is("clock.duplicate:panels") {
+            return Ok(());
+        }
         if !is_new && self.shared.is_in(Phase::AwaitingNews) && self.wrong.is("news.wait:repeated")
         {
             return self.on_news(TickUpdate {
@@ -169,6 +175,12 @@ impl Host {
 
         let mut epoch = news.epoch;
         let mut tick = news.tick;
+        if self.wrong.is("epoch.late:byte") {
+            tick %= 256;
+        }
+        if self.wrong.is("news.wait:epoch") && news.rejoin == Some(generation) {
+            epoch = self.last_clock.epoch;
+        }
         if self.wrong.is("news.wait:any") && self.shared.is_in(Phase::AwaitingNews) {
             epoch = self.last_clock.epoch;
             tick = self.last_clock.tick;
@@ -240,8 +252,8 @@ impl Host {
         if self.wrong.is("epoch.init:welcome") && self.last_clock.epoch > welcome.epoch {
             welcome.epoch = self.last_clock.epoch;
         }
-        if self.wrong.is("return.rejoin:stream") && welcome.generation > 2 {
-            welcome.stream = format!("robot/{}#2", self.name);
+        if self.wrong.is("determinism.seed:32-bits") {
+            welcome.seed &= u64::from(u32::MAX);
         }
         if let Some(before) = &self.welcome
             && self.wrong.is("epoch.init:location")

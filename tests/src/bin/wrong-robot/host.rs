@@ -67,6 +67,8 @@ pub(crate) struct Host {
     pub(crate) strays: Vec<TickUpdate>,
     /// Commands that were not for it yet, if it is to take them.
     pub(crate) intercepted: Vec<Delivery>,
+    /// Commands of the tick before, if it is to take those of a tick for them.
+    pub(crate) before: Vec<Delivery>,
     /// The number of the last command of the first epoch.
     pub(crate) numbered: u32,
     /// Whether it has run a tick as what it was admitted as.
@@ -145,6 +147,7 @@ impl Host {
             last_clock: Clock::default(),
             strays: Vec::new(),
             intercepted: Vec::new(),
+            before: Vec::new(),
             numbered: 0,
             has_begun: false,
             starts_over: false,

@@ -1,5 +1,6 @@
 //! The robot's ticks.
 
+use std::collections::BTreeMap;
 use std::time::Duration;
 
 use lockstep::{Begin, Sent, Turn};
@@ -135,6 +136,23 @@ impl Host {
         }
         if wrong.is("command.order:senders") {
             deliveries.sort_by(|one, other| other.from.cmp(&one.from));
+        }
+        if wrong.is("command.order:interleaved") {
+            // The first of each sender, then the second of each.
+            let mut counts = BTreeMap::new();
+            deliveries.sort_by_cached_key(|delivery| {
+                let count = counts.entry(delivery.from.clone()).or_insert(0);
+                *count += 1;
+                *count
+            });
+        }
+        if wrong.is("command.twice:blocked") && news.correction.is_some_and(|at| at.blocked) {
+            deliveries.clear();
+        }
+        if wrong.is("command.twice:adjacent") {
+            let before = std::mem::take(&mut self.before);
+            self.before.clone_from(&deliveries);
+            deliveries.retain(|delivery| !before.contains(delivery));
         }
         if wrong.is("command.twice:ten") {
             deliveries.truncate(TEN);
