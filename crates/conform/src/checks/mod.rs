@@ -96,13 +96,14 @@ const CHECKS: [Check; 39] = [
 /// Checks of programs that `cars exec` runs.
 const STDIO_CHECKS: [Check; 1] = [rules(&[rules::STDIO_END], stdio::end)];
 /// Rules whose checks presume that the robot keeps another one: without it they show nothing.
-const PRESUMED: [(&str, &str); 8] = [
+const PRESUMED: [(&str, &str); 9] = [
     // On a loaded machine a clock may come again in any check.
     ("news.wait", "clock.duplicate"),
     ("epoch.late", "clock.duplicate"),
     ("query.reply", "clock.duplicate"),
     ("command.order", "operator.commands"),
     ("epoch.init", "clock.duplicate"),
+    ("epoch.init", "tick.initial"),
     ("tick.newest", "news.wait"),
     ("query.reply", "news.wait"),
     ("query.reply", "query.again"),
