@@ -149,44 +149,39 @@ pub(super) fn order(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailur
     Ok(())
 }
 
-/// The same of commands from two senders, of which news list that of the first one before that of the second one.
+/// The same of commands from two senders: news list all of the first one before those of the second one.
 fn order_of_senders(kit: &Kit, one: &str, two: &str) -> Result<(), RuleFailure> {
     let [first, second] = two_senders(kit);
-    let play = |one_at: Tick, two_at: Tick| {
-        let played = commanded_by_two(kit, [(one, one_at), (two, two_at)]);
-        played.map(|played| values(&played))
-    };
+    for commands in [
+        &[(&first, one), (&second, two)][..],
+        &[(&first, one), (&first, two), (&second, one)],
+    ] {
+        // The tick of the last command comes first, and there may be one too many.
+        let effect = |ticks: [Tick; 3]| {
+            let mut arriving = Vec::new();
+            for ((from, text), tick) in commands.iter().rev().zip(ticks) {
+                arriving.push(ArrivingCommand::new(from, text, tick));
+            }
+            arriving.reverse();
+            played(kit, &PlayScript::with(TICKS, arriving)).map(|played| values(&played))
+        };
 
-    let votes = vote(
-        &play(LAST, LAST)?,
-        &play(LAST - 1, LAST)?,
-        &play(LAST, LAST - 1)?,
-    );
-    if votes.is_broken() {
-        return Err(RuleFailure::new(
-            format!(
-                "news that list {one:?} of {first} and then {two:?} of {second} have their effect in this order"
-            ),
-            "the effect of the other order",
-        ));
-    }
-
-    // All of the first one, and then all of the second one.
-    let three = |ticks: [Tick; 3]| {
-        let mut arriving = arrivals(&first, [(one, ticks[0]), (two, ticks[1])]);
-        arriving.extend(arrivals(&second, [(one, ticks[2])]));
-        played(kit, &PlayScript::with(TICKS, arriving)).map(|played| values(&played))
-    };
-    let votes = vote(
-        &three([LAST; 3])?,
-        &three([LAST - 2, LAST - 1, LAST])?,
-        &three([LAST - 2, LAST, LAST - 1])?,
-    );
-    if votes.is_broken() {
-        let expected = format!(
-            "news that list {one:?} and {two:?} of {first} and then {one:?} of {second} have their effect in this order"
+        let votes = vote(
+            &effect([LAST; 3])?,
+            &effect([LAST, LAST - 1, LAST - 2])?,
+            &effect([LAST - 1, LAST, LAST - 2])?,
         );
-        return Err(RuleFailure::new(expected, "the effect of them in turn"));
+        if votes.is_broken() {
+            let listed: Vec<String> = commands
+                .iter()
+                .map(|(from, text)| format!("{text:?} of {from}"))
+                .collect();
+            let listed = listed.join(" and then ");
+            return Err(RuleFailure::new(
+                format!("news that list {listed} have their effect in this order"),
+                "the effect of the other order",
+            ));
+        }
     }
     Ok(())
 }
@@ -324,18 +319,16 @@ fn twice(
 
             // Only a variable that counts commands shows whether there were two executions.
             let is_counter = counts(before, first, second);
-            if is_counter && adjacent.get(name) == Some(first) {
-                let expected =
-                    format!("{text:?} in the news of two ticks in turn is executed twice");
-                return Err(RuleFailure::new(expected, format!("{name} counts it once")));
-            }
-            if is_counter && blocked.get(name) == Some(before) {
-                let expected =
-                    format!("{text:?} is executed in a tick whose news say that it is blocked");
-                return Err(RuleFailure::new(
-                    expected,
-                    format!("{name} does not count it"),
-                ));
+            for (is_executed, played, uncounted) in [
+                ("in two ticks in turn is executed twice", &adjacent, first),
+                ("is executed where it is blocked", &blocked, before),
+            ] {
+                if is_counter && played.get(name) == Some(uncounted) {
+                    return Err(RuleFailure::new(
+                        format!("{text:?} in its news {is_executed}"),
+                        format!("{name} = {uncounted}"),
+                    ));
+                }
             }
             if is_counter && came == second {
                 votes.right += 1;

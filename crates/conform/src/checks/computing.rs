@@ -51,6 +51,14 @@ struct PlayedQueries {
     late: Vec<Duration>,
 }
 
+impl PlayedQueries {
+    /// A play in which no reply was late without another cause: it shows that the robot replies, or nothing.
+    fn note(&mut self, replies: bool) {
+        self.replies |= replies;
+        self.is_unknown |= !replies;
+    }
+}
+
 /// Queries the robot in each tick as long as it takes.
 #[derive(Default)]
 struct QueriesDuringTicks {
@@ -98,9 +106,7 @@ impl Disturbance for QueriesDuringTicks {
             // By the order of arrival on one session, not by clocks.
             let is_late = |number| harness.seen.replies[&number].0 > report.order;
             if !is_late(pair.robot) {
-                let is_recent = since < RECENT;
-                played.replies |= is_recent;
-                played.is_unknown |= !is_recent;
+                played.note(since < RECENT);
                 return Ok(());
             }
             // What a loaded machine takes is not the robot's.
@@ -111,9 +117,7 @@ impl Disturbance for QueriesDuringTicks {
             }
         }
 
-        let is_short = entry.took < ENOUGH;
-        played.replies |= is_short;
-        played.is_unknown |= !is_short;
+        played.note(entry.took < ENOUGH);
         Ok(())
     }
 }
@@ -128,7 +132,7 @@ impl QueriesDuringTicks {
     }
 
     /// Whether another play could show what these have not.
-    fn is_open(&self) -> bool {
+    fn is_undecided(&self) -> bool {
         let mut undecided = self.ticks.values().filter(|played| !played.replies);
         undecided.any(|played| !played.late.is_empty() || played.is_unknown)
     }
@@ -149,7 +153,7 @@ pub(super) fn check(kit: &Kit) -> Result<(), RuleFailure> {
             );
             return Err(RuleFailure::new(expected, came));
         }
-        if !queries.is_open() {
+        if !queries.is_undecided() {
             break;
         }
     }

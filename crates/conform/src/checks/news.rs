@@ -15,8 +15,8 @@ use crate::script::{Disturbance, PlayScript, Straight, demand_usual, play, with_
 const QUIET: Duration = Duration::from_millis(150);
 /// It waits for news however long they take; a robot that goes on without them would do so within this time.
 const LONG: Duration = Duration::from_secs(6);
-/// A generation that no robot of these ticks has.
-const MAX_GENERATION: Generation = 9;
+/// A generation after that of any robot of these ticks.
+const LATER_GENERATION: Generation = 9;
 /// Up to this tick, news come late.
 const LATE_UP_TO: Tick = 14;
 
@@ -98,7 +98,7 @@ fn put_stale(harness: &Harness<'_>, tick: Tick) -> Result<(), RuleFailure> {
         harness.put_news(&TickUpdate {
             epoch,
             tick,
-            joined: is_of_other_epoch.then_some(MAX_GENERATION),
+            joined: is_of_other_epoch.then_some(LATER_GENERATION),
             rejoin: is_of_other_epoch.then_some(1),
             correction: elsewhere,
             ..TickUpdate::default()
