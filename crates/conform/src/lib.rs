@@ -2,13 +2,12 @@
 //! one by one, and in a run.
 //!
 //! The robot is a program, in any language. It is started anew for each group of rules, so that what a rule does to it (a
-//! malformed message, a refusal, a signal) touches no other rule. The simulator's side of the lock-step is
-//! [`lockstep::Barrier`], the same as in the simulator itself; the kit adds what the checks observe. No rule assumes that
-//! a robot moves, queries or commands. What it cannot show is skipped, and the report gives the reason.
+//! malformed message, a refusal, a signal) touches no other rule. The crate `harness` plays the simulator, and keeps what the checks
+//! observe. No rule assumes that a robot moves, queries or commands. What it cannot show is skipped, and the report gives the reason.
 //!
 //! No verdict follows from the wall clock where a loaded machine can have the same effect: checks judge by the order of
 //! messages, or while they withhold what the robot waits for; a late answer counts only if it is late in each of several
-//! repetitions and the kit's own queryable replies in time (`patience.rs`, `checks/computing.rs`).
+//! repetitions and the kit's own queryable replies in time (`harness/src/patience.rs`, `checks/computing.rs`).
 //!
 //! A second part (`checks/run.rs`) plays a run of at least three robots, in which all of it happens: it finds what shows only
 //! there. Its failures count where no rule is broken alone, and say that they are of that part.
@@ -17,32 +16,16 @@
 //! late. Such a rule is checked by playing the same ticks twice, with the disturbance and without it: reports and commands
 //! must be the same, which the promise of the project (same seed, same run) makes fair.
 
-mod body;
 mod checks;
-mod comparison;
-mod fake_peers;
-mod harness;
-mod kit;
-mod load;
-mod patience;
-mod process;
-mod reading;
-mod script;
-mod seen;
-mod setting;
-mod transcript;
-mod wire;
-
-use verdicts::{findings, flushing, report, rules, stdio};
 
 pub use checks::check;
-pub use kit::CannotRun;
-pub use setting::{CheckSetting, PlayedLayer, RosterRobot};
-pub use verdicts::flushing::unflushed;
-pub use verdicts::report::{
+pub use harness::flushing::unflushed;
+pub use harness::kit::CannotRun;
+pub use harness::report::{
     AnswerTimes, CheckReport, KitPart, PlayedRun, RuleFailure, RuleOutcome, RuleVerdict,
 };
-pub use verdicts::rules::{
+pub use harness::rules::{
     PAGE, ProtocolRule, RULES, STDIO_END, STDIO_FIELDS, STDIO_LOG, STDIO_RULES, rules,
 };
-pub use verdicts::stdio::{STDIO_VARIABLE, StdioLine};
+pub use harness::setting::{CheckSetting, PlayedLayer, RosterRobot};
+pub use harness::stdio::{STDIO_VARIABLE, StdioLine};

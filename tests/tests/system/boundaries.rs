@@ -114,8 +114,8 @@ const ALLOWED: &[(&str, &[&str])] = &[
             "timeline",
         ],
     ),
-    ("verdicts", &["bus", "protocol"]),
-    ("conform", &["bus", "lockstep", "protocol", "verdicts"]),
+    ("harness", &["bus", "lockstep", "protocol"]),
+    ("conform", &["bus", "harness", "protocol"]),
     (
         "launch",
         &[

@@ -8,13 +8,13 @@ use protocol::messages::{
 use protocol::{RobotName, Tick};
 use serde_json::{Value, json};
 
-use crate::comparison::is_same;
-use crate::findings::Findings;
-use crate::harness::{Harness, HarnessOptions};
-use crate::kit::Kit;
-use crate::report::RuleFailure;
-use crate::script::{ArrivingCommand, Disturbance, PlayScript, play, played, with_robot};
-use crate::transcript::Transcript;
+use harness::comparison::is_same;
+use harness::findings::Findings;
+use harness::kit::Kit;
+use harness::report::RuleFailure;
+use harness::script::{ArrivingCommand, Disturbance, PlayScript, play, played, with_robot};
+use harness::transcript::Transcript;
+use harness::{Harness, HarnessOptions};
 
 /// The tick in whose news the last commands of these checks arrive, and the last tick.
 const LAST: Tick = 6;

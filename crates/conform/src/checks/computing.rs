@@ -11,12 +11,12 @@ use std::time::{Duration, Instant};
 
 use protocol::Tick;
 
-use crate::harness::{Harness, HarnessOptions};
-use crate::kit::Kit;
-use crate::patience::PATIENCE;
-use crate::report::RuleFailure;
-use crate::script::{Disturbance, PlayScript, play, with_robot};
-use crate::transcript::PlayedTick;
+use harness::kit::Kit;
+use harness::patience::PATIENCE;
+use harness::report::RuleFailure;
+use harness::script::{Disturbance, PlayScript, play, with_robot};
+use harness::transcript::PlayedTick;
+use harness::{Harness, HarnessOptions};
 
 /// How often the robot is queried during a tick.
 const EVERY: Duration = Duration::from_millis(20);

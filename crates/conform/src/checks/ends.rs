@@ -6,13 +6,13 @@ use nix::sys::signal::Signal;
 use protocol::messages::{Clock, End};
 
 use super::waiting;
-use crate::findings::Findings;
-use crate::harness::{Harness, HarnessOptions};
-use crate::kit::Kit;
-use crate::patience::{PATIENCE, in_each_attempt};
-use crate::report::RuleFailure;
-use crate::script::{Disturbance, PlayScript, Straight, demand_usual, play, step, with_robot};
-use crate::transcript::PlayedTick;
+use harness::findings::Findings;
+use harness::kit::Kit;
+use harness::patience::{PATIENCE, in_each_attempt};
+use harness::report::RuleFailure;
+use harness::script::{Disturbance, PlayScript, Straight, demand_usual, play, step, with_robot};
+use harness::transcript::PlayedTick;
+use harness::{Harness, HarnessOptions};
 
 /// A process ends within this time after SIGTERM. The page allows 2 s; signals and the kernel need some, too.
 const END_PATIENCE: Duration = Duration::from_secs(5);

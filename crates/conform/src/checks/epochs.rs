@@ -6,15 +6,17 @@ use protocol::messages::{Clock, JoinRequest, Point, StreamReseed, TickUpdate};
 use protocol::{Epoch, Tick};
 
 use super::waiting;
-use crate::comparison::{PlayDifference, demand_same, difference};
-use crate::findings::Findings;
-use crate::harness::{Harness, HarnessOptions};
-use crate::kit::Kit;
-use crate::patience::PATIENCE;
-use crate::report::RuleFailure;
-use crate::script::{ArrivingCommand, Disturbance, PlayScript, Straight, play, usual, with_robot};
-use crate::transcript::PlayedTick;
-use crate::wire::Joining;
+use harness::Joining;
+use harness::comparison::{PlayDifference, demand_same, difference};
+use harness::findings::Findings;
+use harness::kit::Kit;
+use harness::patience::PATIENCE;
+use harness::report::RuleFailure;
+use harness::script::{
+    ArrivingCommand, Disturbance, PlayScript, Straight, play, usual, with_robot,
+};
+use harness::transcript::PlayedTick;
+use harness::{Harness, HarnessOptions};
 
 /// No report comes within this time where it is not the robot's turn.
 const QUIET: Duration = Duration::from_millis(300);

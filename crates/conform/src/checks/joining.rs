@@ -5,12 +5,12 @@ use std::time::Duration;
 use protocol::keys::{QUERIES, STATE};
 use protocol::messages::Refusal;
 
-use crate::findings::Findings;
-use crate::harness::{Harness, HarnessOptions};
-use crate::kit::Kit;
-use crate::patience::{Limit, PATIENCE, START_PATIENCE};
-use crate::report::RuleFailure;
-use crate::script::{PlayScript, Straight, play};
+use harness::findings::Findings;
+use harness::kit::Kit;
+use harness::patience::{Limit, PATIENCE, START_PATIENCE};
+use harness::report::RuleFailure;
+use harness::script::{PlayScript, Straight, play};
+use harness::{Harness, HarnessOptions};
 
 /// For how long a welcome is held back, to see whether the robot waits for it.
 const HELD_BACK: Duration = Duration::from_millis(200);

@@ -23,11 +23,11 @@ use std::sync::PoisonError;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread::Builder;
 
-use crate::findings::{Findings, VerdictsByRule};
-use crate::kit::{CannotRun, Kit};
-use crate::report::{AnswerTimes, CheckReport, PlayedRun, RuleFailure, RuleOutcome, RuleVerdict};
-use crate::rules::{self, ProtocolRule};
-use crate::setting::CheckSetting;
+use harness::findings::{Findings, VerdictsByRule};
+use harness::kit::{CannotRun, Kit};
+use harness::report::{AnswerTimes, CheckReport, PlayedRun, RuleFailure, RuleOutcome, RuleVerdict};
+use harness::rules::{self, ProtocolRule};
+use harness::setting::CheckSetting;
 
 /// A check, with its rules; the first one gets the failure that breaks it off.
 struct Check {

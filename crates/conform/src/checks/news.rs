@@ -5,11 +5,11 @@ use std::time::Duration;
 use protocol::messages::{Correction, Point, TickUpdate};
 use protocol::{Generation, Tick};
 
-use crate::findings::Findings;
-use crate::harness::{Harness, HarnessOptions};
-use crate::kit::Kit;
-use crate::report::RuleFailure;
-use crate::script::{Disturbance, PlayScript, Straight, demand_usual, play, with_robot};
+use harness::findings::Findings;
+use harness::kit::Kit;
+use harness::report::RuleFailure;
+use harness::script::{Disturbance, PlayScript, Straight, demand_usual, play, with_robot};
+use harness::{Harness, HarnessOptions};
 
 /// A report that must not come has come after this time.
 const QUIET: Duration = Duration::from_millis(150);

@@ -6,15 +6,15 @@ use protocol::Tick;
 use protocol::messages::{Clock, Delivery, Report, TickUpdate};
 
 use super::{waiting, wire};
-use crate::comparison::demand_same;
-use crate::fake_peers::Unhelpful;
-use crate::findings::Findings;
-use crate::harness::{Harness, HarnessOptions};
-use crate::kit::Kit;
-use crate::patience::PATIENCE;
-use crate::report::RuleFailure;
-use crate::script::{ArrivingCommand, Disturbance, PlayScript, Straight, play, with_robot};
-use crate::transcript::PlayedTick;
+use harness::comparison::demand_same;
+use harness::fake_peers::Unhelpful;
+use harness::findings::Findings;
+use harness::kit::Kit;
+use harness::patience::PATIENCE;
+use harness::report::RuleFailure;
+use harness::script::{ArrivingCommand, Disturbance, PlayScript, Straight, play, with_robot};
+use harness::transcript::PlayedTick;
+use harness::{Harness, HarnessOptions};
 
 /// What was put has arrived after this time, also at a robot that rests.
 const ARRIVED: Duration = Duration::from_millis(100);

@@ -8,14 +8,16 @@ use protocol::messages::{Answer, Point, PublicState, TickUpdate};
 use protocol::{Epoch, Tick, decode};
 
 use super::{computing, waiting, wire};
-use crate::fake_peers::ReceivedQuery;
-use crate::findings::Findings;
-use crate::harness::{Harness, HarnessOptions};
-use crate::kit::Kit;
-use crate::patience::{PATIENCE, in_each_attempt};
-use crate::report::RuleFailure;
-use crate::script::{Disturbance, PlayScript, Straight, can_query, demand_usual, play, with_robot};
-use crate::transcript::{PlayedTick, Transcript};
+use harness::fake_peers::ReceivedQuery;
+use harness::findings::Findings;
+use harness::kit::Kit;
+use harness::patience::{PATIENCE, in_each_attempt};
+use harness::report::RuleFailure;
+use harness::script::{
+    Disturbance, PlayScript, Straight, can_query, demand_usual, play, with_robot,
+};
+use harness::transcript::{PlayedTick, Transcript};
+use harness::{Harness, HarnessOptions};
 
 /// The kit's own limit where it waits until all replies are in.
 const ALL_REPLIES: Duration = Duration::from_secs(3);

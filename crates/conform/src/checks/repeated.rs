@@ -7,14 +7,14 @@ use protocol::messages::{Clock, Correction, Point, TickUpdate};
 use protocol::{Epoch, Tick};
 
 use super::waiting;
-use crate::findings::Findings;
-use crate::harness::{Harness, HarnessOptions};
-use crate::kit::Kit;
-use crate::patience::PATIENCE;
-use crate::report::RuleFailure;
-use crate::script::{Disturbance, demand_usual, with_robot};
-use crate::seen::{ReceivedReport, ReportedCommand};
-use crate::transcript::PlayedTick;
+use harness::findings::Findings;
+use harness::kit::Kit;
+use harness::patience::PATIENCE;
+use harness::report::RuleFailure;
+use harness::script::{Disturbance, demand_usual, with_robot};
+use harness::seen::{ReceivedReport, ReportedCommand};
+use harness::transcript::PlayedTick;
+use harness::{Harness, HarnessOptions};
 
 /// One clock in so many comes again, and each whose tick had commands.
 const EVERY: Tick = 3;

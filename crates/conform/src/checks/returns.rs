@@ -5,14 +5,14 @@ use std::time::Duration;
 use protocol::messages::{Clock, Correction, PublicState, TickUpdate};
 use protocol::{Generation, Tick};
 
-use crate::comparison::demand_same;
-use crate::findings::Findings;
-use crate::harness::{Harness, HarnessOptions};
-use crate::kit::Kit;
-use crate::patience::PATIENCE;
-use crate::report::RuleFailure;
-use crate::script::{PlayScript, Straight, play, step, usual, with_robot};
-use crate::transcript::PlayedTick;
+use harness::comparison::demand_same;
+use harness::findings::Findings;
+use harness::kit::Kit;
+use harness::patience::PATIENCE;
+use harness::report::RuleFailure;
+use harness::script::{PlayScript, Straight, play, step, usual, with_robot};
+use harness::transcript::PlayedTick;
+use harness::{Harness, HarnessOptions};
 
 /// The last tick of the predecessor.
 const LAST: Tick = 8;

@@ -14,14 +14,14 @@ use protocol::messages::TickUpdate;
 use protocol::{RobotName, Tick};
 
 use super::{returns, ticks, wire};
-use crate::comparison::difference;
-use crate::fake_peers::Unhelpful;
-use crate::findings::Findings;
-use crate::harness::{Harness, HarnessOptions};
-use crate::kit::Kit;
-use crate::report::{KitPart, PlayedRun, RuleFailure};
-use crate::script::{Disturbance, PlayScript, step, with_robot};
-use crate::transcript::{PlayedTick, Transcript};
+use harness::comparison::difference;
+use harness::fake_peers::Unhelpful;
+use harness::findings::Findings;
+use harness::kit::Kit;
+use harness::report::{KitPart, PlayedRun, RuleFailure};
+use harness::script::{Disturbance, PlayScript, step, with_robot};
+use harness::transcript::{PlayedTick, Transcript};
+use harness::{Harness, HarnessOptions};
 
 /// The rules that the part in a run can find broken.
 pub(super) const RULES: [&str; 13] = [

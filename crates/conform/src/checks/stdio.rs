@@ -2,14 +2,14 @@
 
 use protocol::messages::End;
 
-use crate::findings::Findings;
-use crate::harness::HarnessOptions;
-use crate::kit::Kit;
-use crate::patience::in_each_attempt;
-use crate::report::RuleFailure;
-use crate::rules::{STDIO_END, STDIO_FIELDS, STDIO_LOG, STDIO_RULES};
-use crate::script::{PlayScript, Straight, play, with_robot};
-use crate::stdio::fault_in;
+use harness::HarnessOptions;
+use harness::findings::Findings;
+use harness::kit::Kit;
+use harness::patience::in_each_attempt;
+use harness::report::RuleFailure;
+use harness::rules::{STDIO_END, STDIO_FIELDS, STDIO_LOG, STDIO_RULES};
+use harness::script::{PlayScript, Straight, play, with_robot};
+use harness::stdio::fault_in;
 
 /// Rules that are about each line of such a program, whatever is checked.
 pub(super) const ALWAYS: [&str; 2] = [STDIO_FIELDS, STDIO_LOG];

@@ -8,15 +8,15 @@ use protocol::messages::{OTHERS, Performative, Report};
 use protocol::name::OPERATOR;
 
 use super::wire;
-use crate::findings::Findings;
-use crate::harness::{Harness, HarnessOptions};
-use crate::kit::{CannotRun, Kit};
-use crate::patience::START_PATIENCE;
-use crate::report::{AnswerTimes, RuleFailure};
-use crate::script::{PlayScript, Straight, play, with_robot};
-use crate::seen::ReportedCommand;
-use crate::transcript::{PlayedTick, Transcript};
-use crate::wire::Joining;
+use harness::Joining;
+use harness::findings::Findings;
+use harness::kit::{CannotRun, Kit};
+use harness::patience::START_PATIENCE;
+use harness::report::{AnswerTimes, RuleFailure};
+use harness::script::{PlayScript, Straight, play, with_robot};
+use harness::seen::ReportedCommand;
+use harness::transcript::{PlayedTick, Transcript};
+use harness::{Harness, HarnessOptions};
 
 /// The rules that the usual ticks show.
 pub(super) const USUAL: [&str; 9] = [

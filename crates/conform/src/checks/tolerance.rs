@@ -3,11 +3,11 @@
 use protocol::Tick;
 use protocol::messages::MAX_TEXT_BYTES;
 
-use crate::findings::Findings;
-use crate::harness::{Harness, HarnessOptions};
-use crate::kit::Kit;
-use crate::report::RuleFailure;
-use crate::script::{Disturbance, Straight, demand_usual, with_robot};
+use harness::findings::Findings;
+use harness::kit::Kit;
+use harness::report::RuleFailure;
+use harness::script::{Disturbance, Straight, demand_usual, with_robot};
+use harness::{Harness, HarnessOptions};
 
 /// Later versions of the contract add fields: everything that the robot receives carries some.
 pub(super) fn unknown_fields(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {

@@ -5,11 +5,11 @@ use std::time::Duration;
 use protocol::Tick;
 use protocol::messages::{Correction, TickUpdate};
 
-use crate::comparison::demand_same;
-use crate::harness::{Harness, HarnessOptions};
-use crate::kit::Kit;
-use crate::report::RuleFailure;
-use crate::script::{Disturbance, PlayScript, Straight, play, with_robot};
+use harness::comparison::demand_same;
+use harness::kit::Kit;
+use harness::report::RuleFailure;
+use harness::script::{Disturbance, PlayScript, Straight, play, with_robot};
+use harness::{Harness, HarnessOptions};
 
 /// After this time, a robot that received a clock is in its tick.
 const UNDER_WAY: Duration = Duration::from_millis(50);

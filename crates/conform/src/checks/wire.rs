@@ -1,8 +1,8 @@
 //! How messages are put, and where.
 
-use crate::findings::Findings;
-use crate::harness::Harness;
-use crate::report::RuleFailure;
+use harness::Harness;
+use harness::findings::Findings;
+use harness::report::RuleFailure;
 
 /// All that came on a harness so far was put as ticks need it, and on keys of the robot.
 pub(super) fn check(harness: &Harness<'_>, findings: &mut Findings) {

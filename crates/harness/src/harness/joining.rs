@@ -24,7 +24,7 @@ const SOON: Duration = Duration::from_millis(5);
 
 impl Harness<'_> {
     /// Sets the other robots up and begins the first epoch, so that the robot can be admitted.
-    pub(crate) fn prepare(&mut self) -> Result<(), RuleFailure> {
+    pub fn prepare(&mut self) -> Result<(), RuleFailure> {
         let kit = self.kit;
         let subject = kit.subject();
         self.template = kit.template(&self.run, self.options.part);
@@ -68,7 +68,7 @@ impl Harness<'_> {
     }
 
     /// `init`: begins an epoch.
-    pub(crate) fn begin_epoch(&mut self, epoch: Epoch) {
+    pub fn begin_epoch(&mut self, epoch: Epoch) {
         self.epoch = epoch;
         self.next = 0;
         self.is_gathered = false;
@@ -77,7 +77,7 @@ impl Harness<'_> {
     }
 
     /// A predecessor of the robot's process, played by the kit, takes part up to this tick and is gone.
-    pub(crate) fn play_predecessor(&mut self, last: Tick) -> Result<(), RuleFailure> {
+    pub fn play_predecessor(&mut self, last: Tick) -> Result<(), RuleFailure> {
         let subject = self.kit.subject();
         // Each is a process of its own.
         self.play(&subject, &format!("{OWN_INSTANCE} {last}"));
@@ -99,27 +99,27 @@ impl Harness<'_> {
     }
 
     /// Another process, played by the kit, takes the place of the robot's.
-    pub(crate) fn play_successor(&mut self) {
+    pub fn play_successor(&mut self) {
         let subject = self.kit.subject();
         self.drive(|barrier, out| barrier.token(&subject, false, out));
         self.play(&subject, OWN_INSTANCE);
     }
 
     /// The next request to join.
-    pub(crate) fn next_join(&mut self, patience: Duration) -> Result<Joining, RuleFailure> {
+    pub fn next_join(&mut self, patience: Duration) -> Result<Joining, RuleFailure> {
         self.until("a request to join", patience, |harness| {
             harness.joins.pop_front()
         })
     }
 
     /// Admits the robot, and waits until its token is declared. From now on its requests are answered as they come.
-    pub(crate) fn join(&mut self) -> Result<(), RuleFailure> {
+    pub fn join(&mut self) -> Result<(), RuleFailure> {
         self.prepare()?;
         self.admit_first()
     }
 
     /// The same where the other robots are set up.
-    pub(crate) fn admit_first(&mut self) -> Result<(), RuleFailure> {
+    pub fn admit_first(&mut self) -> Result<(), RuleFailure> {
         let joining = self.next_join(START_PATIENCE)?;
         self.admit(joining);
         self.keeps_requests = false;
@@ -127,7 +127,7 @@ impl Harness<'_> {
     }
 
     /// Answers a request to join as the barrier decides.
-    pub(crate) fn admit(&mut self, joining: Joining) {
+    pub fn admit(&mut self, joining: Joining) {
         self.seen.requests.push(joining.request.clone());
         let request = match &joining.request {
             Ok(request) => request.clone(),
@@ -170,7 +170,7 @@ impl Harness<'_> {
     }
 
     /// Welcomes the robot to an epoch that is over.
-    pub(crate) fn welcome_to(&mut self, joining: Joining, epoch: Epoch) {
+    pub fn welcome_to(&mut self, joining: Joining, epoch: Epoch) {
         self.seen.requests.push(joining.request.clone());
         let admission = Admission {
             epoch,
@@ -187,7 +187,7 @@ impl Harness<'_> {
     }
 
     /// Refuses a request to join.
-    pub(crate) fn refuse_join(&self, joining: Joining, reason: Refusal, explanation: &str) {
+    pub fn refuse_join(&self, joining: Joining, reason: Refusal, explanation: &str) {
         let refused = JoinAnswer::Refused {
             reason,
             explanation: explanation.to_owned(),
@@ -196,7 +196,7 @@ impl Harness<'_> {
     }
 
     /// Waits until the robot's token is declared.
-    pub(crate) fn until_ready(&mut self) -> Result<(), RuleFailure> {
+    pub fn until_ready(&mut self) -> Result<(), RuleFailure> {
         self.until(
             "its liveliness token after the welcome",
             PATIENCE,
@@ -205,7 +205,7 @@ impl Harness<'_> {
     }
 
     /// Stops the robot's process, as a hang does.
-    pub(crate) fn hang(&mut self) -> Result<(), RuleFailure> {
+    pub fn hang(&mut self) -> Result<(), RuleFailure> {
         self.process.signal(Signal::SIGSTOP);
         // The thread that takes the signal stops the others: until it has a processor, they run on.
         let mut limit = Limit::new(PATIENCE);
@@ -222,13 +222,13 @@ impl Harness<'_> {
     }
 
     /// The robot's process is killed, and its token gone.
-    pub(crate) fn crash(&mut self) -> Result<(), RuleFailure> {
+    pub fn crash(&mut self) -> Result<(), RuleFailure> {
         self.process.signal(Signal::SIGKILL);
         self.until_gone()
     }
 
     /// Starts another process of the robot on the same run, and waits until it has joined.
-    pub(crate) fn restart(&mut self) -> Result<(), RuleFailure> {
+    pub fn restart(&mut self) -> Result<(), RuleFailure> {
         self.process = start(self.kit, &self.run, &self.options)?;
         self.until(
             "its liveliness token after its start",
@@ -238,17 +238,17 @@ impl Harness<'_> {
     }
 
     /// The generation of the process that was admitted last.
-    pub(crate) fn generation(&self) -> Generation {
+    pub fn generation(&self) -> Generation {
         self.barrier.presence(&self.kit.subject()).0
     }
 
     /// The tokens of the other robots are gone; their queryables are still there.
-    pub(crate) fn hide_others(&mut self) {
+    pub fn hide_others(&mut self) {
         self.tokens.clear();
     }
 
     /// The same. Returns tokens that are declared all the same, but for that of the robot.
-    pub(crate) fn tokens_of_others(&mut self) -> Result<BTreeSet<String>, RuleFailure> {
+    pub fn tokens_of_others(&mut self) -> Result<BTreeSet<String>, RuleFailure> {
         self.hide_others();
         let tokens = Arc::new(Mutex::new(BTreeSet::new()));
         let known = Arc::clone(&tokens);
@@ -273,7 +273,7 @@ impl Harness<'_> {
     }
 
     /// Waits until the robot, whose news ask it to, has joined again.
-    pub(crate) fn until_rejoined(&mut self, before: Generation) -> Result<(), RuleFailure> {
+    pub fn until_rejoined(&mut self, before: Generation) -> Result<(), RuleFailure> {
         let news = TickUpdate {
             rejoin: Some(before),
             ..self.open_news()
@@ -287,7 +287,7 @@ impl Harness<'_> {
     }
 
     /// Whether the robot takes part from the next tick on, in the middle of an epoch.
-    pub(crate) fn takes_over(&self) -> bool {
+    pub fn takes_over(&self) -> bool {
         let (generation, _) = self.barrier.presence(&self.kit.subject());
         let has_answered = self.seen.answers.iter().any(|answer| {
             let report = &answer.reading.report;

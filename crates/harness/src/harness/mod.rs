@@ -44,31 +44,33 @@ const RESTLESS: Duration = Duration::from_secs(1);
 const TOKEN_PATIENCE: Duration = Duration::from_secs(120);
 
 /// A complete tick.
-pub(crate) struct CompleteTick {
-    pub(crate) report: Report,
-    pub(crate) commands: Vec<ReportedCommand>,
+pub struct CompleteTick {
+    /// The report of the robot.
+    pub report: Report,
+    /// Its commands, by number.
+    pub commands: Vec<ReportedCommand>,
     /// The place of its report in [`Seen::answers`].
-    pub(crate) index: usize,
+    pub index: usize,
     /// From the clock to the report, wall clock.
-    pub(crate) took: Duration,
+    pub took: Duration,
 }
 
 /// How a harness differs from the usual one.
-pub(crate) struct HarnessOptions {
+pub struct HarnessOptions {
     /// How long the robot is to try to join, seconds.
-    pub(crate) patience_s: u32,
+    pub patience_s: u32,
     /// How long the robot is to wait for a simulator that is gone, seconds.
-    pub(crate) gone_patience_s: u32,
+    pub gone_patience_s: u32,
     /// Whether everything that is put carries unknown fields.
-    pub(crate) has_extras: bool,
+    pub has_extras: bool,
     /// Whether whole numbers are written without a fraction wherever a fraction is possible.
-    pub(crate) writes_integers: bool,
+    pub writes_integers: bool,
     /// Whether the kit subscribes to the robot's state.
-    pub(crate) is_followed: bool,
+    pub is_followed: bool,
     /// Whether the other robots put their states, so that a robot that subscribes need not query.
-    pub(crate) puts_states: bool,
+    pub puts_states: bool,
     /// Whose roster it has.
-    pub(crate) part: KitPart,
+    pub part: KitPart,
 }
 
 impl Default for HarnessOptions {
@@ -87,32 +89,39 @@ impl Default for HarnessOptions {
 }
 
 /// A robot's process on a run of its own.
-pub(crate) struct Harness<'k> {
-    pub(crate) kit: &'k Kit,
-    pub(crate) run: RunName,
-    pub(crate) keys: Keys,
-    pub(crate) fake_peers: FakePeers,
-    pub(crate) seen: Seen,
-    pub(crate) process: RobotProcess,
-    pub(crate) body: RobotBody,
+pub struct Harness<'k> {
+    /// The kit that it is of.
+    pub kit: &'k Kit,
+    /// The run, which no other harness has.
+    pub run: RunName,
+    /// The keys of the run.
+    pub keys: Keys,
+    /// The robots that the kit plays.
+    pub fake_peers: FakePeers,
+    /// All that came from the robot.
+    pub seen: Seen,
+    /// Its process.
+    pub process: RobotProcess,
+    /// Where it stands.
+    pub body: RobotBody,
     /// Clocks that were put more than once.
-    pub(crate) repeated: BTreeSet<(Epoch, Tick)>,
+    pub repeated: BTreeSet<(Epoch, Tick)>,
     /// What the robot is welcomed with; epoch, tick, generation and news flag are the barrier's.
-    pub(crate) template: Welcome,
+    pub template: Welcome,
     /// Requests to join are queued for the check instead of being answered.
-    pub(crate) keeps_requests: bool,
+    pub keeps_requests: bool,
     /// Nothing reaches the robot: neither news nor clocks are put.
-    pub(crate) is_cut_off: bool,
+    pub is_cut_off: bool,
     /// News are put twice before each clock.
-    pub(crate) doubles_news: bool,
+    pub doubles_news: bool,
     /// News are not put.
-    pub(crate) withholds_news: bool,
+    pub withholds_news: bool,
     /// Flags that clocks have in addition to the barrier's.
-    pub(crate) more_flags: u32,
+    pub more_flags: u32,
     /// Clocks say that observers are shown their tick.
-    pub(crate) shows_panels: bool,
+    pub shows_panels: bool,
     /// Further incarnations are welcomed as if they had asked a tick earlier, when the body stood elsewhere.
-    pub(crate) asks_early: bool,
+    pub asks_early: bool,
     wire: Wire,
     /// Tokens of the robots that the kit plays.
     tokens: Vec<Declared>,
@@ -165,7 +174,7 @@ fn patient() -> LatePolicy {
 
 impl<'k> Harness<'k> {
     /// Opens a run and starts the robot's program on it.
-    pub(crate) fn open_run(kit: &'k Kit, options: HarnessOptions) -> Result<Self, RuleFailure> {
+    pub fn open_run(kit: &'k Kit, options: HarnessOptions) -> Result<Self, RuleFailure> {
         let run = kit.next_run();
         let keys = Keys::new(&run);
         let wire = Wire::open(&kit.bus, &keys)?;
@@ -205,22 +214,22 @@ impl<'k> Harness<'k> {
     }
 
     /// The epoch under way.
-    pub(crate) fn epoch(&self) -> Epoch {
+    pub fn epoch(&self) -> Epoch {
         self.epoch
     }
 
     /// The tick that is granted next.
-    pub(crate) fn next_tick(&self) -> Tick {
+    pub fn next_tick(&self) -> Tick {
         self.next
     }
 
     /// Whether the robot's token is declared.
-    pub(crate) fn is_present(&self) -> bool {
+    pub fn is_present(&self) -> bool {
         self.seen.is_present(self.kit.subject().as_str())
     }
 
     /// The robot's token has been declared without a break since it joined, also when something happened that it was to bear.
-    pub(crate) fn demand_token_kept(&self, when: &str) -> Result<(), RuleFailure> {
+    pub fn demand_token_kept(&self, when: &str) -> Result<(), RuleFailure> {
         if self.seen.tokens_lost == 0 {
             return Ok(());
         }
@@ -229,12 +238,12 @@ impl<'k> Harness<'k> {
     }
 
     /// From now on the other robots put their states, or do not.
-    pub(crate) fn set_puts_states(&mut self, puts_states: bool) {
+    pub fn set_puts_states(&mut self, puts_states: bool) {
         self.options.puts_states = puts_states;
     }
 
     /// The states of the others for the open tick, as they come to a robot that is slower than they.
-    pub(crate) fn put_early_states(&self) -> Result<(), RuleFailure> {
+    pub fn put_early_states(&self) -> Result<(), RuleFailure> {
         let tick = self.next.saturating_sub(1);
         Ok(self
             .fake_peers
@@ -456,7 +465,7 @@ impl<'k> Harness<'k> {
     }
 
     /// Files what comes until `found` finds something.
-    pub(crate) fn until<T>(
+    pub fn until<T>(
         &mut self,
         expected: &str,
         patience: Duration,
@@ -487,7 +496,7 @@ impl<'k> Harness<'k> {
     }
 
     /// The same for what follows from something that was put and that a link may lose which breaks: it is put again.
-    pub(crate) fn until_put<T>(
+    pub fn until_put<T>(
         &mut self,
         expected: &str,
         patience: Duration,
@@ -507,12 +516,12 @@ impl<'k> Harness<'k> {
     }
 
     /// Files what comes within a time.
-    pub(crate) fn pass(&mut self, time: Duration) {
+    pub fn pass(&mut self, time: Duration) {
         self.pass_while(time, |_| true);
     }
 
     /// Files what comes within a time, as long as a condition holds.
-    pub(crate) fn pass_while(&mut self, time: Duration, mut holds: impl FnMut(&Self) -> bool) {
+    pub fn pass_while(&mut self, time: Duration, mut holds: impl FnMut(&Self) -> bool) {
         let deadline = Instant::now() + time;
         while holds(self) {
             let rest = deadline.saturating_duration_since(Instant::now());
@@ -525,7 +534,7 @@ impl<'k> Harness<'k> {
 
     /// Files what comes within a time, and until the robot rests: after that, it has put what it had to put, and it is in
     /// the wait that it was led to.
-    pub(crate) fn settle(&mut self, time: Duration) {
+    pub fn settle(&mut self, time: Duration) {
         self.pass(time);
         let deadline = Instant::now() + RESTLESS;
         while !self.process.is_idle() && Instant::now() < deadline {
@@ -534,7 +543,7 @@ impl<'k> Harness<'k> {
     }
 
     /// Waits for the end of the process.
-    pub(crate) fn until_ended(
+    pub fn until_ended(
         &mut self,
         expected: &str,
         patience: Duration,
@@ -544,7 +553,7 @@ impl<'k> Harness<'k> {
     }
 
     /// The same for an end that this clock brings about.
-    pub(crate) fn until_ended_by(
+    pub fn until_ended_by(
         &mut self,
         clock: &Clock,
         expected: &str,
@@ -558,7 +567,7 @@ impl<'k> Harness<'k> {
     }
 
     /// Waits until the robot's token is undeclared.
-    pub(crate) fn until_gone(&mut self) -> Result<(), RuleFailure> {
+    pub fn until_gone(&mut self) -> Result<(), RuleFailure> {
         let mut limit = Limit::new(PATIENCE);
         while self.is_present() {
             if limit.is_over(&self.process) {

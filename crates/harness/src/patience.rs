@@ -6,9 +6,9 @@ use crate::process::RobotProcess;
 use crate::report::RuleFailure;
 
 /// Longest wait for a program to start and to ask to join.
-pub(crate) const START_PATIENCE: Duration = Duration::from_secs(40);
+pub const START_PATIENCE: Duration = Duration::from_secs(40);
 /// Longest wait for anything else.
-pub(crate) const PATIENCE: Duration = Duration::from_secs(10);
+pub const PATIENCE: Duration = Duration::from_secs(10);
 /// How often a wait is extended, at most.
 const EXTENSIONS: u32 = 6;
 /// A robot that waited for a processor for less than this share of its time is not extended.
@@ -16,7 +16,7 @@ const STARVING: u32 = 10;
 
 /// The limit of a wait for something that the robot must do. The time that its threads spend waiting for a processor does
 /// not count.
-pub(crate) struct Limit {
+pub struct Limit {
     patience: Duration,
     deadline: Instant,
     starved: Duration,
@@ -25,7 +25,7 @@ pub(crate) struct Limit {
 
 impl Limit {
     /// From now on.
-    pub(crate) fn new(patience: Duration) -> Self {
+    pub fn new(patience: Duration) -> Self {
         Self {
             patience,
             deadline: Instant::now() + patience,
@@ -35,7 +35,7 @@ impl Limit {
     }
 
     /// Whether the robot has had its time.
-    pub(crate) fn is_over(&mut self, process: &RobotProcess) -> bool {
+    pub fn is_over(&mut self, process: &RobotProcess) -> bool {
         let now = Instant::now();
         if now < self.deadline {
             return false;
@@ -58,7 +58,7 @@ const SCALES: [u32; 3] = [1, 3, 9];
 
 /// Judges what a machine that stands still for a moment could have caused as well: the rule is broken only if it is in
 /// each attempt, and each attempt has more time than the one before.
-pub(crate) fn in_each_attempt(
+pub fn in_each_attempt(
     mut judge: impl FnMut(u32) -> Result<(), RuleFailure>,
 ) -> Result<(), RuleFailure> {
     let mut first = None;

@@ -22,19 +22,20 @@ const PACES: Tick = 50;
 
 /// A query that one of them received.
 #[derive(Debug, Clone)]
-pub(crate) struct ReceivedQuery {
+pub struct ReceivedQuery {
     /// The robot that was asked.
-    pub(crate) of: RobotName,
+    pub of: RobotName,
     /// Its parameters, as they came.
-    pub(crate) tick: Option<String>,
-    pub(crate) epoch: Option<String>,
+    pub tick: Option<String>,
+    /// Its parameter `epoch`, as it came.
+    pub epoch: Option<String>,
     /// The tick under way.
-    pub(crate) now: (Epoch, Tick),
+    pub now: (Epoch, Tick),
 }
 
 /// A reply that does not answer: the robot must query again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Unhelpful {
+pub enum Unhelpful {
     /// An error reply, as of a robot that has not reported yet.
     Refusal,
     /// The state of an earlier tick, which says so.
@@ -58,7 +59,7 @@ struct PeersState {
 
 /// The others, and the tick that they are in.
 #[derive(Clone, Default)]
-pub(crate) struct FakePeers {
+pub struct FakePeers {
     others: Arc<BTreeMap<RobotName, RosterRobot>>,
     state: Arc<Mutex<PeersState>>,
     /// Whether everything that is put carries unknown fields.
@@ -68,7 +69,8 @@ pub(crate) struct FakePeers {
 }
 
 impl FakePeers {
-    pub(crate) fn new(
+    /// These robots, with what differs in their messages.
+    pub fn new(
         others: BTreeMap<RobotName, RosterRobot>,
         has_extras: bool,
         writes_integers: bool,
@@ -82,7 +84,7 @@ impl FakePeers {
     }
 
     /// Their names.
-    pub(crate) fn names(&self) -> impl Iterator<Item = &RobotName> {
+    pub fn names(&self) -> impl Iterator<Item = &RobotName> {
         self.others.keys()
     }
 
@@ -91,32 +93,32 @@ impl FakePeers {
     }
 
     /// A tick begins.
-    pub(crate) fn begin(&self, epoch: Epoch, tick: Tick) {
+    pub fn begin(&self, epoch: Epoch, tick: Tick) {
         self.state().now = (epoch, tick);
     }
 
     /// The queries that they received so far.
-    pub(crate) fn asked(&self) -> Vec<ReceivedQuery> {
+    pub fn asked(&self) -> Vec<ReceivedQuery> {
         self.state().asked.clone()
     }
 
     /// From now on they hold queries back.
-    pub(crate) fn hold(&self) {
+    pub fn hold(&self) {
         self.hold_before(Epoch::MAX, Tick::MAX);
     }
 
     /// They hold back queries for ticks before this one, and answer all others.
-    pub(crate) fn hold_before(&self, epoch: Epoch, tick: Tick) {
+    pub fn hold_before(&self, epoch: Epoch, tick: Tick) {
         self.state().holds_before = Some((epoch, tick));
     }
 
     /// States that are put show them elsewhere than they are, or no longer do.
-    pub(crate) fn misplace(&self, misplaces: bool) {
+    pub fn misplace(&self, misplaces: bool) {
         self.state().misplaces = misplaces;
     }
 
     /// They reply in this order to the next queries of each robot, and then as usual.
-    pub(crate) fn be_unhelpful(&self, replies: &[Unhelpful]) {
+    pub fn be_unhelpful(&self, replies: &[Unhelpful]) {
         let mut last_first = replies.to_vec();
         last_first.reverse();
         self.state().unhelpful = self
@@ -126,7 +128,7 @@ impl FakePeers {
     }
 
     /// A robot that was queried, and has not been queried as often as [`Self::be_unhelpful`] demands.
-    pub(crate) fn given_up(&self) -> Option<RobotName> {
+    pub fn given_up(&self) -> Option<RobotName> {
         let state = self.state();
         let asked: Vec<&RobotName> = state
             .asked
@@ -145,12 +147,12 @@ impl FakePeers {
     }
 
     /// Whether they hold a query back.
-    pub(crate) fn has_held(&self) -> bool {
+    pub fn has_held(&self) -> bool {
         !self.state().held.is_empty()
     }
 
     /// They answer what they held back, and everything from now on.
-    pub(crate) fn release(&self) {
+    pub fn release(&self) {
         // Answered without the lock, which `answer` takes itself.
         let held = {
             let mut state = self.state();
@@ -193,14 +195,14 @@ impl FakePeers {
     }
 
     /// The first of them, as it is sensed in a tick.
-    pub(crate) fn sensed(&self, epoch: Epoch, tick: Tick) -> Option<SensedRobot> {
+    pub fn sensed(&self, epoch: Epoch, tick: Tick) -> Option<SensedRobot> {
         let name = self.names().next()?.clone();
         let location = self.state_of(&name, epoch, tick)?.location;
         Some(SensedRobot { name, location })
     }
 
     /// The same as a body.
-    pub(crate) fn bodies(&self, epoch: Epoch, tick: Tick) -> Vec<SensedBody> {
+    pub fn bodies(&self, epoch: Epoch, tick: Tick) -> Vec<SensedBody> {
         let sensed = self.sensed(epoch, tick);
         let body = sensed.map(|robot| SensedBody {
             kind: SensedKind::Robot,
@@ -211,7 +213,7 @@ impl FakePeers {
     }
 
     /// A message as it is put on the wire.
-    pub(crate) fn dress<M: Message>(&self, message: &M) -> Vec<u8> {
+    pub fn dress<M: Message>(&self, message: &M) -> Vec<u8> {
         let bytes = encode(message);
         if !self.has_extras && !self.writes_integers {
             return bytes;
@@ -230,7 +232,7 @@ impl FakePeers {
     }
 
     /// Declares their queryables.
-    pub(crate) fn serve(&self, bus: &Bus, keys: &Keys) -> Result<Vec<Declared>, BusError> {
+    pub fn serve(&self, bus: &Bus, keys: &Keys) -> Result<Vec<Declared>, BusError> {
         let mut declared = Vec::new();
         for name in self.names() {
             for what in QUERIES.iter().chain([&STATE]) {
@@ -246,7 +248,7 @@ impl FakePeers {
     }
 
     /// Declares their tokens.
-    pub(crate) fn show(&self, bus: &Bus, keys: &Keys) -> Result<Vec<Declared>, BusError> {
+    pub fn show(&self, bus: &Bus, keys: &Keys) -> Result<Vec<Declared>, BusError> {
         self.names()
             .map(|name| bus.token(&keys.alive_robot(name)))
             .collect()
@@ -307,7 +309,7 @@ impl FakePeers {
     }
 
     /// Puts their states of the tick before, for robots that subscribe to them, before the clock of the tick.
-    pub(crate) fn put_states(&self, bus: &Bus, keys: &Keys) -> Result<(), BusError> {
+    pub fn put_states(&self, bus: &Bus, keys: &Keys) -> Result<(), BusError> {
         let (_, tick) = self.state().now;
         match tick.checked_sub(1) {
             Some(before) => self.put_states_of(before, bus, keys),
@@ -316,12 +318,7 @@ impl FakePeers {
     }
 
     /// The same for a tick of the epoch under way.
-    pub(crate) fn put_states_of(
-        &self,
-        before: Tick,
-        bus: &Bus,
-        keys: &Keys,
-    ) -> Result<(), BusError> {
+    pub fn put_states_of(&self, before: Tick, bus: &Bus, keys: &Keys) -> Result<(), BusError> {
         let (epoch, _) = self.state().now;
         let misplaces = self.state().misplaces;
         for name in self.names() {

@@ -21,17 +21,20 @@ const WORD_EVERY: usize = 10;
 
 /// A command that arrives at the robot.
 #[derive(Debug, Clone)]
-pub(crate) struct ArrivingCommand {
-    pub(crate) from: RobotName,
-    pub(crate) text: String,
-    pub(crate) payload: Option<Payload>,
+pub struct ArrivingCommand {
+    /// Its sender.
+    pub from: RobotName,
+    /// Its text.
+    pub text: String,
+    /// Its payload.
+    pub payload: Option<Payload>,
     /// The tick in whose news it is.
-    pub(crate) tick: Tick,
+    pub tick: Tick,
 }
 
 impl ArrivingCommand {
     /// The command `text` of `from`, in the news of a tick.
-    pub(crate) fn new(from: &RobotName, text: &str, tick: Tick) -> Self {
+    pub fn new(from: &RobotName, text: &str, tick: Tick) -> Self {
         Self {
             from: from.clone(),
             text: text.to_owned(),
@@ -41,7 +44,7 @@ impl ArrivingCommand {
     }
 
     /// As news list it.
-    pub(crate) fn delivery(&self) -> Delivery {
+    pub fn delivery(&self) -> Delivery {
         Delivery {
             from: self.from.clone(),
             performative: Performative::Achieve,
@@ -53,15 +56,15 @@ impl ArrivingCommand {
 
 /// Ticks to play.
 #[derive(Debug, Clone)]
-pub(crate) struct PlayScript {
+pub struct PlayScript {
     /// How many after the first.
-    pub(crate) ticks: Tick,
+    pub ticks: Tick,
     /// Commands, in the order in which they count.
-    pub(crate) arrivals: Vec<ArrivingCommand>,
+    pub arrivals: Vec<ArrivingCommand>,
 }
 
 /// What a check does between the ticks. None of it may make a difference to the robot.
-pub(crate) trait Disturbance {
+pub trait Disturbance {
     /// Changes news in a way that makes no difference.
     fn news(&mut self, _stage: &Harness<'_>, _news: &mut TickUpdate) {}
 
@@ -82,14 +85,14 @@ pub(crate) trait Disturbance {
 }
 
 /// No disturbance at all.
-pub(crate) struct Straight;
+pub struct Straight;
 
 impl Disturbance for Straight {}
 
 impl PlayScript {
     /// The usual ticks: a few commands among them. Whichever of two words sends a robot to sleep, it is awake in some of the ticks in
     /// which it cannot query others, and asleep in some.
-    pub(crate) fn usual(kit: &Kit) -> Self {
+    pub fn usual(kit: &Kit) -> Self {
         let [one, two] = kit.texts();
         let from = kit.sender();
 
@@ -110,7 +113,7 @@ impl PlayScript {
     }
 
     /// Ticks in which both words arrive in turn, every ten ticks from each of these senders, to the end.
-    pub(crate) fn in_turn(kit: &Kit, senders: &[RobotName], ticks: Tick) -> Self {
+    pub fn in_turn(kit: &Kit, senders: &[RobotName], ticks: Tick) -> Self {
         let texts = kit.texts();
         let mut arrivals = Vec::new();
         for (tick, text) in (FIRST_WORD..=ticks)
@@ -125,7 +128,7 @@ impl PlayScript {
     }
 
     /// A few quiet ticks.
-    pub(crate) fn quiet(ticks: Tick) -> Self {
+    pub fn quiet(ticks: Tick) -> Self {
         Self {
             ticks,
             arrivals: Vec::new(),
@@ -133,7 +136,7 @@ impl PlayScript {
     }
 
     /// A few ticks with these commands.
-    pub(crate) fn with(ticks: Tick, arrivals: Vec<ArrivingCommand>) -> Self {
+    pub fn with(ticks: Tick, arrivals: Vec<ArrivingCommand>) -> Self {
         Self { ticks, arrivals }
     }
 
@@ -151,27 +154,27 @@ impl PlayScript {
 }
 
 /// A robot that has joined a run of its own, ready for its first clock.
-pub(crate) fn with_robot(kit: &Kit, options: HarnessOptions) -> Result<Harness<'_>, RuleFailure> {
+pub fn with_robot(kit: &Kit, options: HarnessOptions) -> Result<Harness<'_>, RuleFailure> {
     let mut harness = Harness::open_run(kit, options)?;
     harness.join()?;
     Ok(harness)
 }
 
 /// A process of its own, taken straight through a script.
-pub(crate) fn played(kit: &Kit, script: &PlayScript) -> Result<Transcript, RuleFailure> {
+pub fn played(kit: &Kit, script: &PlayScript) -> Result<Transcript, RuleFailure> {
     let mut harness = with_robot(kit, HarnessOptions::default())?;
     play(&mut harness, script, &mut Straight)
 }
 
 /// The usual ticks, as the robot went through them without any disturbance.
-pub(crate) fn usual(kit: &Kit) -> Result<&Transcript, RuleFailure> {
+pub fn usual(kit: &Kit) -> Result<&Transcript, RuleFailure> {
     kit.usual
         .get()
         .ok_or_else(|| RuleFailure::new("the usual ticks are played first", "they were not"))
 }
 
 /// Plays a script to a robot that has joined, from the next tick of its harness on.
-pub(crate) fn play(
+pub fn play(
     harness: &mut Harness<'_>,
     script: &PlayScript,
     disturbance: &mut dyn Disturbance,
@@ -185,7 +188,7 @@ pub(crate) fn play(
 }
 
 /// Plays the usual ticks to a robot that has joined, and demands that it goes through them as without `disturbance`.
-pub(crate) fn demand_usual(
+pub fn demand_usual(
     harness: &mut Harness<'_>,
     what: &str,
     disturbance: &mut dyn Disturbance,
@@ -196,7 +199,7 @@ pub(crate) fn demand_usual(
 }
 
 /// Plays the next tick.
-pub(crate) fn step(
+pub fn step(
     harness: &mut Harness<'_>,
     script: &PlayScript,
     disturbance: &mut dyn Disturbance,
@@ -227,7 +230,7 @@ pub(crate) fn step(
 }
 
 /// Whether the robot can query another one in a tick, by the news of these ticks.
-pub(crate) fn can_query(tick: Tick) -> bool {
+pub fn can_query(tick: Tick) -> bool {
     ![CUT_OFF, OUT_OF_RANGE].contains(&(tick % ROUND))
 }
 

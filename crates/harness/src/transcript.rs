@@ -9,20 +9,24 @@ use crate::seen::ReportedCommand;
 
 /// A tick that was played.
 #[derive(Debug, Clone)]
-pub(crate) struct PlayedTick {
-    pub(crate) epoch: Epoch,
-    pub(crate) tick: Tick,
-    pub(crate) news: TickUpdate,
+pub struct PlayedTick {
+    /// Its epoch.
+    pub epoch: Epoch,
+    /// Its number.
+    pub tick: Tick,
+    /// What was new for the robot.
+    pub news: TickUpdate,
     /// Where the robot stands in it.
-    pub(crate) location: Point,
-    pub(crate) report: Report,
+    pub location: Point,
+    /// The report of the robot.
+    pub report: Report,
     /// Its commands, by number.
-    pub(crate) commands: Vec<ReportedCommand>,
+    pub commands: Vec<ReportedCommand>,
     /// The place of its report in [`crate::seen::Seen::answers`].
-    pub(crate) index: usize,
+    pub index: usize,
     /// From the clock to the report, wall clock.
-    pub(crate) took: Duration,
+    pub took: Duration,
 }
 
 /// Ticks that were played, in their order.
-pub(crate) type Transcript = Vec<PlayedTick>;
+pub type Transcript = Vec<PlayedTick>;

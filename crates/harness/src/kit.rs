@@ -29,21 +29,25 @@ pub enum CannotRun {
 }
 
 /// A router session, a command, and what was learned.
-pub(crate) struct Kit {
-    pub(crate) bus: Bus,
+pub struct Kit {
+    /// The router session.
+    pub bus: Bus,
     /// A queryable in a session of its own, which replies at once.
     _control: Declared,
-    pub(crate) endpoint: String,
-    pub(crate) command: Command,
-    pub(crate) setting: CheckSetting,
+    /// Where the robot connects.
+    pub endpoint: String,
+    /// What starts the robot.
+    pub command: Command,
+    /// What the robot finds.
+    pub setting: CheckSetting,
     runs: AtomicUsize,
     /// What `cars exec` has reported of the robot's processes.
-    pub(crate) stdio: StdioReports,
+    pub stdio: StdioReports,
     learned: OnceLock<Learned>,
     /// The usual ticks, without any disturbance.
-    pub(crate) usual: OnceLock<Transcript>,
+    pub usual: OnceLock<Transcript>,
     /// Whether the same ticks gave the same reports, so that differences mean something.
-    pub(crate) is_deterministic: OnceLock<bool>,
+    pub is_deterministic: OnceLock<bool>,
 }
 
 /// What the first request to join contained.
@@ -61,7 +65,7 @@ const OWN_PATIENCE: Duration = Duration::from_secs(20);
 
 impl Kit {
     /// Opens the kit's sessions. Nothing is started yet.
-    pub(crate) fn open(command: &Command, setting: &CheckSetting) -> Result<Self, CannotRun> {
+    pub fn open(command: &Command, setting: &CheckSetting) -> Result<Self, CannotRun> {
         let (bus, endpoint) = open_router()?;
         let mut own = process::copy(command);
         // The robot connects to this kit only.
@@ -82,19 +86,19 @@ impl Kit {
     }
 
     /// The key of the kit's own queryable: a query there takes as long as this machine makes any query take.
-    pub(crate) fn control_key(&self) -> String {
+    pub fn control_key(&self) -> String {
         control_key()
     }
 
     /// A name for a run that no other has.
-    pub(crate) fn next_run(&self) -> RunName {
+    pub fn next_run(&self) -> RunName {
         let number = self.runs.fetch_add(1, Ordering::Relaxed);
         RunName::new(&format!("conform-{}-{number}", std::process::id()))
             .unwrap_or_else(|error| unreachable!("letters and digits are a name: {error}"))
     }
 
     /// The first request to join names the robot.
-    pub(crate) fn learn(&self, request: &JoinRequest) -> Result<(), CannotRun> {
+    pub fn learn(&self, request: &JoinRequest) -> Result<(), CannotRun> {
         let fake_peers = self
             .setting
             .cast_for(&request.name)
@@ -117,17 +121,17 @@ impl Kit {
     }
 
     /// The instance that its first process claimed.
-    pub(crate) fn first_instance(&self) -> &str {
+    pub fn first_instance(&self) -> &str {
         &self.learned().request.instance
     }
 
     /// The robot that is checked.
-    pub(crate) fn subject(&self) -> RobotName {
+    pub fn subject(&self) -> RobotName {
         self.learned().request.name.clone()
     }
 
     /// What the robot is written with, as it states.
-    pub(crate) fn sdk(&self) -> String {
+    pub fn sdk(&self) -> String {
         self.learned().request.sdk.clone()
     }
 
@@ -140,7 +144,7 @@ impl Kit {
     }
 
     /// The robots that the kit plays.
-    pub(crate) fn others(&self, part: KitPart) -> BTreeMap<RobotName, RosterRobot> {
+    pub fn others(&self, part: KitPart) -> BTreeMap<RobotName, RosterRobot> {
         let learned = self.learned();
         let mut others = Self::roster(learned, part);
         others.remove(&learned.request.name);
@@ -148,7 +152,7 @@ impl Kit {
     }
 
     /// The sender of the robot's commands: the first of the others, or the operator.
-    pub(crate) fn sender(&self) -> RobotName {
+    pub fn sender(&self) -> RobotName {
         self.others(KitPart::Alone)
             .into_keys()
             .next()
@@ -157,7 +161,7 @@ impl Kit {
 
     /// Pairs of different commands: first those that the robot understands, as far as is known, then others. A robot that
     /// shows nothing of the one may show something of the other.
-    pub(crate) fn pairs(&self) -> Vec<[String; 2]> {
+    pub fn pairs(&self) -> Vec<[String; 2]> {
         let role = self.learned().fake_peers.get(&self.subject());
         let own = role
             .map(|role| role.understands.clone())
@@ -171,17 +175,17 @@ impl Kit {
     }
 
     /// The first of these pairs.
-    pub(crate) fn texts(&self) -> [String; 2] {
+    pub fn texts(&self) -> [String; 2] {
         self.pairs().into_iter().next().unwrap_or_default()
     }
 
     /// Whether its news list the bodies around it.
-    pub(crate) fn wants_bodies(&self) -> bool {
+    pub fn wants_bodies(&self) -> bool {
         self.learned().request.bodies
     }
 
     /// Its heading at the start, if it drives.
-    pub(crate) fn heading_rad(&self) -> f64 {
+    pub fn heading_rad(&self) -> f64 {
         let Some(learned) = self.learned.get() else {
             return 0.0;
         };
@@ -190,7 +194,7 @@ impl Kit {
     }
 
     /// The distances along its rays, if it asks for them and there are any: nothing is within their range.
-    pub(crate) fn ranges_m(&self) -> Vec<f64> {
+    pub fn ranges_m(&self) -> Vec<f64> {
         match self.setting.rays {
             Some(rays) if self.learned().request.ranges => vec![rays.range_m; rays.count as usize],
             _ => Vec::new(),
@@ -198,7 +202,7 @@ impl Kit {
     }
 
     /// What it senses of layers where it stands.
-    pub(crate) fn layers_at(&self, place: Point) -> Vec<SensedLayer> {
+    pub fn layers_at(&self, place: Point) -> Vec<SensedLayer> {
         let mut sensed = Vec::new();
         for layer in &self.setting.layers {
             sensed.push(SensedLayer {
@@ -215,7 +219,7 @@ impl Kit {
     }
 
     /// What the robot is welcomed with at tick 0.
-    pub(crate) fn template(&self, run: &RunName, part: KitPart) -> Welcome {
+    pub fn template(&self, run: &RunName, part: KitPart) -> Welcome {
         let learned = self.learned.get();
         let name = learned.map_or_else(RobotName::operator, |learned| learned.request.name.clone());
         let fake_peers = learned

@@ -18,7 +18,7 @@ const TAIL_BYTES: u64 = 1500;
 const HEAD_BYTES: u64 = 1 << 16;
 
 /// The same command again.
-pub(crate) fn copy(command: &Command) -> Command {
+pub fn copy(command: &Command) -> Command {
     let mut own = Command::new(command.get_program());
     own.args(command.get_args());
 
@@ -37,7 +37,7 @@ pub(crate) fn copy(command: &Command) -> Command {
 }
 
 /// A robot's process, with all that it started.
-pub(crate) struct RobotProcess {
+pub struct RobotProcess {
     child: Child,
     group: ProcessGroup,
     output: File,
@@ -47,10 +47,7 @@ pub(crate) struct RobotProcess {
 
 impl RobotProcess {
     /// Starts the command as it is, with more in its environment.
-    pub(crate) fn start(
-        command: &Command,
-        environment: &[(&str, String)],
-    ) -> std::io::Result<Self> {
+    pub fn start(command: &Command, environment: &[(&str, String)]) -> std::io::Result<Self> {
         // Files, not pipes: a program that prints much is never blocked by a kit that does not read.
         let output = tempfile::tempfile()?;
         let errors = tempfile::tempfile()?;
@@ -72,7 +69,7 @@ impl RobotProcess {
     }
 
     /// How it ended, if it has.
-    pub(crate) fn ended(&mut self) -> Option<ExitStatus> {
+    pub fn ended(&mut self) -> Option<ExitStatus> {
         if self.ended.is_none() {
             // It is our child and was not waited for before: asking cannot fail.
             self.ended = self.child.try_wait().ok().flatten();
@@ -81,43 +78,43 @@ impl RobotProcess {
     }
 
     /// Sends a signal to the program and all that it started, as a launcher does.
-    pub(crate) fn signal(&self, signal: Signal) {
+    pub fn signal(&self, signal: Signal) {
         // A group that has ended needs none.
         let _ended = killpg(self.group.0, signal);
     }
 
     /// Whether the program, and all that it started, is stopped by a signal.
-    pub(crate) fn is_stopped(&self) -> bool {
+    pub fn is_stopped(&self) -> bool {
         self.group.is_stopped()
     }
 
     /// Whether the program, and all that it started, rests.
-    pub(crate) fn is_idle(&self) -> bool {
+    pub fn is_idle(&self) -> bool {
         self.group.is_idle()
     }
 
     /// How long its threads have waited for a processor so far.
-    pub(crate) fn starved(&self) -> Duration {
+    pub fn starved(&self) -> Duration {
         self.group.starved()
     }
 
     /// The beginning of what it wrote to its standard output.
-    pub(crate) fn output(&self) -> String {
+    pub fn output(&self) -> String {
         String::from_utf8_lossy(&first_bytes(&self.output).unwrap_or_default()).into_owned()
     }
 
     /// How much it wrote to its standard error, bytes.
-    pub(crate) fn error_bytes(&self) -> u64 {
+    pub fn error_bytes(&self) -> u64 {
         self.errors.metadata().map_or(0, |metadata| metadata.len())
     }
 
     /// The last that it wrote to its standard error.
-    pub(crate) fn errors(&self) -> String {
+    pub fn errors(&self) -> String {
         tail(&self.errors)
     }
 
     /// What became of it, in words.
-    pub(crate) fn fate(&mut self) -> String {
+    pub fn fate(&mut self) -> String {
         let fate = match self.ended() {
             None => "it runs".to_owned(),
             Some(status) => format!("its process has ended ({status})"),

@@ -6,20 +6,20 @@ use serde_json::Value;
 
 /// A report as far as it can be read.
 #[derive(Debug, Clone)]
-pub(crate) struct Reading {
+pub struct Reading {
     /// The report; numbers that are not finite are left out or zero.
-    pub(crate) report: Report,
+    pub report: Report,
     /// Fields whose numbers are not finite.
-    pub(crate) not_numbers: Vec<String>,
+    pub not_numbers: Vec<String>,
     /// Integers that are written with a fraction.
-    pub(crate) not_integers: Vec<String>,
+    pub not_integers: Vec<String>,
 }
 
 /// The integers of a report and of a command.
 const INTEGERS: [&str; 5] = ["epoch", "tick", "generation", "number", "commands"];
 
 /// Reads a report.
-pub(crate) fn read(key: &str, robot: &str, bytes: &[u8]) -> Result<Reading, Malformed> {
+pub fn read(key: &str, robot: &str, bytes: &[u8]) -> Result<Reading, Malformed> {
     match decode(key, robot, bytes) {
         Ok(report) => Ok(Reading {
             report,
@@ -31,7 +31,7 @@ pub(crate) fn read(key: &str, robot: &str, bytes: &[u8]) -> Result<Reading, Malf
 }
 
 /// Reads a command, and the integers in it that are written with a fraction.
-pub(crate) fn read_command(
+pub fn read_command(
     key: &str,
     robot: &str,
     bytes: &[u8],

@@ -18,12 +18,12 @@ const INCOMPLETE: usize = 3;
 
 impl Harness<'_> {
     /// Whether the tick that was granted last is open.
-    pub(crate) fn is_open(&self) -> bool {
+    pub fn is_open(&self) -> bool {
         self.barrier.is_open()
     }
 
     /// Whether the robot has put a report for a tick of the epoch under way.
-    pub(crate) fn has_answered(&self, tick: Tick) -> bool {
+    pub fn has_answered(&self, tick: Tick) -> bool {
         self.seen.answers.iter().any(|answer| {
             let report = &answer.reading.report;
             (report.epoch, report.tick) == (self.epoch, tick)
@@ -31,7 +31,7 @@ impl Harness<'_> {
     }
 
     /// The robot's flag in clocks.
-    pub(crate) fn flag(&self) -> u32 {
+    pub fn flag(&self) -> u32 {
         let subject = self.kit.subject();
         let index = self.barrier.roster().position(|name| *name == subject);
 
@@ -39,27 +39,27 @@ impl Harness<'_> {
     }
 
     /// Puts a clock.
-    pub(crate) fn put_clock(&self, clock: &Clock) -> Result<(), RuleFailure> {
+    pub fn put_clock(&self, clock: &Clock) -> Result<(), RuleFailure> {
         self.put_as_clock(&self.fake_peers.dress(clock))
     }
 
     /// Puts something else on the key of clocks.
-    pub(crate) fn put_as_clock(&self, bytes: &[u8]) -> Result<(), RuleFailure> {
+    pub fn put_as_clock(&self, bytes: &[u8]) -> Result<(), RuleFailure> {
         self.wire.put_clock(bytes.to_vec())
     }
 
     /// Puts news for the robot.
-    pub(crate) fn put_news(&self, news: &TickUpdate) -> Result<(), RuleFailure> {
+    pub fn put_news(&self, news: &TickUpdate) -> Result<(), RuleFailure> {
         self.put_as_news(&self.fake_peers.dress(news))
     }
 
     /// Puts something else on the key of its news.
-    pub(crate) fn put_as_news(&self, bytes: &[u8]) -> Result<(), RuleFailure> {
+    pub fn put_as_news(&self, bytes: &[u8]) -> Result<(), RuleFailure> {
         self.wire.put_news(&self.kit.subject(), bytes.to_vec())
     }
 
     /// Puts commands to the robot as the operator and another robot do, for the medium, which here delivers none of them.
-    pub(crate) fn send_to_medium(&self) -> Result<(), RuleFailure> {
+    pub fn send_to_medium(&self) -> Result<(), RuleFailure> {
         let subject = self.kit.subject();
         let sender = self.kit.sender();
         for text in self.kit.texts() {
@@ -91,17 +91,17 @@ impl Harness<'_> {
     }
 
     /// Deletes the keys of clocks and of the robot's news.
-    pub(crate) fn delete_keys(&self) -> Result<(), RuleFailure> {
+    pub fn delete_keys(&self) -> Result<(), RuleFailure> {
         self.wire.delete(&self.kit.subject())
     }
 
     /// Puts the last clock and its news again.
-    pub(crate) fn repeat(&mut self) {
+    pub fn repeat(&mut self) {
         self.drive(lockstep::Barrier::repeat);
     }
 
     /// The news of the open tick, as they are put.
-    pub(crate) fn open_news(&self) -> TickUpdate {
+    pub fn open_news(&self) -> TickUpdate {
         let generation = self.generation();
         TickUpdate {
             epoch: self.epoch,
@@ -113,13 +113,13 @@ impl Harness<'_> {
     }
 
     /// Puts the news of the open tick that were withheld. If a broken link loses them, they are put again with their clock.
-    pub(crate) fn release_news(&mut self) -> Result<(), RuleFailure> {
+    pub fn release_news(&mut self) -> Result<(), RuleFailure> {
         self.withholds_news = false;
         self.put_news(&self.open_news())
     }
 
     /// Grants the next tick with these news.
-    pub(crate) fn open(&mut self, news: &TickUpdate) -> Result<(), RuleFailure> {
+    pub fn open(&mut self, news: &TickUpdate) -> Result<(), RuleFailure> {
         self.until("all robots are connected", PATIENCE, |harness| {
             harness.is_gathered.then_some(())
         })?;
@@ -141,7 +141,7 @@ impl Harness<'_> {
     }
 
     /// Whether the robot senses something in every tick, so that there is no tick without news for it.
-    pub(crate) fn has_steady_senses(&self) -> bool {
+    pub fn has_steady_senses(&self) -> bool {
         !self.with_senses(TickUpdate::default()).is_empty()
     }
 
@@ -157,14 +157,14 @@ impl Harness<'_> {
     }
 
     /// Waits until the robot has reported, or has asked another one that holds its answer back.
-    pub(crate) fn until_asking(&mut self) -> Result<(), RuleFailure> {
+    pub fn until_asking(&mut self) -> Result<(), RuleFailure> {
         self.until("a report or a query", PATIENCE, |harness| {
             (harness.fake_peers.has_held() || !harness.is_open()).then_some(())
         })
     }
 
     /// Waits until the open tick is complete.
-    pub(crate) fn complete(&mut self) -> Result<CompleteTick, RuleFailure> {
+    pub fn complete(&mut self) -> Result<CompleteTick, RuleFailure> {
         let tick = self.next.saturating_sub(1);
         let expected = format!("a report for tick {tick} of epoch {}", self.epoch);
         let came = self.until(&expected, PATIENCE, |harness| {
@@ -243,7 +243,7 @@ impl Harness<'_> {
     }
 
     /// A command of the open tick that has another generation than the robot, in words.
-    pub(crate) fn misstamped(&self) -> Option<String> {
+    pub fn misstamped(&self) -> Option<String> {
         let generation = self.generation();
         let at = (self.epoch, self.next.saturating_sub(1));
         self.seen
@@ -260,7 +260,7 @@ impl Harness<'_> {
     }
 
     /// How many commands the robot states for the open tick again and again, and does not put.
-    pub(crate) fn incomplete(&self) -> Option<u32> {
+    pub fn incomplete(&self) -> Option<u32> {
         if !self.barrier.is_open() {
             return None;
         }
@@ -291,7 +291,7 @@ impl Harness<'_> {
     }
 
     /// Grants the next tick while the robot is cut off, and goes on without it: it is lost.
-    pub(crate) fn miss(&mut self) -> Result<(), RuleFailure> {
+    pub fn miss(&mut self) -> Result<(), RuleFailure> {
         self.is_cut_off = true;
         self.go_on_without()?;
         self.is_cut_off = false;
@@ -299,7 +299,7 @@ impl Harness<'_> {
     }
 
     /// Grants the next tick, which the robot cannot answer, and goes on without it: it is lost.
-    pub(crate) fn go_on_without(&mut self) -> Result<(), RuleFailure> {
+    pub fn go_on_without(&mut self) -> Result<(), RuleFailure> {
         let impatient = LatePolicy {
             on_late: OnLate::Continue,
             ..patient()
@@ -316,12 +316,12 @@ impl Harness<'_> {
     }
 
     /// Ends the run. Returns the clock that says so.
-    pub(crate) fn end(&mut self, end: End) -> Clock {
+    pub fn end(&mut self, end: End) -> Clock {
         self.barrier.end(end)
     }
 
     /// Undeclares the simulator's liveliness token, or declares it again. Returns when that is done.
-    pub(crate) fn show_simulator(&mut self, is_present: bool) -> Result<Instant, RuleFailure> {
+    pub fn show_simulator(&mut self, is_present: bool) -> Result<Instant, RuleFailure> {
         self.wire.show_simulator(is_present)?;
         Ok(Instant::now())
     }

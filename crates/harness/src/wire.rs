@@ -16,7 +16,7 @@ const QUEUE: usize = 65_536;
 const ATTEMPTS: usize = 4;
 
 /// All that a robot can put or ask.
-pub(crate) enum WireEvent {
+pub enum WireEvent {
     Join(Query),
     Report {
         key: String,
@@ -49,14 +49,18 @@ pub(crate) enum WireEvent {
 }
 
 /// A robot asks to take part.
-pub(crate) struct Joining {
-    pub(crate) query: Query,
-    pub(crate) key: String,
-    pub(crate) request: Result<JoinRequest, String>,
+pub struct Joining {
+    /// The query, which the answer ends.
+    pub query: Query,
+    /// The key of the query.
+    pub key: String,
+    /// The request, or why it cannot be read.
+    pub request: Result<JoinRequest, String>,
 }
 
 impl Joining {
-    pub(crate) fn new(query: Query) -> Self {
+    /// Reads the request.
+    pub fn new(query: Query) -> Self {
         let key = query.key().to_owned();
         let request = decode(&key, "a robot", &query.body()).map_err(|error| error.to_string());
         Self {
@@ -68,7 +72,7 @@ impl Joining {
 }
 
 /// The declarations of one run, and the queue of what arrives.
-pub(crate) struct Wire {
+pub struct Wire {
     bus: Bus,
     keys: Keys,
     queue: SyncSender<WireEvent>,
@@ -81,7 +85,7 @@ pub(crate) struct Wire {
 
 impl Wire {
     /// Declares all that a simulator declares, its token last.
-    pub(crate) fn open(bus: &Bus, keys: &Keys) -> Result<Self, BusError> {
+    pub fn open(bus: &Bus, keys: &Keys) -> Result<Self, BusError> {
         let (queue, events) = std::sync::mpsc::sync_channel(QUEUE);
         let declared = listen(bus, keys, &queue)?;
         let clock = bus.publisher(&keys.clock())?;
@@ -100,18 +104,18 @@ impl Wire {
     }
 
     /// Keeps further declarations until the run is over.
-    pub(crate) fn keep(&mut self, declared: impl IntoIterator<Item = Declared>) {
+    pub fn keep(&mut self, declared: impl IntoIterator<Item = Declared>) {
         self.declared.extend(declared);
     }
 
     /// Puts a command on a key from which the medium takes it.
-    pub(crate) fn put_command(&self, key: &str, command: &Command) -> Result<(), RuleFailure> {
+    pub fn put_command(&self, key: &str, command: &Command) -> Result<(), RuleFailure> {
         self.bus.put(key, encode(command))?;
         Ok(())
     }
 
     /// Deletes the keys of the clock and of a robot's news, as a tool may do.
-    pub(crate) fn delete(&self, robot: &RobotName) -> Result<(), RuleFailure> {
+    pub fn delete(&self, robot: &RobotName) -> Result<(), RuleFailure> {
         for key in [self.keys.clock(), self.keys.news(robot)] {
             self.bus.delete(&key)?;
         }
@@ -119,7 +123,7 @@ impl Wire {
     }
 
     /// Watches what a robot may not put: the states of these others, whom the kit plays.
-    pub(crate) fn guard<'n>(
+    pub fn guard<'n>(
         &mut self,
         others: impl IntoIterator<Item = &'n RobotName>,
     ) -> Result<(), BusError> {
@@ -132,12 +136,12 @@ impl Wire {
     }
 
     /// The next that arrives.
-    pub(crate) fn receive(&self, patience: Duration) -> Option<WireEvent> {
+    pub fn receive(&self, patience: Duration) -> Option<WireEvent> {
         self.events.recv_timeout(patience).ok()
     }
 
     /// Subscribes to the state that a robot puts.
-    pub(crate) fn follow(&mut self, robot: &RobotName) -> Result<(), BusError> {
+    pub fn follow(&mut self, robot: &RobotName) -> Result<(), BusError> {
         let sender = self.queue.clone();
         let key = self.keys.query(robot, STATE);
         let states = self.bus.subscribe_with_qos(&key, move |_, bytes, qos| {
@@ -151,17 +155,17 @@ impl Wire {
     }
 
     /// Puts a clock, or something else on the key of clocks.
-    pub(crate) fn put_clock(&self, bytes: Vec<u8>) -> Result<(), RuleFailure> {
+    pub fn put_clock(&self, bytes: Vec<u8>) -> Result<(), RuleFailure> {
         Ok(self.clock.put(bytes)?)
     }
 
     /// Puts news for a robot, or something else on the key of its news.
-    pub(crate) fn put_news(&self, robot: &RobotName, bytes: Vec<u8>) -> Result<(), RuleFailure> {
+    pub fn put_news(&self, robot: &RobotName, bytes: Vec<u8>) -> Result<(), RuleFailure> {
         Ok(self.bus.put(&self.keys.news(robot), bytes)?)
     }
 
     /// Undeclares the simulator's liveliness token, or declares it again.
-    pub(crate) fn show_simulator(&mut self, is_present: bool) -> Result<(), RuleFailure> {
+    pub fn show_simulator(&mut self, is_present: bool) -> Result<(), RuleFailure> {
         self.simulator = None;
         if is_present {
             self.simulator = Some(self.bus.token(&self.keys.alive_sim())?);
@@ -171,7 +175,7 @@ impl Wire {
 
     /// Queries a robot; `None` if no queryable replies. A query whose time is up is sent again: a robot that has the key
     /// and a loaded machine may be late, and a key without a queryable is known at once.
-    pub(crate) fn ask(&self, key: &str, parameters: &str) -> Result<Option<Reply>, RuleFailure> {
+    pub fn ask(&self, key: &str, parameters: &str) -> Result<Option<Reply>, RuleFailure> {
         for _ in 0..ATTEMPTS {
             let begun = Instant::now();
             let reply = self.bus.get(key, parameters, None)?;
@@ -183,11 +187,7 @@ impl Wire {
     }
 
     /// Queries a key without waiting. The reply arrives as an event with the number that this returns.
-    pub(crate) fn begin_query(
-        &mut self,
-        key: &str,
-        parameters: &str,
-    ) -> Result<usize, RuleFailure> {
+    pub fn begin_query(&mut self, key: &str, parameters: &str) -> Result<usize, RuleFailure> {
         let number = self.queries;
         self.queries += 1;
         let sender = self.queue.clone();

@@ -6,7 +6,7 @@ use protocol::messages::{Correction, Point, Pose, Report, Velocity, Welcome};
 use protocol::{Tick, published_angle};
 
 /// Every so many ticks the same happens to a body again.
-pub(crate) const ROUND: Tick = 16;
+pub const ROUND: Tick = 16;
 /// In a round: it is placed elsewhere, and its move is refused.
 const PLACED: Tick = 5;
 const REFUSED: Tick = 9;
@@ -15,9 +15,11 @@ const SHIFT: (f64, f64) = (0.25, 0.125);
 
 /// Where the robot stands, and where it wants to be.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct RobotBody {
-    pub(crate) stands: Point,
-    pub(crate) proposal: Point,
+pub struct RobotBody {
+    /// Where it stands, meters.
+    pub stands: Point,
+    /// Where it wants to be in the next tick, meters.
+    pub proposal: Point,
     /// Of a robot that drives.
     heading_rad: f64,
     velocity: Velocity,
@@ -25,7 +27,7 @@ pub(crate) struct RobotBody {
 
 impl RobotBody {
     /// A body that stands and stays.
-    pub(crate) fn at(location: Point, heading_rad: f64) -> Self {
+    pub fn at(location: Point, heading_rad: f64) -> Self {
         Self {
             stands: location,
             proposal: location,
@@ -35,7 +37,7 @@ impl RobotBody {
     }
 
     /// A correction that says where it stands anyway.
-    pub(crate) fn confirmed(&self) -> Correction {
+    pub fn confirmed(&self) -> Correction {
         Correction {
             location: self.stands,
             blocked: false,
@@ -44,7 +46,7 @@ impl RobotBody {
 
     /// Where the robot wants to be, by its report. One that drives moves straight along its heading, and then turns: how exactly it
     /// moves is the simulator's affair.
-    pub(crate) fn propose(&mut self, report: &Report, welcome: &Welcome) {
+    pub fn propose(&mut self, report: &Report, welcome: &Welcome) {
         let Some(limits) = welcome.drive else {
             self.proposal = report.proposal;
             return;
@@ -64,7 +66,7 @@ impl RobotBody {
     }
 
     /// Its pose.
-    pub(crate) fn pose(&self) -> Pose {
+    pub fn pose(&self) -> Pose {
         Pose {
             location: self.stands,
             heading_rad: self.heading_rad,
@@ -73,7 +75,7 @@ impl RobotBody {
     }
 
     /// Its move into a tick, and the correction if it does not stand where it proposed.
-    pub(crate) fn advance(&mut self, tick: Tick, welcome: &Welcome) -> Option<Correction> {
+    pub fn advance(&mut self, tick: Tick, welcome: &Welcome) -> Option<Correction> {
         if tick % ROUND == PLACED {
             let mut placed = self.shifted(1.0);
             if !is_free(placed, welcome) {

@@ -94,10 +94,7 @@ impl Default for CheckSetting {
 
 impl CheckSetting {
     /// The roster for a robot that asks to be `name`, or why it is not of the roster.
-    pub(crate) fn cast_for(
-        &self,
-        name: &RobotName,
-    ) -> Result<BTreeMap<RobotName, RosterRobot>, String> {
+    pub fn cast_for(&self, name: &RobotName) -> Result<BTreeMap<RobotName, RosterRobot>, String> {
         if let Some(wanted) = self.name.as_ref().filter(|wanted| *wanted != name) {
             return Err(format!(
                 "the robot asks to be {name}, and {wanted} is checked"
@@ -120,7 +117,7 @@ impl CheckSetting {
     }
 
     /// A roster with at least two robots beside the one that is checked: those of `roster`, and others that stand still.
-    pub(crate) fn with_others(
+    pub fn with_others(
         &self,
         roster: &BTreeMap<RobotName, RosterRobot>,
     ) -> BTreeMap<RobotName, RosterRobot> {

@@ -12,11 +12,13 @@ const SHOWN: usize = 200;
 
 /// Where two plays differ: what the first has, and what the second has, in words.
 #[derive(Debug)]
-pub(crate) struct PlayDifference {
+pub struct PlayDifference {
     /// The first tick that differs; none where one play ended before the other.
-    pub(crate) tick: Option<Tick>,
-    pub(crate) first: String,
-    pub(crate) second: String,
+    pub tick: Option<Tick>,
+    /// What the first has.
+    pub first: String,
+    /// What the second has.
+    pub second: String,
 }
 
 /// What a robot did in a tick: its report, and its commands with their targets.
@@ -35,7 +37,7 @@ fn outcome(entry: &PlayedTick) -> Value {
 }
 
 /// The first difference between the reports and commands of two plays. Their epochs may differ.
-pub(crate) fn difference(one: &Transcript, two: &Transcript) -> Option<PlayDifference> {
+pub fn difference(one: &Transcript, two: &Transcript) -> Option<PlayDifference> {
     for (one, two) in one.iter().zip(two) {
         let first = outcome(one);
         let second = outcome(two);
@@ -77,13 +79,13 @@ fn shown(value: &Value, field: &str, tick: Tick) -> String {
 }
 
 /// Whether two plays gave the same reports and commands.
-pub(crate) fn is_same(one: &Transcript, two: &Transcript) -> bool {
+pub fn is_same(one: &Transcript, two: &Transcript) -> bool {
     difference(one, two).is_none()
 }
 
 /// Demands that what happened made no difference. A robot that does not even repeat itself fails by its own rule, and by
 /// no other.
-pub(crate) fn demand_same(
+pub fn demand_same(
     kit: &Kit,
     what: &str,
     usual: &Transcript,

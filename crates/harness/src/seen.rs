@@ -11,82 +11,90 @@ use protocol::{Tick, decode};
 use crate::reading::{self, Reading};
 
 /// A report that came.
-pub(crate) struct ReceivedReport {
-    pub(crate) reading: Reading,
-    pub(crate) bytes: Vec<u8>,
-    pub(crate) at: Instant,
+pub struct ReceivedReport {
+    /// The report, and what is noticed about its numbers.
+    pub reading: Reading,
+    /// The message as it came.
+    pub bytes: Vec<u8>,
+    /// When it came, wall clock.
+    pub at: Instant,
     /// Its place among all that came.
-    pub(crate) order: usize,
+    pub order: usize,
 }
 
 /// A command of the robot that came.
 #[derive(Debug, Clone)]
-pub(crate) struct ReportedCommand {
-    pub(crate) to: String,
+pub struct ReportedCommand {
+    /// Its target.
+    pub to: String,
     /// The sender that its key names.
-    pub(crate) from: String,
-    pub(crate) command: Result<Command, String>,
-    pub(crate) bytes: Vec<u8>,
+    pub from: String,
+    /// The command, or why it cannot be read.
+    pub command: Result<Command, String>,
+    /// The message as it came.
+    pub bytes: Vec<u8>,
     /// Its place among all that came.
-    pub(crate) order: usize,
+    pub order: usize,
 }
 
 impl ReportedCommand {
     /// Its number in its tick, if it can be read.
-    pub(crate) fn number(&self) -> Option<u32> {
+    pub fn number(&self) -> Option<u32> {
         self.command.as_ref().ok().map(|command| command.number)
     }
 
     /// The tick that it is of, if it can be read.
-    pub(crate) fn tick(&self) -> Option<Tick> {
+    pub fn tick(&self) -> Option<Tick> {
         self.command.as_ref().ok().map(|command| command.tick)
     }
 }
 
 /// All that came from the robot so far.
 #[derive(Default)]
-pub(crate) struct Seen {
-    pub(crate) answers: Vec<ReceivedReport>,
+pub struct Seen {
+    /// Reports.
+    pub answers: Vec<ReceivedReport>,
     /// Reports that cannot be read, and why.
-    pub(crate) unreadable: Vec<String>,
-    pub(crate) commands: Vec<ReportedCommand>,
+    pub unreadable: Vec<String>,
+    /// Commands.
+    pub commands: Vec<ReportedCommand>,
     /// Integers of commands that are written with a fraction.
-    pub(crate) not_integers: Vec<String>,
+    pub not_integers: Vec<String>,
     /// States that it put, with their place among all that came.
-    pub(crate) states: Vec<(usize, Result<PublicState, String>)>,
+    pub states: Vec<(usize, Result<PublicState, String>)>,
     /// Requests to join.
-    pub(crate) requests: Vec<Result<JoinRequest, String>>,
+    pub requests: Vec<Result<JoinRequest, String>>,
     /// How often a token was undeclared.
-    pub(crate) tokens_lost: usize,
+    pub tokens_lost: usize,
     /// Replies to the kit's queries, by their numbers, with their place among all that came.
-    pub(crate) replies: BTreeMap<usize, (usize, Option<Reply>)>,
+    pub replies: BTreeMap<usize, (usize, Option<Reply>)>,
     /// Messages that were put in a way that may lose or reorder them.
-    pub(crate) wrong_qos: Vec<String>,
+    pub wrong_qos: Vec<String>,
     /// Keys of others on which it put something.
-    pub(crate) foreign: Vec<String>,
+    pub foreign: Vec<String>,
     /// What it put on `waiting`.
-    pub(crate) waiting: Vec<Waiting>,
+    pub waiting: Vec<Waiting>,
     /// How many messages, tokens and replies came: the place of the next one.
-    pub(crate) count: usize,
+    pub count: usize,
     /// Robots whose liveliness tokens are declared.
     present: BTreeSet<String>,
 }
 
 impl Seen {
     /// The place of what came just now.
-    pub(crate) fn next_order(&mut self) -> usize {
+    pub fn next_order(&mut self) -> usize {
         let order = self.count;
         self.count += 1;
         order
     }
 
     /// Whether a robot's token is declared.
-    pub(crate) fn is_present(&self, robot: &str) -> bool {
+    pub fn is_present(&self, robot: &str) -> bool {
         self.present.contains(robot)
     }
 
     /// Files that a token was declared or undeclared.
-    pub(crate) fn file_token(&mut self, robot: &str, is_present: bool) {
+    pub fn file_token(&mut self, robot: &str, is_present: bool) {
         if is_present {
             self.present.insert(robot.to_owned());
         } else {
@@ -96,7 +104,7 @@ impl Seen {
     }
 
     /// Files a report, and returns its place in [`Seen::answers`]; `None` if it cannot be read.
-    pub(crate) fn file_report(
+    pub fn file_report(
         &mut self,
         key: &str,
         bytes: Vec<u8>,
@@ -123,12 +131,7 @@ impl Seen {
     }
 
     /// Files a command of the robot.
-    pub(crate) fn file_command(
-        &mut self,
-        key: &str,
-        bytes: Vec<u8>,
-        order: usize,
-    ) -> ReportedCommand {
+    pub fn file_command(&mut self, key: &str, bytes: Vec<u8>, order: usize) -> ReportedCommand {
         let robot = Keys::robot_of(key).unwrap_or_default();
         let sender = Keys::command_sender(key).unwrap_or(robot).to_owned();
         let command = match reading::read_command(key, &sender, &bytes) {
@@ -156,13 +159,13 @@ impl Seen {
     }
 
     /// Files a state that the robot put.
-    pub(crate) fn file_state(&mut self, bytes: &[u8], order: usize) {
+    pub fn file_state(&mut self, bytes: &[u8], order: usize) {
         let state = decode(STATE, "the robot", bytes).map_err(|error| error.to_string());
         self.states.push((order, state));
     }
 
     /// Notes a message that was put in another way than ticks need.
-    pub(crate) fn note_qos(&mut self, what: &str, qos: Qos) {
+    pub fn note_qos(&mut self, what: &str, qos: Qos) {
         if qos == Qos::IN_ORDER {
             return;
         }
