@@ -8,16 +8,16 @@ use nix::unistd::Pid;
 
 /// The processes of a group.
 #[derive(Debug, Clone, Copy)]
-pub struct ProcessGroup(pub Pid);
+pub(crate) struct ProcessGroup(pub(crate) Pid);
 
 impl ProcessGroup {
     /// Whether no thread of the group runs or waits for a processor. Where the system does not show it, the group is taken to rest.
-    pub fn is_idle(self) -> bool {
+    pub(crate) fn is_idle(self) -> bool {
         self.all_threads(|state| state != "R")
     }
 
     /// Whether all threads of the group are stopped, or have ended. Where the system does not show it, they are taken to be.
-    pub fn is_stopped(self) -> bool {
+    pub(crate) fn is_stopped(self) -> bool {
         self.all_threads(|state| ["T", "Z", "X"].contains(&state))
     }
 
@@ -34,7 +34,7 @@ impl ProcessGroup {
     }
 
     /// How long the group's threads have waited for a processor so far, together. Threads that have ended do not count.
-    pub fn starved(self) -> Duration {
+    pub(crate) fn starved(self) -> Duration {
         let mut starved = Duration::ZERO;
         self.each_thread(|thread| {
             // proc(5): time on a processor, time waiting for one, number of time slices; nanoseconds.

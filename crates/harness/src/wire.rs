@@ -16,7 +16,7 @@ const QUEUE: usize = 65_536;
 const ATTEMPTS: usize = 4;
 
 /// All that a robot can put or ask.
-pub enum WireEvent {
+pub(crate) enum WireEvent {
     Join(Query),
     Report {
         key: String,
@@ -72,7 +72,7 @@ impl Joining {
 }
 
 /// The declarations of one run, and the queue of what arrives.
-pub struct Wire {
+pub(crate) struct Wire {
     bus: Bus,
     keys: Keys,
     queue: SyncSender<WireEvent>,
@@ -85,7 +85,7 @@ pub struct Wire {
 
 impl Wire {
     /// Declares all that a simulator declares, its token last.
-    pub fn open(bus: &Bus, keys: &Keys) -> Result<Self, BusError> {
+    pub(crate) fn open(bus: &Bus, keys: &Keys) -> Result<Self, BusError> {
         let (queue, events) = std::sync::mpsc::sync_channel(QUEUE);
         let declared = listen(bus, keys, &queue)?;
         let clock = bus.publisher(&keys.clock())?;
@@ -104,18 +104,18 @@ impl Wire {
     }
 
     /// Keeps further declarations until the run is over.
-    pub fn keep(&mut self, declared: impl IntoIterator<Item = Declared>) {
+    pub(crate) fn keep(&mut self, declared: impl IntoIterator<Item = Declared>) {
         self.declared.extend(declared);
     }
 
     /// Puts a command on a key from which the medium takes it.
-    pub fn put_command(&self, key: &str, command: &Command) -> Result<(), RuleFailure> {
+    pub(crate) fn put_command(&self, key: &str, command: &Command) -> Result<(), RuleFailure> {
         self.bus.put(key, encode(command))?;
         Ok(())
     }
 
     /// Deletes the keys of the clock and of a robot's news, as a tool may do.
-    pub fn delete(&self, robot: &RobotName) -> Result<(), RuleFailure> {
+    pub(crate) fn delete(&self, robot: &RobotName) -> Result<(), RuleFailure> {
         for key in [self.keys.clock(), self.keys.news(robot)] {
             self.bus.delete(&key)?;
         }
@@ -123,7 +123,7 @@ impl Wire {
     }
 
     /// Watches what a robot may not put: the states of these others, whom the kit plays.
-    pub fn guard<'n>(
+    pub(crate) fn guard<'n>(
         &mut self,
         others: impl IntoIterator<Item = &'n RobotName>,
     ) -> Result<(), BusError> {
@@ -136,12 +136,12 @@ impl Wire {
     }
 
     /// The next that arrives.
-    pub fn receive(&self, patience: Duration) -> Option<WireEvent> {
+    pub(crate) fn receive(&self, patience: Duration) -> Option<WireEvent> {
         self.events.recv_timeout(patience).ok()
     }
 
     /// Subscribes to the state that a robot puts.
-    pub fn follow(&mut self, robot: &RobotName) -> Result<(), BusError> {
+    pub(crate) fn follow(&mut self, robot: &RobotName) -> Result<(), BusError> {
         let sender = self.queue.clone();
         let key = self.keys.query(robot, STATE);
         let states = self.bus.subscribe_with_qos(&key, move |_, bytes, qos| {
@@ -155,17 +155,17 @@ impl Wire {
     }
 
     /// Puts a clock, or something else on the key of clocks.
-    pub fn put_clock(&self, bytes: Vec<u8>) -> Result<(), RuleFailure> {
+    pub(crate) fn put_clock(&self, bytes: Vec<u8>) -> Result<(), RuleFailure> {
         Ok(self.clock.put(bytes)?)
     }
 
     /// Puts news for a robot, or something else on the key of its news.
-    pub fn put_news(&self, robot: &RobotName, bytes: Vec<u8>) -> Result<(), RuleFailure> {
+    pub(crate) fn put_news(&self, robot: &RobotName, bytes: Vec<u8>) -> Result<(), RuleFailure> {
         Ok(self.bus.put(&self.keys.news(robot), bytes)?)
     }
 
     /// Undeclares the simulator's liveliness token, or declares it again.
-    pub fn show_simulator(&mut self, is_present: bool) -> Result<(), RuleFailure> {
+    pub(crate) fn show_simulator(&mut self, is_present: bool) -> Result<(), RuleFailure> {
         self.simulator = None;
         if is_present {
             self.simulator = Some(self.bus.token(&self.keys.alive_sim())?);
@@ -175,7 +175,7 @@ impl Wire {
 
     /// Queries a robot; `None` if no queryable replies. A query whose time is up is sent again: a robot that has the key
     /// and a loaded machine may be late, and a key without a queryable is known at once.
-    pub fn ask(&self, key: &str, parameters: &str) -> Result<Option<Reply>, RuleFailure> {
+    pub(crate) fn ask(&self, key: &str, parameters: &str) -> Result<Option<Reply>, RuleFailure> {
         for _ in 0..ATTEMPTS {
             let begun = Instant::now();
             let reply = self.bus.get(key, parameters, None)?;
@@ -187,7 +187,11 @@ impl Wire {
     }
 
     /// Queries a key without waiting. The reply arrives as an event with the number that this returns.
-    pub fn begin_query(&mut self, key: &str, parameters: &str) -> Result<usize, RuleFailure> {
+    pub(crate) fn begin_query(
+        &mut self,
+        key: &str,
+        parameters: &str,
+    ) -> Result<usize, RuleFailure> {
         let number = self.queries;
         self.queries += 1;
         let sender = self.queue.clone();
