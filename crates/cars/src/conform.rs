@@ -2,10 +2,12 @@
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
+use std::time::Duration;
 
 use clap::Args;
 use config::Changes;
 use conform::{CheckReport, CheckSetting, PlayedLayer, ProtocolRule, RosterRobot};
+use indicatif::{ProgressBar, ProgressStyle};
 use protocol::messages::KnownSite;
 use protocol::{RobotName, Tick};
 use scenario::Scenario;
@@ -13,6 +15,10 @@ use terminal::OutputError;
 
 use crate::errors::{Result, refusal, render};
 use crate::named;
+use crate::why::INTERRUPTED;
+
+/// How often the spinner turns.
+const SPIN: Duration = Duration::from_millis(100);
 
 /// `cars conform`.
 ///
@@ -90,7 +96,20 @@ fn check(args: &ConformArgs) -> Result<CheckReport> {
     let mut command = Command::new(program);
     command.args(arguments);
 
-    conform::check(&command, &setting, &args.rules).map_err(|error| refusal!("{program}: {error}"))
+    // Each robot is in a group of its own, which no signal of a terminal reaches.
+    ctrlc::set_handler(|| {
+        conform::kill_all();
+        std::process::exit(INTERRUPTED);
+    })?;
+    let style = ProgressStyle::with_template("{spinner} {msg}, {elapsed}")?;
+    let bar = ProgressBar::new_spinner().with_style(style);
+    bar.set_message("the usual ticks");
+    bar.enable_steady_tick(SPIN);
+    let progress = |done, of| bar.set_message(format!("{done} of {of} checks"));
+
+    let report = conform::check(&command, &setting, &args.rules, &progress);
+    bar.finish_and_clear();
+    report.map_err(|error| refusal!("{program}: {error}"))
 }
 
 /// The setting of the checks: the default one, with what the command line and its scenario change.

@@ -20,7 +20,7 @@ use crate::errors::{Result, refusal};
 /// Most jumps and causes that are printed.
 const MAX_ROWS: usize = 20;
 /// The exit status after a second Ctrl-C, as shells have it.
-const INTERRUPTED: i32 = 130;
+pub(crate) const INTERRUPTED: i32 = 130;
 /// Set by Ctrl-C: what was played is kept.
 static STOP: AtomicBool = AtomicBool::new(false);
 

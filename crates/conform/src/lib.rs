@@ -21,6 +21,7 @@ mod checks;
 pub use checks::check;
 pub use harness::flushing::unflushed;
 pub use harness::kit::CannotRun;
+pub use harness::process::kill_all;
 pub use harness::report::{
     AnswerTimes, CheckReport, KitPart, PlayedRun, RuleFailure, RuleOutcome, RuleVerdict,
 };

@@ -1,9 +1,11 @@
 //! The robot's process: started in a group of its own, watched, and never left behind.
 
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::os::unix::fs::FileExt;
 use std::os::unix::process::CommandExt;
 use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use nix::sys::signal::{Signal, killpg};
@@ -36,6 +38,20 @@ pub fn copy(command: &Command) -> Command {
     own
 }
 
+/// The groups of all robots that run.
+static GROUPS: Mutex<BTreeSet<Pid>> = Mutex::new(BTreeSet::new());
+
+/// Kills all robots, before this process ends by a signal. No further one is started.
+pub fn kill_all() {
+    let groups = GROUPS.lock().unwrap_or_else(PoisonError::into_inner);
+    for group in groups.iter() {
+        // One that has ended needs none.
+        let _ended = killpg(*group, Signal::SIGKILL);
+    }
+    // Whoever starts a robot at this moment waits for the lock until the process ends.
+    std::mem::forget(groups);
+}
+
 /// A robot's process, with all that it started.
 pub struct RobotProcess {
     child: Child,
@@ -57,11 +73,14 @@ impl RobotProcess {
             .stdout(output.try_clone()?)
             .stderr(errors.try_clone()?);
 
+        let mut groups = GROUPS.lock().unwrap_or_else(PoisonError::into_inner);
         let child = own.process_group(0).spawn()?;
         let id = i32::try_from(child.id()).map_err(std::io::Error::other)?;
+        let group = Pid::from_raw(id);
+        groups.insert(group);
         Ok(Self {
             child,
-            group: ProcessGroup(Pid::from_raw(id)),
+            group: ProcessGroup(group),
             output,
             errors,
             ended: None,
@@ -160,6 +179,10 @@ fn last_bytes(file: &File) -> std::io::Result<Vec<u8>> {
 impl Drop for RobotProcess {
     fn drop(&mut self) {
         self.signal(Signal::SIGKILL);
+        // Before its number is free for another process.
+        let mut groups = GROUPS.lock().unwrap_or_else(PoisonError::into_inner);
+        groups.remove(&self.group.0);
+        drop(groups);
         // Only our own child can be waited for; what it started ends with the group.
         let _ = self.child.wait();
     }

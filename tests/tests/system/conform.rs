@@ -8,7 +8,9 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::process::Command;
 
-use conform::{CheckSetting, PAGE, ProtocolRule, RULES};
+use conform::{CheckSetting, PAGE, ProtocolRule, RULES, RosterRobot};
+use protocol::RobotName;
+use protocol::messages::Point;
 use system_tests::tools::has_python;
 use system_tests::{Lab, objections, programs, root, side_by_side};
 
@@ -97,12 +99,27 @@ fn wrong(rule: &str) -> Command {
 }
 
 fn setting() -> CheckSetting {
+    let role = |x, y, parameters| RosterRobot {
+        location: Point::new(x, y),
+        parameters,
+        ..RosterRobot::default()
+    };
+    let parameters = [("step_m".to_owned(), 0.2.into())];
     CheckSetting {
         ticks: 40,
+        fake_peers: [
+            (robot_name("Walker"), role(5.0, 5.0, parameters.into())),
+            (robot_name("Echo"), role(7.0, 6.0, [].into())),
+        ]
+        .into(),
         // One sends the robot to sleep, and the other one wakes it.
         commands: vec!["rest".to_owned(), "fly".to_owned()],
         ..CheckSetting::default()
     }
+}
+
+fn robot_name(name: &str) -> RobotName {
+    RobotName::new(name).unwrap()
 }
 
 /// All rules are checked: there is occasion to every one of them.
@@ -144,7 +161,7 @@ fn the_robots_of_the_project_conform_with_default_parameters() {
 }
 
 /// Further ways to break a rule, after the one that is named like the rule.
-const OTHERWISE: [&str; 111] = [
+const OTHERWISE: [&str; 116] = [
     "command.twice:hundred",
     "command.payload:ascii",
     "return.generation:placed",
@@ -256,6 +273,11 @@ const OTHERWISE: [&str; 111] = [
     "clock.duplicate:panels",
     "news.wait:epoch",
     "determinism.seed:32-bits",
+    "determinism.seed:second-stream",
+    "epoch.init:parameters",
+    "return.generation:first-command",
+    "command.order:many",
+    "query.asking:first",
 ];
 
 /// Further ways that are about how a message is written or put.
@@ -290,7 +312,7 @@ fn rule_of(how: &str) -> &str {
 /// What is wrong with the verdict on a robot that breaks a rule in this way: it must fail by that rule alone.
 fn misjudged(how: &str, rules: &[ProtocolRule]) -> Option<String> {
     let name = rule_of(how);
-    let report = match conform::check(&wrong(how), &setting(), rules) {
+    let report = match conform::check(&wrong(how), &setting(), rules, &|_, _| ()) {
         Ok(report) => report,
         Err(error) => return Some(format!("{how}: {error}")),
     };

@@ -137,7 +137,8 @@ pub(super) fn order(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailur
         }
         // Both ways: a robot that sorts its commands would be right in one of them.
         if votes.right > 0 && back.right > 0 {
-            return order_of_senders(kit, &one, &two);
+            order_of_senders(kit, &one, &two)?;
+            return last_of_many(kit, &one, &two);
         }
     }
 
@@ -180,6 +181,27 @@ fn order_of_senders(kit: &Kit, one: &str, two: &str) -> Result<(), RuleFailure> 
             return Err(RuleFailure::new(
                 format!("news that list {listed} have their effect in this order"),
                 "the effect of the other order",
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// The last one of many commands in the news of a tick is executed, if it is where it is the last one of two.
+fn last_of_many(kit: &Kit, one: &str, two: &str) -> Result<(), RuleFailure> {
+    for [one, two] in [[one, two], [two, one]] {
+        let has_effect = |count: usize| {
+            let mut commands = vec![(one, LAST); count];
+            let without = commanded(kit, &commands)?;
+            commands.push((two, LAST));
+            commanded(kit, &commands).map(|with| !is_same(&with, &without))
+        };
+        if has_effect(1)? && !has_effect(MANY)? {
+            return Err(RuleFailure::new(
+                format!(
+                    "news that list {MANY} times {one:?} and then {two:?} have the effect of both"
+                ),
+                format!("that of {one:?} alone"),
             ));
         }
     }

@@ -2,10 +2,11 @@
 
 use std::time::Duration;
 
-use protocol::messages::{Clock, JoinRequest, Point, StreamReseed, TickUpdate};
+use protocol::messages::{Clock, JoinRequest, Point, StreamReseed, TickUpdate, Welcome};
 use protocol::{Epoch, Tick};
+use serde_json::Value;
 
-use super::waiting;
+use super::{returns, waiting};
 use harness::Joining;
 use harness::comparison::{PlayDifference, demand_same, difference};
 use harness::findings::Findings;
@@ -34,6 +35,8 @@ const RESEEDED_AGAIN: Tick = 8;
 const FAR: Tick = 300;
 /// How far from its place in one epoch a robot is placed in a further one.
 const MOVED_M: f64 = 0.25;
+/// By how much its parameters differ between epochs.
+const SHRUNK: f64 = 0.875;
 
 /// Another process, the same seed: the same reports.
 pub(super) fn same_seed(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
@@ -110,6 +113,9 @@ pub(super) fn streams(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFail
     }
     if are_all_different(&by_seed) {
         demand_reseeded(&mut harness, findings, seed, &stream)?;
+    }
+    if are_all_different(&by_stream) {
+        returns::demand_streams(kit, findings)?;
     }
     Ok(())
 }
@@ -256,6 +262,59 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         usual(kit)?,
         &again,
     )
+}
+
+/// A further epoch with another welcome: it goes through it as a process that has no other one. What differs is what differs between
+/// the epochs of a run, and the robot's own parameters, if it can work with others.
+pub(super) fn other_welcome(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
+    let busy = PlayScript {
+        ticks: BUSY,
+        ..PlayScript::usual(kit)
+    };
+    let anew = |has_parameters| {
+        let mut harness = Harness::open_run(kit, HarnessOptions::default())?;
+        harness.prepare()?;
+        differ(&mut harness.template, has_parameters);
+        harness.admit_first()?;
+        play(&mut harness, &busy, &mut Straight)
+    };
+    let (expected, has_parameters) = match anew(true) {
+        Ok(expected) => (expected, true),
+        // It refuses such parameters, as it may.
+        Err(_) => (anew(false)?, false),
+    };
+
+    let mut harness = with_robot(kit, HarnessOptions::default())?;
+    play(&mut harness, &busy, &mut Straight)?;
+    differ(&mut harness.template, has_parameters);
+    harness.begin_epoch(2);
+    let played = play(&mut harness, &busy, &mut Straight)?;
+    let what = "to be welcomed in another way in the epoch before";
+    demand_same(kit, what, &expected, &played)
+}
+
+/// Another seed, stream and place, and other numbers among the parameters.
+fn differ(welcome: &mut Welcome, has_parameters: bool) {
+    welcome.seed += 1;
+    welcome.stream.push_str("#other");
+    welcome.location.x += MOVED_M;
+    if has_parameters {
+        welcome.parameters.values_mut().for_each(shrink);
+    }
+}
+
+/// Makes all numbers with a fraction smaller; whole ones may be counts.
+fn shrink(value: &mut Value) {
+    match value {
+        Value::Array(values) => values.iter_mut().for_each(shrink),
+        Value::Object(fields) => fields.values_mut().for_each(shrink),
+        Value::Number(number) => {
+            if let Some(float) = number.as_f64().filter(|_| number.is_f64()) {
+                *value = (float * SHRUNK).into();
+            }
+        }
+        _ => {}
+    }
 }
 
 /// An epoch begins while it waits for its news, or for another robot's answer: nothing else would ever end that wait.

@@ -43,7 +43,7 @@ const fn rules(
 }
 
 /// Checks that need nothing but the usual ticks before; those that take longest begin.
-const CHECKS: [Check; 39] = [
+const CHECKS: [Check; 41] = [
     rules(&["join.refused"], joining::refused),
     rules(&["end.gone"], ends::gone_for_a_while),
     rules(&["end.gone"], ends::gone_forever),
@@ -60,9 +60,11 @@ const CHECKS: [Check; 39] = [
     rules(&["end.clock"], ends::clock),
     rules(&["news.wait"], news::wait),
     rules(&["epoch.init"], epochs::init),
+    rules(&["epoch.init"], epochs::other_welcome),
     rules(&["epoch.init"], epochs::while_waiting),
     rules(&["epoch.late"], epochs::late),
     rules(&["return.generation"], returns::generation),
+    rules(&["return.generation"], returns::first_command),
     rules(&["return.rejoin"], returns::rejoin),
     rules(&["join.ready-last"], joining::ready_last),
     rules(
@@ -112,7 +114,7 @@ const PRESUMED: [(&str, &str); 9] = [
 /// Processes of the robot that run at the same time.
 const WORKERS: usize = 4;
 
-/// Checks the robot that `command` starts: all rules, or those in `rules`.
+/// Checks the robot that `command` starts: all rules, or those in `rules`. Tells how many checks are done, and of how many.
 ///
 /// # Errors
 /// [`CannotRun`] if the command cannot be started, or the robot never asks to join.
@@ -120,13 +122,14 @@ pub fn check(
     command: &Command,
     setting: &CheckSetting,
     rules: &[ProtocolRule],
+    progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<CheckReport, CannotRun> {
     let kit = Kit::open(command, setting)?;
     let AllFindings {
         mut verdicts,
         answers,
         in_run,
-    } = all(&kit, rules)?;
+    } = all(&kit, rules, progress)?;
 
     let mut outcomes = Vec::new();
     for rule in rules::rules() {
@@ -164,7 +167,11 @@ struct AllFindings {
 }
 
 /// Takes the robot through all checks that the wanted rules need.
-fn all(kit: &Kit, wanted: &[ProtocolRule]) -> Result<AllFindings, CannotRun> {
+fn all(
+    kit: &Kit,
+    wanted: &[ProtocolRule],
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<AllFindings, CannotRun> {
     let mut findings = Findings::default();
     // First and alone: all other checks compare with these ticks, and a robot that does not get through
     // them shows nothing else.
@@ -199,7 +206,8 @@ fn all(kit: &Kit, wanted: &[ProtocolRule]) -> Result<AllFindings, CannotRun> {
         let run = is_wanted(&run::RULES).then(|| run::check(kit, &mut own));
         (run, own)
     };
-    let next = AtomicUsize::new(0);
+    progress(0, due.len());
+    let [next, done] = [0, 0].map(AtomicUsize::new);
     let all = Mutex::new(findings);
     let work = || {
         while let Some(check) = due.get(next.fetch_add(1, Ordering::Relaxed)) {
@@ -211,6 +219,7 @@ fn all(kit: &Kit, wanted: &[ProtocolRule]) -> Result<AllFindings, CannotRun> {
             all.lock()
                 .unwrap_or_else(PoisonError::into_inner)
                 .merge(own);
+            progress(done.fetch_add(1, Ordering::Relaxed) + 1, due.len());
         }
     };
     let (in_run, found_in_run) = std::thread::scope(|scope| {

@@ -12,7 +12,7 @@ use harness::fake_peers::ReceivedQuery;
 use harness::findings::Findings;
 use harness::kit::Kit;
 use harness::patience::{PATIENCE, in_each_attempt};
-use harness::report::RuleFailure;
+use harness::report::{KitPart, RuleFailure};
 use harness::script::{
     Disturbance, PlayScript, Straight, can_query, demand_usual, play, with_robot,
 };
@@ -463,11 +463,14 @@ pub(super) fn asking(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailu
     let spoken = PlayScript::in_turn(kit, &[kit.sender()], ticks);
     let mut has_asked = false;
     for script in [spoken, PlayScript::quiet(ticks)] {
-        let mut harness = waiting::of_queries(kit)?;
-        let played = play(&mut harness, &script, &mut Straight)?;
-        let asked = harness.fake_peers.asked();
-        has_asked |= !asked.is_empty();
-        demand_allowed(asked, &played)?;
+        // Several others, of which none can be queried in some of the ticks.
+        for part in [KitPart::Alone, KitPart::InRun] {
+            let mut harness = waiting::of_queries_in(kit, part)?;
+            let played = play(&mut harness, &script, &mut Straight)?;
+            let asked = harness.fake_peers.asked();
+            has_asked |= !asked.is_empty();
+            demand_allowed(asked, &played)?;
+        }
     }
 
     if !has_asked {

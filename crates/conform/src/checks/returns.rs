@@ -1,22 +1,25 @@
 //! Incarnations: a process that takes over in the middle of an epoch, and one that has been replaced.
 
+use std::collections::BTreeSet;
 use std::time::Duration;
 
 use protocol::messages::{Clock, Correction, PublicState, TickUpdate};
 use protocol::{Generation, Tick};
 
-use harness::comparison::demand_same;
+use harness::comparison::{demand_same, is_same};
 use harness::findings::Findings;
 use harness::kit::Kit;
 use harness::patience::PATIENCE;
 use harness::report::RuleFailure;
-use harness::script::{PlayScript, Straight, play, step, usual, with_robot};
+use harness::script::{ArrivingCommand, PlayScript, Straight, play, step, usual, with_robot};
 use harness::transcript::PlayedTick;
 use harness::{Harness, HarnessOptions};
 
 /// The last tick of the predecessor.
 const LAST: Tick = 8;
 const GENERATION: Generation = 2;
+/// Streams of a further incarnation, of which a robot cannot know the names.
+const STREAMS: [&str; 3] = ["one", "other", "further"];
 /// No report comes within this time where it is not the robot's turn.
 const QUIET: Duration = Duration::from_millis(300);
 
@@ -36,11 +39,12 @@ fn state_of(entry: &PlayedTick) -> PublicState {
 }
 
 /// A harness on which the robot has joined in the place of incarnations that were gone after these ticks, of which the last one
-/// has reported this.
+/// has reported this. It draws from `stream`, or else from the one that is named after its generation.
 fn returned<'k>(
     kit: &'k Kit,
     last_ticks: &[Tick],
     reported: &[PlayedTick],
+    stream: Option<&str>,
 ) -> Result<Harness<'k>, RuleFailure> {
     let mut harness = Harness::open_run(kit, HarnessOptions::default())?;
     harness.prepare()?;
@@ -50,6 +54,9 @@ fn returned<'k>(
         generation += 1;
     }
     inherit(&mut harness, reported, generation);
+    if let Some(stream) = stream {
+        stream.clone_into(&mut harness.template.stream);
+    }
     harness.admit_first()?;
     Ok(harness)
 }
@@ -74,7 +81,7 @@ pub(super) fn inherit(harness: &mut Harness<'_>, reported: &[PlayedTick], genera
 
 /// It waits for the news that name it, shows meanwhile what its predecessor reported, and reports as what it is.
 pub(super) fn generation(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
-    let mut harness = returned(kit, &[LAST], first_ticks(kit)?)?;
+    let mut harness = returned(kit, &[LAST], first_ticks(kit)?, None)?;
     // The last tick was its predecessor's; the next one may go on without it.
     harness.repeat();
     harness.put_clock(&Clock {
@@ -170,7 +177,7 @@ pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         harness.demand_token_kept("it joins again")?;
 
         // What a new process does in the same place is what it has to do.
-        let mut anew = returned(kit, &last_ticks, &reported)?;
+        let mut anew = returned(kit, &last_ticks, &reported, None)?;
         let anew = play(&mut anew, &PlayScript::quiet(5), &mut Straight)?;
         demand_same(kit, "to join again instead of a new process", &anew, &again)?;
         reported = again;
@@ -181,14 +188,9 @@ pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
 /// The robot misses a tick, its news ask it to join again, and it does, as the process that it is.
 fn join_again(harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
     harness.miss()?;
-    harness.keeps_requests = true;
+    let generation = harness.generation();
     harness.open(&TickUpdate::default())?;
-    let expected = "another request to join when its news have its generation as `rejoin`";
-    let joining = harness
-        .next_join(PATIENCE)
-        .map_err(|failure| RuleFailure::new(expected, failure.came))?;
-    harness.admit(joining);
-    harness.keeps_requests = false;
+    harness.until_rejoined(generation)?;
 
     let mut instances = Vec::new();
     for request in harness.seen.requests.iter().flatten() {
@@ -198,6 +200,67 @@ fn join_again(harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
     if instances.len() > 1 {
         let came = format!("{instances:?}");
         return Err(RuleFailure::new("the same instance in all requests", came));
+    }
+    Ok(())
+}
+
+/// A command in the news that name an incarnation is executed, as one in the news of its further ticks is.
+pub(super) fn first_command(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
+    if kit.is_deterministic.get() == Some(&false) {
+        return Ok(());
+    }
+    let commanded = |text: &str, ticks: &[Tick]| {
+        let mut arrivals = Vec::new();
+        for tick in ticks {
+            arrivals.push(ArrivingCommand::new(&kit.sender(), text, *tick));
+        }
+        let mut harness = returned(kit, &[LAST], first_ticks(kit)?, None)?;
+        play(&mut harness, &PlayScript::with(5, arrivals), &mut Straight)
+    };
+
+    let none = commanded("", &[])?;
+    for text in kit.pairs().iter().flatten() {
+        // Who heeds it in two further ticks does not leave it out because of what it does at that moment.
+        if is_same(&commanded(text, &[LAST + 2])?, &none)
+            || is_same(&commanded(text, &[LAST + 3])?, &none)
+        {
+            continue;
+        }
+        if is_same(&commanded(text, &[LAST + 1])?, &none) {
+            return Err(RuleFailure::new(
+                format!("{text:?} in the news that name its generation is executed"),
+                "it has no effect at all, and has one in the ticks after it",
+            ));
+        }
+        return Ok(());
+    }
+    Ok(())
+}
+
+/// Whether the moves of a third incarnation follow the stream that its welcome names. Of a robot that draws in each tick of an epoch.
+pub(super) fn demand_streams(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
+    let mut straight = with_robot(kit, HarnessOptions::default())?;
+    let reported = play(&mut straight, &PlayScript::quiet(LAST + 2), &mut Straight)?;
+    let mut turns = BTreeSet::new();
+    for stream in STREAMS {
+        let mut harness = returned(kit, &[LAST, LAST + 2], &reported, Some(stream))?;
+        let played = play(&mut harness, &PlayScript::quiet(LAST), &mut Straight)?;
+        let directions = played
+            .iter()
+            .map(|entry| entry.report.direction_rad.to_bits());
+        let directions: Vec<u64> = directions.collect();
+        if directions.windows(2).any(|pair| pair[0] == pair[1]) {
+            return Ok(());
+        }
+        turns.insert(directions);
+    }
+
+    if turns.len() == 1 {
+        let expected = format!(
+            "{} streams of a third incarnation give different moves",
+            STREAMS.len()
+        );
+        findings.fail("determinism.seed", RuleFailure::new(expected, "the same"));
     }
     Ok(())
 }

@@ -7,7 +7,7 @@ use protocol::messages::{Correction, TickUpdate};
 
 use harness::comparison::demand_same;
 use harness::kit::Kit;
-use harness::report::RuleFailure;
+use harness::report::{KitPart, RuleFailure};
 use harness::script::{Disturbance, PlayScript, Straight, play, with_robot};
 use harness::{Harness, HarnessOptions};
 
@@ -18,10 +18,16 @@ const TICKS: Tick = 24;
 
 /// A harness on which the other robots put no states, so that a robot that wants to know them must query.
 pub(super) fn of_queries(kit: &Kit) -> Result<Harness<'_>, RuleFailure> {
+    of_queries_in(kit, KitPart::Alone)
+}
+
+/// The same with the roster of a part of the kit.
+pub(super) fn of_queries_in(kit: &Kit, part: KitPart) -> Result<Harness<'_>, RuleFailure> {
     with_robot(
         kit,
         HarnessOptions {
             puts_states: false,
+            part,
             ..HarnessOptions::default()
         },
     )

@@ -97,6 +97,9 @@ impl Host {
             if self.wrong.is("epoch.init:random") {
                 walker.random = before.random;
             }
+            if self.wrong.is("epoch.init:parameters") {
+                walker.step_m = before.step_m;
+            }
             if self.wrong.is("epoch.init:variables") {
                 walker.received = before.received;
             }
@@ -145,6 +148,13 @@ impl Host {
                 *count += 1;
                 *count
             });
+        }
+        if wrong.is("command.order:many") && deliveries.len() > HUNDRED {
+            // Of many only those that are like the first.
+            deliveries.dedup_by(|next, one| next.command != one.command);
+        }
+        if wrong.is("return.generation:first-command") && news.joined.is_some() {
+            deliveries.clear();
         }
         if wrong.is("command.twice:blocked") && news.correction.is_some_and(|at| at.blocked) {
             deliveries.clear();
@@ -233,8 +243,8 @@ impl Host {
         if tick == SLOW_TICK {
             std::thread::sleep(COMPUTES);
         }
-        let step_x_m = (unit(&mut walker.random) - 0.5) * 0.2;
-        let step_y_m = (unit(&mut walker.random) - 0.5) * 0.2;
+        let step_x_m = (unit(&mut walker.random) - 0.5) * walker.step_m;
+        let step_y_m = (unit(&mut walker.random) - 0.5) * walker.step_m;
         walker.proposal = Point::new(walker.at.x + step_x_m, walker.at.y + step_y_m);
         let angle = unit(&mut walker.random) * 3.0;
         let is_awake = tick > LATE_TICK && !walker.is_asleep;
@@ -330,7 +340,13 @@ impl Host {
         welcome: &Welcome,
         is_awake: bool,
     ) -> Result<Option<Point>, Failure> {
-        let other = welcome.roster.iter().find(|name| **name != self.name);
+        let mut others = welcome.roster.iter().filter(|name| **name != self.name);
+        let heeds_first = self.wrong.is("query.asking:first");
+        let other = if heeds_first {
+            others.next_back()
+        } else {
+            others.next()
+        };
         let Some(other) = other.cloned() else {
             return Ok(None);
         };
@@ -341,7 +357,10 @@ impl Host {
         if news.in_range.is_none() && self.wrong.is("query.asking:listed") {
             return Ok(None);
         }
-        let is_unreachable = !news.can_query(&other);
+        let mut is_unreachable = !news.can_query(&other);
+        if heeds_first && news.in_range.is_none() {
+            is_unreachable = news.unreachable.first() == Some(&other);
+        }
         // The participant does not know of a tick that is run a second time.
         let is_running = self.shared.is_in(Phase::Computing);
         if tick == 0 || !tick.is_multiple_of(2) || !is_running {

@@ -2,14 +2,20 @@
 
 use protocol::messages::{Point, Welcome};
 use protocol::random::{Stream, stream};
+use serde_json::Value;
 
 use crate::wrong::Wrong;
+
+/// Its parameter `step_m` where there is none.
+const STEP_M: f64 = 0.2;
 
 /// Walks at random, counts commands and replies to them, and queries another robot in some ticks.
 pub(crate) struct Walker {
     pub(crate) random: Stream,
     pub(crate) at: Point,
     pub(crate) proposal: Point,
+    /// Side of the square in which a step ends, meters.
+    pub(crate) step_m: f64,
     pub(crate) received: u32,
     pub(crate) sent: u32,
     pub(crate) last: String,
@@ -35,10 +41,18 @@ impl Walker {
             &welcome.stream
         };
 
+        let name = if wrong.is("determinism.seed:second-stream") && welcome.generation > 1 {
+            format!("robot/{}#2", welcome.name)
+        } else {
+            name.to_owned()
+        };
+        let step_m = welcome.parameters.get("step_m").and_then(Value::as_f64);
+
         Self {
-            random: stream(seed, name),
+            random: stream(seed, &name),
             at: welcome.location,
             proposal: welcome.location,
+            step_m: step_m.unwrap_or(STEP_M),
             received: 0,
             sent: 0,
             last: String::new(),
