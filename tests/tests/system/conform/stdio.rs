@@ -126,7 +126,8 @@ fn exec(folder: &Path, (name, in_tick, at_end): Doing) -> Command {
 fn misjudged(doing: Doing, rules: &[ProtocolRule]) -> Option<String> {
     let name = doing.0;
     let lab = tempfile::tempdir().unwrap();
-    let report: CheckReport = match check(&exec(lab.path(), doing), &setting(), rules) {
+    let command = exec(lab.path(), doing);
+    let report: CheckReport = match check(&command, &setting(), rules, &|_, _| ()) {
         Ok(report) => report,
         Err(error) => return Some(format!("{name}: {error}")),
     };
