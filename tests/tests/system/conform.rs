@@ -99,6 +99,16 @@ fn wrong(rule: &str) -> Command {
 }
 
 fn setting() -> CheckSetting {
+    CheckSetting {
+        ticks: 40,
+        // One sends the robot to sleep, and the other one wakes it.
+        commands: vec!["rest".to_owned(), "fly".to_owned()],
+        ..CheckSetting::default()
+    }
+}
+
+/// The same for a robot that has a parameter.
+fn setting_of_walker() -> CheckSetting {
     let role = |x, y, parameters| RosterRobot {
         location: Point::new(x, y),
         parameters,
@@ -106,15 +116,12 @@ fn setting() -> CheckSetting {
     };
     let parameters = [("step_m".to_owned(), 0.2.into())];
     CheckSetting {
-        ticks: 40,
         fake_peers: [
             (robot_name("Walker"), role(5.0, 5.0, parameters.into())),
             (robot_name("Echo"), role(7.0, 6.0, [].into())),
         ]
         .into(),
-        // One sends the robot to sleep, and the other one wakes it.
-        commands: vec!["rest".to_owned(), "fly".to_owned()],
-        ..CheckSetting::default()
+        ..setting()
     }
 }
 
@@ -161,7 +168,7 @@ fn the_robots_of_the_project_conform_with_default_parameters() {
 }
 
 /// Further ways to break a rule, after the one that is named like the rule.
-const OTHERWISE: [&str; 116] = [
+const OTHERWISE: [&str; 117] = [
     "command.twice:hundred",
     "command.payload:ascii",
     "return.generation:placed",
@@ -276,6 +283,7 @@ const OTHERWISE: [&str; 116] = [
     "determinism.seed:second-stream",
     "epoch.init:parameters",
     "return.generation:first-command",
+    "return.generation:deaf",
     "command.order:many",
     "query.asking:first",
 ];
@@ -312,7 +320,7 @@ fn rule_of(how: &str) -> &str {
 /// What is wrong with the verdict on a robot that breaks a rule in this way: it must fail by that rule alone.
 fn misjudged(how: &str, rules: &[ProtocolRule]) -> Option<String> {
     let name = rule_of(how);
-    let report = match conform::check(&wrong(how), &setting(), rules, &|_, _| ()) {
+    let report = match conform::check(&wrong(how), &setting_of_walker(), rules, &|_, _| ()) {
         Ok(report) => report,
         Err(error) => return Some(format!("{how}: {error}")),
     };

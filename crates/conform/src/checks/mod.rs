@@ -64,7 +64,7 @@ const CHECKS: [Check; 41] = [
     rules(&["epoch.init"], epochs::while_waiting),
     rules(&["epoch.late"], epochs::late),
     rules(&["return.generation"], returns::generation),
-    rules(&["return.generation"], returns::first_command),
+    rules(&["return.generation"], returns::commanded),
     rules(&["return.rejoin"], returns::rejoin),
     rules(&["join.ready-last"], joining::ready_last),
     rules(

@@ -11,13 +11,17 @@ use harness::findings::Findings;
 use harness::kit::Kit;
 use harness::patience::PATIENCE;
 use harness::report::RuleFailure;
-use harness::script::{ArrivingCommand, PlayScript, Straight, play, step, usual, with_robot};
+use harness::script::{
+    ArrivingCommand, PlayScript, Straight, play, played, step, usual, with_robot,
+};
 use harness::transcript::PlayedTick;
 use harness::{Harness, HarnessOptions};
 
 /// The last tick of the predecessor.
 const LAST: Tick = 8;
 const GENERATION: Generation = 2;
+/// Ticks that a further incarnation is played.
+const TICKS: Tick = 5;
 /// Streams of a further incarnation, of which a robot cannot know the names.
 const STREAMS: [&str; 3] = ["one", "other", "further"];
 /// No report comes within this time where it is not the robot's turn.
@@ -204,35 +208,42 @@ fn join_again(harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
     Ok(())
 }
 
-/// A command in the news that name an incarnation is executed, as one in the news of its further ticks is.
-pub(super) fn first_command(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
+/// A further incarnation heeds commands as the first one does, from the news on that name it.
+pub(super) fn commanded(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     if kit.is_deterministic.get() == Some(&false) {
         return Ok(());
     }
-    let commanded = |text: &str, ticks: &[Tick]| {
-        let mut arrivals = Vec::new();
-        for tick in ticks {
-            arrivals.push(ArrivingCommand::new(&kit.sender(), text, *tick));
-        }
-        let mut harness = returned(kit, &[LAST], first_ticks(kit)?, None)?;
-        play(&mut harness, &PlayScript::with(5, arrivals), &mut Straight)
+    let reported = played(kit, &PlayScript::quiet(LAST))?;
+    let script = |command: Option<(&str, Tick)>, ticks| {
+        let arrivals = command.map(|(text, tick)| ArrivingCommand::new(&kit.sender(), text, tick));
+        PlayScript::with(ticks, arrivals.into_iter().collect())
+    };
+    let first = |command| played(kit, &script(command, LAST + TICKS));
+    let further = |command| {
+        let mut harness = returned(kit, &[LAST], &reported, None)?;
+        play(&mut harness, &script(command, TICKS), &mut Straight)
     };
 
-    let none = commanded("", &[])?;
+    let ticks = LAST + 1..=LAST + 3;
     for text in kit.pairs().iter().flatten() {
-        // Who heeds it in two further ticks does not leave it out because of what it does at that moment.
-        if is_same(&commanded(text, &[LAST + 2])?, &none)
-            || is_same(&commanded(text, &[LAST + 3])?, &none)
-        {
-            continue;
+        if !is_same(&further(Some((text, LAST + 1)))?, &further(None)?) {
+            return Ok(());
         }
-        if is_same(&commanded(text, &[LAST + 1])?, &none) {
+
+        let silent = first(None)?;
+        let mut heeded = 0;
+        for tick in ticks.clone() {
+            heeded += usize::from(!is_same(&first(Some((text, tick)))?, &silent));
+        }
+        // It does not leave it out because of what it does at that moment.
+        if heeded == ticks.clone().count() {
             return Err(RuleFailure::new(
-                format!("{text:?} in the news that name its generation is executed"),
-                "it has no effect at all, and has one in the ticks after it",
+                format!(
+                    "{text:?} in the news that name its generation is executed as by a first incarnation"
+                ),
+                "it has no effect at all",
             ));
         }
-        return Ok(());
     }
     Ok(())
 }

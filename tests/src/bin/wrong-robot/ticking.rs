@@ -79,6 +79,10 @@ impl Host {
             }
         }
 
+        if turn.begin == Begin::TakeOver && self.wrong.is("return.generation:first-command") {
+            news.commands.clear();
+        }
+
         let (commands, state, report) = self.act(turn.epoch, turn.tick, &news)?;
         self.drive(|machine, out| machine.done(commands, state, report, out))?;
         self.shared.enter(Phase::Idle);
@@ -153,7 +157,7 @@ impl Host {
             // Of many only those that are like the first.
             deliveries.dedup_by(|next, one| next.command != one.command);
         }
-        if wrong.is("return.generation:first-command") && news.joined.is_some() {
+        if wrong.is("return.generation:deaf") && news.joined.is_some() {
             deliveries.clear();
         }
         if wrong.is("command.twice:blocked") && news.correction.is_some_and(|at| at.blocked) {
