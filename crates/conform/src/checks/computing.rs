@@ -43,7 +43,7 @@ struct Pair {
 /// What the plays so far have shown of a tick.
 #[derive(Default)]
 struct PlayedQueries {
-    /// In one of them it replied while the tick lasted, or was done so soon that nobody waits.
+    /// In one of them it replied while the tick lasted, or was done so soon that no query waits.
     replies: bool,
     /// One of them shows nothing.
     is_unknown: bool,

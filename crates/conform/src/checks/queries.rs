@@ -525,7 +525,7 @@ pub(super) fn unreachable(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure
     demand_usual(&mut harness, what, &mut Misplaced)
 }
 
-/// A robot that queries nobody does not do so only because its news list nobody: all are in range where they have no list.
+/// A robot that queries no other one does not do so only because its news list none: all are in range where they have no list.
 fn demand_none_in_range(kit: &Kit) -> Result<(), RuleFailure> {
     struct AllInRange;
     impl Disturbance for AllInRange {
@@ -540,7 +540,7 @@ fn demand_none_in_range(kit: &Kit) -> Result<(), RuleFailure> {
     match harness.fake_peers.asked().first() {
         None => Ok(()),
         Some(query) => Err(RuleFailure::new(
-            "the same queries where news list all others as `in_range` and where they list nobody",
+            "the same queries where news list all others as `in_range` and where they have no list",
             format!(
                 "a query of {} in tick {} where they do, and none where they do not",
                 query.of, query.now.1

@@ -208,7 +208,7 @@ fn join_again(harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
     Ok(())
 }
 
-/// A further incarnation heeds commands as the first one does, from the news on that name it.
+/// A further incarnation executes commands as the first one does, from the news on that name it.
 pub(super) fn commanded(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     if kit.is_deterministic.get() == Some(&false) {
         return Ok(());
@@ -231,12 +231,12 @@ pub(super) fn commanded(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> 
         }
 
         let silent = first(None)?;
-        let mut heeded = 0;
+        let mut executed = 0;
         for tick in ticks.clone() {
-            heeded += usize::from(!is_same(&first(Some((text, tick)))?, &silent));
+            executed += usize::from(!is_same(&first(Some((text, tick)))?, &silent));
         }
         // It does not leave it out because of what it does at that moment.
-        if heeded == ticks.clone().count() {
+        if executed == ticks.clone().count() {
             return Err(RuleFailure::new(
                 format!(
                     "{text:?} in the news that name its generation is executed as by a first incarnation"

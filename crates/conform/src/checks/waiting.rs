@@ -33,7 +33,7 @@ pub(super) fn of_queries_in(kit: &Kit, part: KitPart) -> Result<Harness<'_>, Rul
     )
 }
 
-/// What happens while a robot waits for the others' answers makes no difference. Nothing is found of one that queries nobody.
+/// What happens while a robot waits for the others' answers makes no difference. Nothing is found of one that queries no other one.
 pub(super) fn while_asking(
     kit: &Kit,
     what: &str,
