@@ -25,6 +25,7 @@ pub struct PlayDifference {
 fn outcome(entry: &PlayedTick) -> Value {
     let mut value = serde_json::json!(entry.report);
     value["epoch"] = Value::Null;
+    value["generation"] = Value::Null;
 
     let mut commands = Vec::new();
     for sent in &entry.commands {
@@ -36,7 +37,7 @@ fn outcome(entry: &PlayedTick) -> Value {
     value
 }
 
-/// The first difference between the reports and commands of two plays. Their epochs may differ.
+/// The first difference between the reports and commands of two plays. Their epochs and generations may differ.
 pub fn difference(one: &Transcript, two: &Transcript) -> Option<PlayDifference> {
     for (one, two) in one.iter().zip(two) {
         let first = outcome(one);

@@ -102,6 +102,11 @@ impl FakePeers {
         self.state().asked.clone()
     }
 
+    /// Forgets these queries.
+    pub fn forget_asked(&self) {
+        self.state().asked.clear();
+    }
+
     /// From now on they hold queries back.
     pub fn hold(&self) {
         self.hold_before(Epoch::MAX, Tick::MAX);

@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 use std::net::TcpListener;
+use std::ops::Deref;
 use std::process::Command;
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use bus::{Bus, BusError, Declared, Role as BusRole};
@@ -28,8 +29,14 @@ pub enum CannotRun {
     Robot(String),
 }
 
-/// A router session, a command, and what was learned.
+/// A router session, a command, and what was learned, for the checks of one part.
 pub struct Kit {
+    shared: Arc<SharedKit>,
+    part: KitPart,
+}
+
+/// What all parts share.
+pub struct SharedKit {
     /// The router session.
     pub bus: Bus,
     /// A queryable in a session of its own, which replies at once.
@@ -71,7 +78,7 @@ impl Kit {
         // The robot connects to this kit only.
         own.env_remove("CARS_ZENOH_CONFIG");
 
-        Ok(Self {
+        let shared = SharedKit {
             _control: declare_control(&endpoint)?,
             bus,
             endpoint,
@@ -82,9 +89,36 @@ impl Kit {
             learned: OnceLock::new(),
             usual: OnceLock::new(),
             is_deterministic: OnceLock::new(),
+        };
+        Ok(Self {
+            shared: Arc::new(shared),
+            part: KitPart::Alone,
         })
     }
 
+    /// The same kit, for the checks of a part.
+    pub fn of_part(&self, part: KitPart) -> Self {
+        Self {
+            shared: Arc::clone(&self.shared),
+            part,
+        }
+    }
+
+    /// The part whose checks it is for.
+    pub fn part(&self) -> KitPart {
+        self.part
+    }
+}
+
+impl Deref for Kit {
+    type Target = SharedKit;
+
+    fn deref(&self) -> &SharedKit {
+        &self.shared
+    }
+}
+
+impl SharedKit {
     /// The key of the kit's own queryable: a query there takes as long as this machine makes any query take.
     pub fn control_key(&self) -> String {
         control_key()
@@ -138,7 +172,7 @@ impl Kit {
     /// The robots of a roster: the usual one, or that of the part in a run.
     fn roster(learned: &Learned, part: KitPart) -> BTreeMap<RobotName, RosterRobot> {
         match part {
-            KitPart::Alone => learned.fake_peers.clone(),
+            KitPart::Alone | KitPart::LaterEpoch => learned.fake_peers.clone(),
             KitPart::InRun => learned.in_run.clone(),
         }
     }

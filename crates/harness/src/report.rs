@@ -14,6 +14,9 @@ pub enum KitPart {
     /// The checks that take the robot through one thing at a time.
     #[serde(rename = "alone")]
     Alone,
+    /// The same, in the second epoch of the robot's process.
+    #[serde(rename = "in a later epoch")]
+    LaterEpoch,
     /// A run of at least three robots, in which all of it happens.
     #[serde(rename = "in a run")]
     InRun,
@@ -23,6 +26,7 @@ impl fmt::Display for KitPart {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Alone => "alone",
+            Self::LaterEpoch => "in a later epoch",
             Self::InRun => "in a run",
         })
     }

@@ -2,13 +2,13 @@
 //! the same robot meets the same again.
 
 use protocol::messages::{Delivery, Payload, Performative, TickUpdate};
-use protocol::{RobotName, Tick};
+use protocol::{Generation, RobotName, Tick};
 
 use crate::body::{ROUND, RobotBody};
 use crate::comparison::demand_same;
 use crate::harness::{Harness, HarnessOptions};
 use crate::kit::Kit;
-use crate::report::RuleFailure;
+use crate::report::{KitPart, RuleFailure};
 use crate::transcript::{PlayedTick, Transcript};
 
 /// In a round of ticks: the robot senses another one, and it cannot query any other.
@@ -18,6 +18,9 @@ const OUT_OF_RANGE: Tick = 8;
 /// The first of the words that come in turn, and how far they are apart, ticks.
 const FIRST_WORD: Tick = 5;
 const WORD_EVERY: usize = 10;
+
+/// Ticks of the epoch before the one in which a robot is checked.
+const EARLIER: Tick = 8;
 
 /// A command that arrives at the robot.
 #[derive(Debug, Clone)]
@@ -153,11 +156,48 @@ impl PlayScript {
     }
 }
 
-/// A robot that has joined a run of its own, ready for its first clock.
+/// A robot that has joined a run of its own, ready for its first clock, or for that of a later epoch.
 pub fn with_robot(kit: &Kit, options: HarnessOptions) -> Result<Harness<'_>, RuleFailure> {
     let mut harness = Harness::open_run(kit, options)?;
     harness.join()?;
+    if kit.part() == KitPart::LaterEpoch {
+        play_earlier_epoch(&mut harness)?;
+    }
     Ok(harness)
+}
+
+/// The epoch before the one in which a robot is checked: commands, and a tick that it misses, so that it joins again.
+fn play_earlier_epoch(harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
+    let welcome = harness.template.clone();
+    let script = PlayScript {
+        ticks: EARLIER,
+        ..PlayScript::usual(harness.kit)
+    };
+    let reported = play(harness, &script, &mut Straight)?;
+    let generation = harness.generation();
+    inherit(harness, &reported, generation + 1);
+    harness.miss()?;
+    harness.open(&TickUpdate::default())?;
+    harness.until_rejoined(generation)?;
+    play(harness, &PlayScript::quiet(1), &mut Straight)?;
+
+    harness.template = welcome;
+    harness.begin_epoch(harness.epoch() + 1);
+    // What is checked is what comes from here on.
+    harness.seen.forget();
+    harness.fake_peers.forget_asked();
+    Ok(())
+}
+
+/// Further welcomes are those of an incarnation whose predecessor has reported this.
+pub fn inherit(harness: &mut Harness<'_>, reported: &[PlayedTick], generation: Generation) {
+    let mut last_first = reported.iter().rev().map(PlayedTick::state);
+    harness.template.last_state = last_first.next();
+    harness.template.state_before = last_first.next();
+    harness.template.stream = format!("robot/{}#{generation}", harness.template.name);
+    if let Some(last) = &harness.template.last_state {
+        harness.template.location = last.location;
+    }
 }
 
 /// A process of its own, taken straight through a script.
@@ -252,6 +292,8 @@ fn news_of(harness: &mut Harness<'_>, script: &PlayScript, tick: Tick) -> TickUp
         news.correction = Some(harness.body.confirmed());
     } else if tick == 0 {
         harness.body = start;
+        // News that name an incarnation say where it stands.
+        news.correction = (harness.generation() > 1).then(|| start.confirmed());
     } else {
         news.correction = harness.body.advance(tick, &harness.template);
         // What it proposed is not where it drove.

@@ -88,6 +88,15 @@ impl Seen {
         order
     }
 
+    /// Forgets all that came, but not which tokens are declared, nor the place of what comes next.
+    pub fn forget(&mut self) {
+        *self = Self {
+            count: self.count,
+            present: std::mem::take(&mut self.present),
+            ..Self::default()
+        };
+    }
+
     /// Whether a robot's token is declared.
     pub fn is_present(&self, robot: &str) -> bool {
         self.present.contains(robot)

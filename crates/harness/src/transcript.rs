@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use protocol::messages::{Point, Report, TickUpdate};
+use protocol::messages::{Point, PublicState, Report, TickUpdate};
 use protocol::{Epoch, Tick};
 
 use crate::seen::ReportedCommand;
@@ -26,6 +26,23 @@ pub struct PlayedTick {
     pub index: usize,
     /// From the clock to the report, wall clock.
     pub took: Duration,
+}
+
+impl PlayedTick {
+    /// The state that the robot shows of it.
+    pub fn state(&self) -> PublicState {
+        let report = self.report.clone();
+        PublicState {
+            epoch: report.epoch,
+            tick: report.tick,
+            location: self.location,
+            speed_mps: report.speed_mps,
+            direction_rad: report.direction_rad,
+            state_variables: report.state_variables,
+            emotion_state: report.emotion_state,
+            behavior_state: report.behavior_state,
+        }
+    }
 }
 
 /// Ticks that were played, in their order.

@@ -220,11 +220,11 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
                 return Ok(());
             }
             let joining = join_again(harness)?;
-            harness.welcome_to(joining, 1);
+            harness.welcome_to(joining, harness.epoch() - 1);
             harness.settle(QUIET);
             demand_silence(
                 harness,
-                "welcomed to epoch 1, no report for a clock of epoch 2",
+                "welcomed to the epoch before, no report for a clock of the next one",
             )?;
             harness.repeat();
             let joining = join_again(harness)?;
@@ -242,13 +242,13 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     let [text, _] = kit.texts();
     // News of a tick that is never granted must not be taken for those of the next epoch.
     harness.put_news(&TickUpdate {
-        epoch: 1,
+        epoch: harness.epoch(),
         tick: harness.next_tick(),
         commands: vec![ArrivingCommand::new(&kit.sender(), &text, harness.next_tick()).delivery()],
         ..TickUpdate::default()
     })?;
 
-    harness.begin_epoch(2);
+    harness.begin_epoch(harness.epoch() + 1);
     harness.keeps_requests = true;
     let again = play(&mut harness, &PlayScript::usual(kit), &mut WrongWelcome);
     // Before the play itself is judged: a process that has another identity explains what else is
@@ -287,7 +287,7 @@ pub(super) fn other_welcome(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailu
     let mut harness = with_robot(kit, HarnessOptions::default())?;
     play(&mut harness, &busy, &mut Straight)?;
     differ(&mut harness.template, has_parameters);
-    harness.begin_epoch(2);
+    harness.begin_epoch(harness.epoch() + 1);
     let played = play(&mut harness, &busy, &mut Straight)?;
     let what = "to be welcomed in another way in the epoch before";
     demand_same(kit, what, &expected, &played)

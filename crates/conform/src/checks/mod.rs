@@ -25,26 +25,42 @@ use std::thread::Builder;
 
 use harness::findings::{Findings, VerdictsByRule};
 use harness::kit::{CannotRun, Kit};
-use harness::report::{AnswerTimes, CheckReport, PlayedRun, RuleFailure, RuleOutcome, RuleVerdict};
+use harness::report::{
+    AnswerTimes, CheckReport, KitPart, PlayedRun, RuleFailure, RuleOutcome, RuleVerdict,
+};
 use harness::rules::{self, ProtocolRule};
 use harness::setting::CheckSetting;
+
+/// What a check does.
+type RunCheck = fn(&Kit, &mut Findings) -> Result<(), RuleFailure>;
 
 /// A check, with its rules; the first one gets the failure that breaks it off.
 struct Check {
     rules: &'static [&'static str],
-    run: fn(&Kit, &mut Findings) -> Result<(), RuleFailure>,
+    run: RunCheck,
+    /// Whether it is about a process as it starts, which has no epoch before.
+    is_of_start: bool,
 }
 
-const fn rules(
-    rules: &'static [&'static str],
-    run: fn(&Kit, &mut Findings) -> Result<(), RuleFailure>,
-) -> Check {
-    Check { rules, run }
+const fn rules(rules: &'static [&'static str], run: RunCheck) -> Check {
+    Check {
+        rules,
+        run,
+        is_of_start: false,
+    }
+}
+
+const fn of_start(rules: &'static [&'static str], run: RunCheck) -> Check {
+    Check {
+        rules,
+        run,
+        is_of_start: true,
+    }
 }
 
 /// Checks that need nothing but the usual ticks before; those that take longest begin.
 const CHECKS: [Check; 41] = [
-    rules(&["join.refused"], joining::refused),
+    of_start(&["join.refused"], joining::refused),
     rules(&["end.gone"], ends::gone_for_a_while),
     rules(&["end.gone"], ends::gone_forever),
     rules(&["end.gone"], ends::back_in_time),
@@ -63,10 +79,10 @@ const CHECKS: [Check; 41] = [
     rules(&["epoch.init"], epochs::other_welcome),
     rules(&["epoch.init"], epochs::while_waiting),
     rules(&["epoch.late"], epochs::late),
-    rules(&["return.generation"], returns::generation),
-    rules(&["return.generation"], returns::commanded),
+    of_start(&["return.generation"], returns::generation),
+    of_start(&["return.generation"], returns::commanded),
     rules(&["return.rejoin"], returns::rejoin),
-    rules(&["join.ready-last"], joining::ready_last),
+    of_start(&["join.ready-last"], joining::ready_last),
     rules(
         &[
             "query.tick",
@@ -96,7 +112,7 @@ const CHECKS: [Check; 41] = [
 ];
 
 /// Checks of programs that `cars exec` runs.
-const STDIO_CHECKS: [Check; 1] = [rules(&[rules::STDIO_END], stdio::end)];
+const STDIO_CHECKS: [Check; 1] = [of_start(&[rules::STDIO_END], stdio::end)];
 /// Rules whose checks presume that the robot keeps another one: without it they show nothing.
 const PRESUMED: [(&str, &str); 9] = [
     // On a loaded machine a clock may come again in any check.
@@ -194,10 +210,14 @@ fn all(
 
     let is_wanted =
         |rules: &[&str]| wanted.is_empty() || wanted.iter().any(|rule| rules.contains(&rule.name));
+    let later = kit.of_part(KitPart::LaterEpoch);
     let mut due = Vec::new();
     for check in CHECKS.iter().chain(&STDIO_CHECKS) {
         if is_wanted(check.rules) {
-            due.push(check);
+            due.push((check, kit));
+            if !check.is_of_start {
+                due.push((check, &later));
+            }
         }
     }
     // It waits most of the time, beside the other checks.
@@ -208,17 +228,19 @@ fn all(
     };
     progress(0, due.len());
     let [next, done] = [0, 0].map(AtomicUsize::new);
-    let all = Mutex::new(findings);
+    let all = Mutex::new((findings, Findings::default()));
     let work = || {
-        while let Some(check) = due.get(next.fetch_add(1, Ordering::Relaxed)) {
+        while let Some((check, kit)) = due.get(next.fetch_add(1, Ordering::Relaxed)) {
             let mut own = Findings::default();
             let end = (check.run)(kit, &mut own);
             // Each check finds for itself, and is merged as a whole: the order in which they end
             // changes nothing.
             own.close(check.rules, end);
-            all.lock()
-                .unwrap_or_else(PoisonError::into_inner)
-                .merge(own);
+            let (alone, later) = &mut *all.lock().unwrap_or_else(PoisonError::into_inner);
+            match kit.part() {
+                KitPart::LaterEpoch => later.merge(own.of_part(KitPart::LaterEpoch)),
+                KitPart::Alone | KitPart::InRun => alone.merge(own),
+            }
             progress(done.fetch_add(1, Ordering::Relaxed) + 1, due.len());
         }
     };
@@ -236,10 +258,13 @@ fn all(
         }
     });
 
-    let mut findings = all.into_inner().unwrap_or_else(PoisonError::into_inner);
-    // A robot that breaks a rule alone breaks others by it in a run, where nothing is for itself.
-    if !findings.is_broken() {
-        findings.merge(found_in_run);
+    let (mut findings, mut later) = all.into_inner().unwrap_or_else(PoisonError::into_inner);
+    later.presume(&PRESUMED);
+    // A robot that breaks a rule alone breaks others by it later and in a run, where nothing is for itself.
+    for further in [later, found_in_run] {
+        if !findings.is_broken() {
+            findings.merge(further);
+        }
     }
     findings.presume(&PRESUMED);
     stdio::judge(kit, &mut findings);

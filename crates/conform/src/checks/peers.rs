@@ -61,14 +61,14 @@ fn after_skipped(kit: &Kit, commands: &[Delivery]) -> Result<Vec<Report>, RuleFa
     let held = harness.next_tick() - 1;
     let newest = held + 2;
     // The others are in that tick, too.
-    harness.fake_peers.begin(1, newest);
+    harness.fake_peers.begin(harness.epoch(), newest);
     let clock = Clock {
-        epoch: 1,
+        epoch: harness.epoch(),
         news: harness.flag(),
         ..Clock::default()
     };
     let news = TickUpdate {
-        epoch: 1,
+        epoch: harness.epoch(),
         correction: Some(harness.body.confirmed()),
         ..TickUpdate::default()
     };
@@ -108,7 +108,7 @@ fn after_skipped(kit: &Kit, commands: &[Delivery]) -> Result<Vec<Report>, RuleFa
     }
 
     let after = newest + 1;
-    harness.fake_peers.begin(1, after);
+    harness.fake_peers.begin(harness.epoch(), after);
     let expected = format!("a report for tick {after}");
     harness.until_put(
         &expected,
@@ -271,21 +271,21 @@ pub(super) fn newer(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     }
     let tick = harness.next_tick();
     let clock = Clock {
-        epoch: 1,
+        epoch: harness.epoch(),
         tick,
         news: harness.flag(),
         ..Clock::default()
     };
     let news = TickUpdate {
-        epoch: 1,
+        epoch: harness.epoch(),
         tick,
         correction: Some(harness.body.confirmed()),
         ..TickUpdate::default()
     };
 
     // What it asked for is never answered; what it asks for in the newer tick is.
-    harness.fake_peers.hold_before(1, tick);
-    harness.fake_peers.begin(1, tick);
+    harness.fake_peers.hold_before(harness.epoch(), tick);
+    harness.fake_peers.begin(harness.epoch(), tick);
     let expected = format!(
         "a report for tick {tick}, whose clock comes while it waits for an answer in the tick before"
     );
@@ -325,7 +325,7 @@ pub(super) fn waiting(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFail
         let mut waiting = harness.seen.waiting.iter();
         waiting
             .any(|waiting| {
-                (waiting.epoch, waiting.tick) == (1, tick)
+                (waiting.epoch, waiting.tick) == (harness.epoch(), tick)
                     && asked.iter().any(|query| query.of == waiting.on)
             })
             .then_some(())
@@ -346,7 +346,7 @@ pub(super) fn own_joined(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure>
             if harness.next_tick().is_multiple_of(3) {
                 return;
             }
-            news.joined = self.names_it.then_some(1);
+            news.joined = self.names_it.then_some(harness.generation());
             news.correction = news.correction.or(Some(harness.body.confirmed()));
         }
     }

@@ -351,20 +351,21 @@ fn demand_refused(harness: &mut Harness<'_>, findings: &mut Findings) {
 
 fn try_refused(harness: &Harness<'_>) -> Result<(), RuleFailure> {
     let now = harness.next_tick() - 1;
+    let of = harness.epoch();
     let never = [
-        (1, now + 2),
-        (2, 1),
-        (1, 0),
-        (1, now - 1),
-        (1, 1),
-        (1, now + 3),
-        (1, now + 1000),
-        (0, now + 1),
+        (of, now + 2),
+        (of + 1, 1),
+        (of, 0),
+        (of, now - 1),
+        (of, 1),
+        (of, now + 3),
+        (of, now + 1000),
+        (of - 1, now + 1),
     ];
 
     for (epoch, tick) in never {
         let expected = format!(
-            "after tick {now} of epoch 1, an error reply in words to tick={tick};epoch={epoch}, at once"
+            "after tick {now} of epoch {of}, an error reply in words to tick={tick};epoch={epoch}, at once"
         );
         match harness.state_in(epoch, tick)? {
             Some(Reply {
@@ -569,7 +570,7 @@ pub(super) fn once(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     }
     for other in harness.fake_peers.names() {
         let key = harness.keys.query(other, STATE);
-        let replies = kit.bus.get_all(&key, "tick=4;epoch=1", ALL_REPLIES)?;
+        let replies = kit.bus.get_all(&key, &of_tick_4(&harness), ALL_REPLIES)?;
         if replies.len() > 1 {
             let expected = format!("no reply of its own to a query of {other}");
             return Err(RuleFailure::new(
@@ -581,6 +582,11 @@ pub(super) fn once(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     Ok(())
 }
 
+/// The parameters of a query in tick 4.
+fn of_tick_4(harness: &Harness<'_>) -> String {
+    format!("tick=4;epoch={}", harness.epoch())
+}
+
 /// One reply, and the end of the query with it: a query that is not released takes all the time that the kit has.
 fn demand_one_reply(
     harness: &Harness<'_>,
@@ -590,7 +596,10 @@ fn demand_one_reply(
     let key = harness.keys.query(&harness.kit.subject(), what);
     let begun = Instant::now();
     // It ends when the last queryable has released it, or with the patience: the time tells which.
-    let replies = harness.kit.bus.get_all(&key, "tick=4;epoch=1", patience)?;
+    let replies = harness
+        .kit
+        .bus
+        .get_all(&key, &of_tick_4(harness), patience)?;
     let took = begun.elapsed();
 
     if replies.len() != 1 {
@@ -619,7 +628,7 @@ fn demand_own_key(
     let replies = harness
         .kit
         .bus
-        .get_all(&asked, "tick=4;epoch=1", patience)?;
+        .get_all(&asked, &of_tick_4(harness), patience)?;
 
     if replies.iter().filter(|reply| reply.key == own).count() == 1 {
         return Ok(());

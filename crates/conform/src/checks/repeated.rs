@@ -171,7 +171,13 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
                 return Ok(());
             }
 
-            let late = [(1, tick - 2), (1, tick - 5), (0, tick), (0, tick + 9)];
+            let now = harness.epoch();
+            let late = [
+                (now, tick - 2),
+                (now, tick - 5),
+                (now - 1, tick),
+                (now - 1, tick + 9),
+            ];
             // Counted before: ticks of this epoch have been answered once already.
             self.0 = late.map(|of| (of, count_of(harness, of))).into();
             let flag = harness.flag();

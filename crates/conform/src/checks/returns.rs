@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use protocol::messages::{Clock, Correction, PublicState, TickUpdate};
+use protocol::messages::{Clock, Correction, TickUpdate};
 use protocol::{Generation, Tick};
 
 use harness::comparison::{demand_same, is_same};
@@ -12,7 +12,7 @@ use harness::kit::Kit;
 use harness::patience::PATIENCE;
 use harness::report::RuleFailure;
 use harness::script::{
-    ArrivingCommand, PlayScript, Straight, play, played, step, usual, with_robot,
+    ArrivingCommand, PlayScript, Straight, inherit, play, played, step, usual, with_robot,
 };
 use harness::transcript::PlayedTick;
 use harness::{Harness, HarnessOptions};
@@ -26,21 +26,6 @@ const TICKS: Tick = 5;
 const STREAMS: [&str; 3] = ["one", "other", "further"];
 /// No report comes within this time where it is not the robot's turn.
 const QUIET: Duration = Duration::from_millis(300);
-
-/// What the robot reported for a tick when nothing disturbed it.
-fn state_of(entry: &PlayedTick) -> PublicState {
-    let report = entry.report.clone();
-    PublicState {
-        epoch: report.epoch,
-        tick: report.tick,
-        location: entry.location,
-        speed_mps: report.speed_mps,
-        direction_rad: report.direction_rad,
-        state_variables: report.state_variables,
-        emotion_state: report.emotion_state,
-        behavior_state: report.behavior_state,
-    }
-}
 
 /// A harness on which the robot has joined in the place of incarnations that were gone after these ticks, of which the last one
 /// has reported this. It draws from `stream`, or else from the one that is named after its generation.
@@ -70,17 +55,6 @@ fn first_ticks(kit: &Kit) -> Result<&[PlayedTick], RuleFailure> {
     let usual = usual(kit)?;
     let last = usual.iter().position(|entry| entry.tick == LAST);
     Ok(&usual[..=last.unwrap_or_default()])
-}
-
-/// Further welcomes are those of an incarnation whose predecessor has reported this.
-pub(super) fn inherit(harness: &mut Harness<'_>, reported: &[PlayedTick], generation: Generation) {
-    let mut last_first = reported.iter().rev().map(state_of);
-    harness.template.last_state = last_first.next();
-    harness.template.state_before = last_first.next();
-    harness.template.stream = format!("robot/{}#{generation}", harness.template.name);
-    if let Some(last) = &harness.template.last_state {
-        harness.template.location = last.location;
-    }
 }
 
 /// It waits for the news that name it, shows meanwhile what its predecessor reported, and reports as what it is.
@@ -169,7 +143,7 @@ pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
 
     let mut reported = first_ticks(kit)?.to_vec();
     let mut last_ticks = Vec::new();
-    for generation in [GENERATION, GENERATION + 1] {
+    for generation in [harness.generation() + 1, harness.generation() + 2] {
         // The welcome of the further incarnation is set before the barrier asks for it.
         inherit(&mut harness, &reported, generation);
         join_again(&mut harness)?;
@@ -181,7 +155,8 @@ pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         harness.demand_token_kept("it joins again")?;
 
         // What a new process does in the same place is what it has to do.
-        let mut anew = returned(kit, &last_ticks, &reported, None)?;
+        let stream = harness.template.stream.clone();
+        let mut anew = returned(kit, &last_ticks, &reported, Some(&stream))?;
         let anew = play(&mut anew, &PlayScript::quiet(5), &mut Straight)?;
         demand_same(kit, "to join again instead of a new process", &anew, &again)?;
         reported = again;

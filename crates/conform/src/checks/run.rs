@@ -13,13 +13,13 @@ use nix::sys::signal::Signal;
 use protocol::messages::TickUpdate;
 use protocol::{RobotName, Tick};
 
-use super::{returns, ticks, wire};
+use super::{ticks, wire};
 use harness::comparison::difference;
 use harness::fake_peers::Unhelpful;
 use harness::findings::Findings;
 use harness::kit::Kit;
 use harness::report::{KitPart, PlayedRun, RuleFailure};
-use harness::script::{Disturbance, PlayScript, step, with_robot};
+use harness::script::{Disturbance, PlayScript, inherit, step, with_robot};
 use harness::transcript::{PlayedTick, Transcript};
 use harness::{Harness, HarnessOptions};
 
@@ -313,7 +313,7 @@ fn hang(
     transcript: &Transcript,
 ) -> Result<(), RuleFailure> {
     let generation = harness.generation();
-    returns::inherit(harness, transcript, generation + 1);
+    inherit(harness, transcript, generation + 1);
     if is_disturbed {
         harness.hang()?;
         for _ in 0..MISSED {
@@ -334,7 +334,7 @@ fn hang(
 /// The process is killed, misses ticks, and another one follows.
 fn crash(harness: &mut Harness<'_>, transcript: &Transcript) -> Result<(), RuleFailure> {
     let generation = harness.generation();
-    returns::inherit(harness, transcript, generation + 1);
+    inherit(harness, transcript, generation + 1);
     harness.crash()?;
     for _ in 0..MISSED {
         harness.go_on_without()?;

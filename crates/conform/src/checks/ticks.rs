@@ -151,8 +151,9 @@ fn check_answers(harness: &Harness<'_>, transcript: &Transcript) -> Result<(), R
         let granted = transcript
             .iter()
             .find(|entry| (entry.epoch, entry.tick) == (epoch, tick));
-        let Some(entry) = granted.filter(|_| report.generation == 1) else {
-            let expected = "reports of generation 1 for ticks that were granted";
+        let own = harness.generation();
+        let Some(entry) = granted.filter(|_| report.generation == own) else {
+            let expected = format!("reports of generation {own} for ticks that were granted");
             return Err(RuleFailure::new(expected, came));
         };
         // A clock that was repeated while its report was awaited may have been answered twice.
@@ -240,11 +241,12 @@ fn check_stamps(harness: &Harness<'_>, transcript: &Transcript) -> Result<(), Ru
                 .roster
                 .iter()
                 .any(|name| name.as_str() == sent.to);
-        let is_right = command.generation == 1 && command.performative == Performative::Achieve;
+        let own = harness.generation();
+        let is_right = command.generation == own && command.performative == Performative::Achieve;
 
         if !(is_granted && is_own && is_known && is_right) {
             let expected = format!(
-                "commands of generation 1 and of a tick that was granted, performative achieve, from {subject} to robots \
+                "commands of generation {own} and of a tick that was granted, performative achieve, from {subject} to robots \
                  of the roster"
             );
             return Err(RuleFailure::new(expected, describe(sent)));

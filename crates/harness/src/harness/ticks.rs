@@ -75,7 +75,7 @@ impl Harness<'_> {
             let stamped = Command {
                 epoch: self.epoch,
                 tick: self.next,
-                generation: 1,
+                generation: self.generation(),
                 number: 1,
                 to: Some(Target::Robot(subject.clone())),
                 ..command
