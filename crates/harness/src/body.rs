@@ -7,9 +7,9 @@ use protocol::{Tick, published_angle};
 
 /// Every so many ticks the same happens to a body again.
 pub const ROUND: Tick = 16;
-/// In a round: it is placed elsewhere, and its move is refused.
+/// In a round: it is placed elsewhere, and its moves are refused in two ticks in turn.
 const PLACED: Tick = 5;
-const REFUSED: Tick = 9;
+const REFUSED: [Tick; 2] = [9, 10];
 /// How far it is placed from where it stood, meters.
 const SHIFT: (f64, f64) = (0.25, 0.125);
 
@@ -86,7 +86,7 @@ impl RobotBody {
             return Some(self.confirmed());
         }
 
-        if tick % ROUND == REFUSED || !is_free(self.proposal, welcome) {
+        if REFUSED.contains(&(tick % ROUND)) || !is_free(self.proposal, welcome) {
             self.velocity.linear_mps = 0.0;
             return Some(Correction {
                 location: self.stands,

@@ -16,6 +16,8 @@ const MAX_WHOLE: f64 = 9_007_199_254_740_992.0;
 
 /// How far from its place a robot is shown where that must make no difference, meters.
 const MISPLACED_M: f64 = 1.5;
+/// How far apart the bodies are that a robot senses, meters.
+const BESIDE_M: f64 = 0.75;
 /// How far a robot without a script moves in a tick, meters, and after how many ticks it is back.
 const PACE_M: f64 = 0.01;
 const PACES: Tick = 50;
@@ -199,22 +201,29 @@ impl FakePeers {
         })
     }
 
-    /// The first of them, as it is sensed in a tick.
-    pub fn sensed(&self, epoch: Epoch, tick: Tick) -> Option<SensedRobot> {
-        let name = self.names().next()?.clone();
-        let location = self.state_of(&name, epoch, tick)?.location;
-        Some(SensedRobot { name, location })
+    /// They, as they are sensed in a tick.
+    pub fn sensed(&self, epoch: Epoch, tick: Tick) -> Vec<SensedRobot> {
+        let mut sensed = Vec::new();
+        for name in self.names() {
+            sensed.extend(self.state_of(name, epoch, tick).map(|state| SensedRobot {
+                name: name.clone(),
+                location: state.location,
+            }));
+        }
+        sensed
     }
 
-    /// The same as a body.
+    /// The same as bodies, and one of each other kind.
     pub fn bodies(&self, epoch: Epoch, tick: Tick) -> Vec<SensedBody> {
-        let sensed = self.sensed(epoch, tick);
-        let body = sensed.map(|robot| SensedBody {
-            kind: SensedKind::Robot,
-            location: robot.location,
-        });
-
-        body.into_iter().collect()
+        let mut bodies = Vec::new();
+        for robot in self.sensed(epoch, tick) {
+            for kind in [SensedKind::Robot, SensedKind::Guest, SensedKind::Obstacle] {
+                let aside_m = BESIDE_M * bodies.len() as f64;
+                let location = Point::new(robot.location.x, robot.location.y + aside_m);
+                bodies.push(SensedBody { kind, location });
+            }
+        }
+        bodies
     }
 
     /// A message as it is put on the wire.

@@ -51,8 +51,8 @@ pub struct SharedKit {
     /// What `cars exec` has reported of the robot's processes.
     pub stdio: StdioReports,
     learned: OnceLock<Learned>,
-    /// The usual ticks, without any disturbance.
-    pub usual: OnceLock<Transcript>,
+    usual: OnceLock<Transcript>,
+    usual_rejoined: OnceLock<Transcript>,
     /// Whether the same ticks gave the same reports, so that differences mean something.
     pub is_deterministic: OnceLock<bool>,
 }
@@ -88,6 +88,7 @@ impl Kit {
             stdio: StdioReports::default(),
             learned: OnceLock::new(),
             usual: OnceLock::new(),
+            usual_rejoined: OnceLock::new(),
             is_deterministic: OnceLock::new(),
         };
         Ok(Self {
@@ -107,6 +108,14 @@ impl Kit {
     /// The part whose checks it is for.
     pub fn part(&self) -> KitPart {
         self.part
+    }
+
+    /// The usual ticks, as the robot goes through them in this part without any disturbance; set when the part begins.
+    pub fn usual(&self) -> &OnceLock<Transcript> {
+        match self.part {
+            KitPart::Rejoined => &self.shared.usual_rejoined,
+            KitPart::Alone | KitPart::LaterEpoch | KitPart::InRun => &self.shared.usual,
+        }
     }
 }
 
@@ -172,7 +181,7 @@ impl SharedKit {
     /// The robots of a roster: the usual one, or that of the part in a run.
     fn roster(learned: &Learned, part: KitPart) -> BTreeMap<RobotName, RosterRobot> {
         match part {
-            KitPart::Alone | KitPart::LaterEpoch => learned.fake_peers.clone(),
+            KitPart::Alone | KitPart::LaterEpoch | KitPart::Rejoined => learned.fake_peers.clone(),
             KitPart::InRun => learned.in_run.clone(),
         }
     }

@@ -9,7 +9,7 @@ use serde::Serialize;
 use crate::rules::ProtocolRule;
 
 /// A part of the kit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub enum KitPart {
     /// The checks that take the robot through one thing at a time.
     #[serde(rename = "alone")]
@@ -17,6 +17,9 @@ pub enum KitPart {
     /// The same, in the second epoch of the robot's process.
     #[serde(rename = "in a later epoch")]
     LaterEpoch,
+    /// The same, after the robot's process has joined again.
+    #[serde(rename = "after joining again")]
+    Rejoined,
     /// A run of at least three robots, in which all of it happens.
     #[serde(rename = "in a run")]
     InRun,
@@ -27,6 +30,7 @@ impl fmt::Display for KitPart {
         f.write_str(match self {
             Self::Alone => "alone",
             Self::LaterEpoch => "in a later epoch",
+            Self::Rejoined => "after joining again",
             Self::InRun => "in a run",
         })
     }

@@ -1,6 +1,8 @@
 //! The ticks that a robot is taken through: what happens to it is a function of the tick and of what it proposed, so that
 //! the same robot meets the same again.
 
+use std::time::Duration;
+
 use protocol::messages::{Delivery, Payload, Performative, TickUpdate};
 use protocol::{Generation, RobotName, Tick};
 
@@ -15,12 +17,15 @@ use crate::transcript::{PlayedTick, Transcript};
 const SENSES: Tick = 12;
 const CUT_OFF: Tick = 14;
 const OUT_OF_RANGE: Tick = 8;
+const FIRST_IN_RANGE: Tick = 6;
 /// The first of the words that come in turn, and how far they are apart, ticks.
 const FIRST_WORD: Tick = 5;
 const WORD_EVERY: usize = 10;
 
 /// Ticks of the epoch before the one in which a robot is checked.
-const EARLIER: Tick = 8;
+const EARLIER: Tick = 9;
+/// How long the simulator is away in it.
+const AWAY: Duration = Duration::from_millis(50);
 
 /// A command that arrives at the robot.
 #[derive(Debug, Clone)]
@@ -156,36 +161,46 @@ impl PlayScript {
     }
 }
 
-/// A robot that has joined a run of its own, ready for its first clock, or for that of a later epoch.
+/// A robot that has joined a run of its own, ready for its first clock, or with what comes before in this part of the kit.
 pub fn with_robot(kit: &Kit, options: HarnessOptions) -> Result<Harness<'_>, RuleFailure> {
     let mut harness = Harness::open_run(kit, options)?;
     harness.join()?;
-    if kit.part() == KitPart::LaterEpoch {
-        play_earlier_epoch(&mut harness)?;
+    match kit.part() {
+        KitPart::Alone | KitPart::InRun => return Ok(harness),
+        KitPart::LaterEpoch => play_earlier_epoch(&mut harness)?,
+        KitPart::Rejoined => rejoin(&mut harness)?,
     }
+    // What is checked is what comes from here on.
+    harness.seen.forget();
+    harness.fake_peers.forget_asked();
     Ok(harness)
 }
 
-/// The epoch before the one in which a robot is checked: commands, and a tick that it misses, so that it joins again.
+/// The epoch before the one in which a robot is checked: commands, a move that is refused, and a simulator that is away and back.
 fn play_earlier_epoch(harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
-    let welcome = harness.template.clone();
     let script = PlayScript {
         ticks: EARLIER,
         ..PlayScript::usual(harness.kit)
     };
-    let reported = play(harness, &script, &mut Straight)?;
+    play(harness, &script, &mut Straight)?;
+    harness.show_simulator(false)?;
+    harness.pass(AWAY);
+    harness.show_simulator(true)?;
+    harness.begin_epoch(harness.epoch() + 1);
+    Ok(())
+}
+
+/// The first tick, and one that the robot misses, so that it joins again: all that is checked comes after the next one.
+fn rejoin(harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
+    let welcome = harness.template.clone();
+    let reported = play(harness, &PlayScript::quiet(0), &mut Straight)?;
     let generation = harness.generation();
     inherit(harness, &reported, generation + 1);
     harness.miss()?;
     harness.open(&TickUpdate::default())?;
     harness.until_rejoined(generation)?;
-    play(harness, &PlayScript::quiet(1), &mut Straight)?;
-
+    play(harness, &PlayScript::quiet(0), &mut Straight)?;
     harness.template = welcome;
-    harness.begin_epoch(harness.epoch() + 1);
-    // What is checked is what comes from here on.
-    harness.seen.forget();
-    harness.fake_peers.forget_asked();
     Ok(())
 }
 
@@ -208,7 +223,7 @@ pub fn played(kit: &Kit, script: &PlayScript) -> Result<Transcript, RuleFailure>
 
 /// The usual ticks, as the robot went through them without any disturbance.
 pub fn usual(kit: &Kit) -> Result<&Transcript, RuleFailure> {
-    kit.usual
+    kit.usual()
         .get()
         .ok_or_else(|| RuleFailure::new("the usual ticks are played first", "they were not"))
 }
@@ -301,10 +316,13 @@ fn news_of(harness: &mut Harness<'_>, script: &PlayScript, tick: Tick) -> TickUp
             news.correction = Some(harness.body.confirmed());
         }
         if tick % ROUND == SENSES {
-            news.sensed = harness.fake_peers.sensed(epoch, tick).into_iter().collect();
+            news.sensed = harness.fake_peers.sensed(epoch, tick);
         }
         if tick % ROUND == OUT_OF_RANGE {
             news.in_range = Some(Vec::new());
+        }
+        if tick % ROUND == FIRST_IN_RANGE {
+            news.in_range = Some(harness.fake_peers.names().take(1).cloned().collect());
         }
         if tick % ROUND == CUT_OFF {
             news.unreachable = harness.fake_peers.names().cloned().collect();

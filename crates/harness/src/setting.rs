@@ -68,7 +68,7 @@ const TICKS: Tick = 100;
 const CENTER: Point = Point { x: 5.0, y: 5.0 };
 const BESIDE: Point = Point { x: 7.0, y: 6.0 };
 /// The other ones, and what they are called where a robot of the roster has that name.
-const OTHERS: [&str; 4] = ["Echo", "Echo2", "Echo3", "Echo4"];
+const OTHERS: [&str; 4] = ["Echo", "Zoe", "Echo3", "Echo4"];
 /// Robots of the part in a run, at least.
 const RUN_ROBOTS: usize = 3;
 

@@ -187,21 +187,41 @@ fn order_of_senders(kit: &Kit, one: &str, two: &str) -> Result<(), RuleFailure> 
     Ok(())
 }
 
-/// The last one of many commands in the news of a tick is executed, if it is where it is the last one of two.
+/// The last command in the news of a tick is executed, whatever is listed before it, if it is in the tick after it.
 fn last_of_many(kit: &Kit, one: &str, two: &str) -> Result<(), RuleFailure> {
-    for [one, two] in [[one, two], [two, one]] {
-        let has_effect = |count: usize| {
-            let mut commands = vec![(one, LAST); count];
-            let without = commanded(kit, &commands)?;
-            commands.push((two, LAST));
-            commanded(kit, &commands).map(|with| !is_same(&with, &without))
+    let sender = kit.sender();
+    let command = |text: &str, payload: Value| ArrivingCommand {
+        payload: Payload::new(payload),
+        ..ArrivingCommand::new(&sender, text, LAST)
+    };
+    let plain = |text| ArrivingCommand::new(&sender, text, LAST);
+    for (listed, last) in [
+        (vec![plain(one); MANY], plain(two)),
+        (vec![plain(two); MANY], plain(one)),
+        (vec![plain(one), plain(two)], plain(one)),
+        (vec![command(one, json!(1))], command(one, json!(2))),
+    ] {
+        let effect = |last: Option<ArrivingCommand>| {
+            let commands = listed.iter().cloned().chain(last).collect();
+            played(kit, &PlayScript::with(TICKS, commands))
         };
-        if has_effect(1)? && !has_effect(MANY)? {
+        let without = effect(None)?;
+        let after = ArrivingCommand {
+            tick: LAST + 1,
+            ..last.clone()
+        };
+        if !is_same(&effect(Some(after))?, &without) && is_same(&effect(Some(last))?, &without) {
+            let texts: Vec<&str> = listed
+                .iter()
+                .map(|command| &*command.text)
+                .take(2)
+                .collect();
             return Err(RuleFailure::new(
                 format!(
-                    "news that list {MANY} times {one:?} and then {two:?} have the effect of both"
+                    "a command that news list after {} others, {texts:?}, has an effect, as in the tick after it",
+                    listed.len()
                 ),
-                format!("that of {one:?} alone"),
+                "none at all",
             ));
         }
     }
@@ -469,6 +489,11 @@ pub(super) fn payload(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
             "the deepest payload and large numbers",
             json!([u64::MAX, i64::MIN, -0.0, 1e300, deepest]),
         ),
+        ("the payload false", json!(false)),
+        ("the payload 0", json!(0)),
+        ("an empty text as payload", json!("")),
+        ("an empty list as payload", json!([])),
+        ("an empty object as payload", json!({})),
     ];
     let with_payload = |text: &str, payload: &Value| {
         let arrival = ArrivingCommand {
@@ -506,6 +531,7 @@ pub(super) fn payload(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
             &two_bytes,
         ),
         (format!("the text {ESCAPED_TEXT:?}"), ESCAPED_TEXT),
+        ("an empty text".to_owned(), ""),
     ] {
         unknown.push((what, commanded(kit, &[(text, LAST)])?));
     }
@@ -586,6 +612,29 @@ fn sent(transcript: &Transcript) -> usize {
     transcript.iter().map(|entry| entry.commands.len()).sum()
 }
 
+/// Where the payload of a robot's command makes a difference, that of the operator's does.
+fn demand_payload_of_operator(kit: &Kit, text: &str) -> Result<(), RuleFailure> {
+    let makes_difference = |from: &RobotName| {
+        let plain = ArrivingCommand::new(from, text, LAST);
+        let with_payload = ArrivingCommand {
+            payload: Payload::new(json!({ "task": 3 })),
+            ..plain.clone()
+        };
+        let plain = played(kit, &PlayScript::with(TICKS, vec![plain]))?;
+        let with_payload = played(kit, &PlayScript::with(TICKS, vec![with_payload]))?;
+        Ok::<bool, RuleFailure>(!is_same(&plain, &with_payload))
+    };
+    if makes_difference(&kit.sender())? && !makes_difference(&RobotName::operator())? {
+        return Err(RuleFailure::new(
+            format!(
+                "the payload of {text:?} from the operator makes a difference, as from a robot"
+            ),
+            "none",
+        ));
+    }
+    Ok(())
+}
+
 /// A command from the operator, who is not a robot of the roster, is executed like any other, and not answered.
 pub(super) fn from_operator(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
     let operator = RobotName::operator();
@@ -612,6 +661,7 @@ pub(super) fn from_operator(kit: &Kit, findings: &mut Findings) -> Result<(), Ru
         }
 
         is_seen = true;
+        demand_payload_of_operator(kit, &text)?;
         if is_same(&from_operator, &none) {
             let sender = kit.sender();
             return Err(RuleFailure::new(

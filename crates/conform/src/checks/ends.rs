@@ -5,7 +5,7 @@ use std::time::Duration;
 use nix::sys::signal::Signal;
 use protocol::messages::{Clock, End};
 
-use super::waiting;
+use super::{repeated, returns, waiting};
 use harness::findings::Findings;
 use harness::kit::Kit;
 use harness::patience::{PATIENCE, in_each_attempt};
@@ -48,6 +48,10 @@ pub(super) fn clock(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     // The end must also reach a robot that waits: nothing else would ever end its wait.
     let mut harness = waiting::for_news(kit)?;
     demand_end(&mut harness, End::Stopped, "while it waits for its news")?;
+
+    let mut harness = returns::returned_once(kit)?;
+    let when = "while it waits for the news that name it";
+    demand_end(&mut harness, End::Stopped, when)?;
 
     let (mut harness, is_asking) = waiting::for_another(kit)?;
     if is_asking {
@@ -117,7 +121,8 @@ pub(super) fn gone_for_a_while(kit: &Kit, _: &mut Findings) -> Result<(), RuleFa
                 "it waits {LONG_GONE_S} s (CARS_GONE_PATIENCE_S) for a simulator that is gone"
             );
             demand_running(harness, &expected)?;
-            harness.show_simulator(true).map(drop)
+            harness.show_simulator(true)?;
+            repeated::repeat(harness, entry)
         }
     }
     let options = HarnessOptions {

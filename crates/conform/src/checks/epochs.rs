@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use protocol::messages::{Clock, JoinRequest, Point, StreamReseed, TickUpdate, Welcome};
+use protocol::messages::{Clock, JoinRequest, KnownSite, Point, StreamReseed, TickUpdate, Welcome};
 use protocol::{Epoch, Tick};
 use serde_json::Value;
 
@@ -12,7 +12,7 @@ use harness::comparison::{PlayDifference, demand_same, difference};
 use harness::findings::Findings;
 use harness::kit::Kit;
 use harness::patience::PATIENCE;
-use harness::report::RuleFailure;
+use harness::report::{KitPart, RuleFailure};
 use harness::script::{
     ArrivingCommand, Disturbance, PlayScript, Straight, play, usual, with_robot,
 };
@@ -23,8 +23,8 @@ use harness::{Harness, HarnessOptions};
 const QUIET: Duration = Duration::from_millis(300);
 /// An epoch that follows the first one, where those between were missed.
 const LATER: Epoch = 4;
-/// Ticks of an epoch that is to leave nothing behind, commands among them.
-const BUSY: Tick = 21;
+/// Ticks of an epoch that is to leave nothing behind, commands among them; in the last one the robot's move is refused.
+const BUSY: Tick = 25;
 /// So many streams and seeds are tried, for so many ticks each.
 const DRAWS: u64 = 16;
 const DRAWN: Tick = 12;
@@ -35,7 +35,7 @@ const RESEEDED_AGAIN: Tick = 8;
 const FAR: Tick = 300;
 /// How far from its place in one epoch a robot is placed in a further one.
 const MOVED_M: f64 = 0.25;
-/// By how much its parameters differ between epochs.
+/// By how much numbers differ between epochs.
 const SHRUNK: f64 = 0.875;
 
 /// Another process, the same seed: the same reports.
@@ -234,11 +234,7 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         }
     }
     let mut harness = with_robot(kit, HarnessOptions::default())?;
-    let busy = PlayScript {
-        ticks: BUSY,
-        ..PlayScript::usual(kit)
-    };
-    play(&mut harness, &busy, &mut Straight)?;
+    play(&mut harness, &busy(kit), &mut Straight)?;
     let [text, _] = kit.texts();
     // News of a tick that is never granted must not be taken for those of the next epoch.
     harness.put_news(&TickUpdate {
@@ -264,42 +260,60 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     )
 }
 
-/// A further epoch with another welcome: it goes through it as a process that has no other one. What differs is what differs between
-/// the epochs of a run, and the robot's own parameters, if it can work with others.
+/// A further epoch with another welcome: it goes through it as a process that has no other one. A person may load another scenario
+/// between two epochs, so that all of it differs.
 pub(super) fn other_welcome(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
-    let busy = PlayScript {
-        ticks: BUSY,
-        ..PlayScript::usual(kit)
-    };
-    let anew = |has_parameters| {
+    let busy = busy(kit);
+    let anew = |differs| {
         let mut harness = Harness::open_run(kit, HarnessOptions::default())?;
         harness.prepare()?;
-        differ(&mut harness.template, has_parameters);
+        differ(&mut harness.template, differs);
         harness.admit_first()?;
         play(&mut harness, &busy, &mut Straight)
     };
-    let (expected, has_parameters) = match anew(true) {
-        Ok(expected) => (expected, true),
-        // It refuses such parameters, as it may.
-        Err(_) => (anew(false)?, false),
+    // A robot may refuse such numbers.
+    let mut differs = Differing::All;
+    let expected = match anew(differs) {
+        Ok(expected) => expected,
+        Err(_) => {
+            differs = Differing::Start;
+            anew(differs)?
+        }
     };
 
     let mut harness = with_robot(kit, HarnessOptions::default())?;
     play(&mut harness, &busy, &mut Straight)?;
-    differ(&mut harness.template, has_parameters);
+    differ(&mut harness.template, differs);
     harness.begin_epoch(harness.epoch() + 1);
     let played = play(&mut harness, &busy, &mut Straight)?;
     let what = "to be welcomed in another way in the epoch before";
     demand_same(kit, what, &expected, &played)
 }
 
-/// Another seed, stream and place, and other numbers among the parameters.
-fn differ(welcome: &mut Welcome, has_parameters: bool) {
+/// How a welcome differs from that of the epoch before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Differing {
+    /// In seed, stream and place.
+    Start,
+    /// In the robot's parameters, the field and what is in it, and the length of a tick, too.
+    All,
+}
+
+fn differ(welcome: &mut Welcome, differs: Differing) {
     welcome.seed += 1;
     welcome.stream.push_str("#other");
     welcome.location.x += MOVED_M;
-    if has_parameters {
+    if differs == Differing::All {
         welcome.parameters.values_mut().for_each(shrink);
+        welcome.tick_s *= SHRUNK;
+        welcome.body_m *= SHRUNK;
+        welcome.sensing_range_m *= SHRUNK;
+        welcome.field_m[1] += MOVED_M;
+        welcome.known_sites.push(KnownSite {
+            name: "another site".to_owned(),
+            kind: "site".to_owned(),
+            location: welcome.location,
+        });
     }
 }
 
@@ -314,6 +328,33 @@ fn shrink(value: &mut Value) {
             }
         }
         _ => {}
+    }
+}
+
+/// A process that has joined again in an epoch goes through the next one as one that joins in that epoch in the place of another.
+pub(super) fn after_rejoining(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
+    let busy = busy(kit);
+    let mut anew = Harness::open_run(kit, HarnessOptions::default())?;
+    anew.prepare()?;
+    anew.play_predecessor(DRAWN)?;
+    anew.begin_epoch(anew.epoch() + 1);
+    anew.admit_first()?;
+    let expected = play(&mut anew, &busy, &mut Straight)?;
+
+    let rejoined = kit.of_part(KitPart::Rejoined);
+    let mut harness = with_robot(&rejoined, HarnessOptions::default())?;
+    play(&mut harness, &busy, &mut Straight)?;
+    harness.begin_epoch(harness.epoch() + 1);
+    let played = play(&mut harness, &busy, &mut Straight)?;
+    let what = "to have joined again in the epoch before, for one of the same generation";
+    demand_same(kit, what, &expected, &played)
+}
+
+/// Ticks of an epoch that is to leave nothing behind.
+fn busy(kit: &Kit) -> PlayScript {
+    PlayScript {
+        ticks: BUSY,
+        ..PlayScript::usual(kit)
     }
 }
 

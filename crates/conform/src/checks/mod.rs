@@ -17,6 +17,7 @@ mod tolerance;
 mod waiting;
 mod wire;
 
+use std::collections::BTreeMap;
 use std::process::Command;
 use std::sync::Mutex;
 use std::sync::PoisonError;
@@ -29,6 +30,7 @@ use harness::report::{
     AnswerTimes, CheckReport, KitPart, PlayedRun, RuleFailure, RuleOutcome, RuleVerdict,
 };
 use harness::rules::{self, ProtocolRule};
+use harness::script::{PlayScript, played};
 use harness::setting::CheckSetting;
 
 /// What a check does.
@@ -38,28 +40,32 @@ type RunCheck = fn(&Kit, &mut Findings) -> Result<(), RuleFailure>;
 struct Check {
     rules: &'static [&'static str],
     run: RunCheck,
-    /// Whether it is about a process as it starts, which has no epoch before.
-    is_of_start: bool,
+    /// The parts of the kit that it is of.
+    parts: &'static [KitPart],
 }
+
+/// The parts in which one thing happens at a time; what fails later counts only where nothing fails before.
+const PARTS: [KitPart; 3] = [KitPart::Alone, KitPart::LaterEpoch, KitPart::Rejoined];
 
 const fn rules(rules: &'static [&'static str], run: RunCheck) -> Check {
-    Check {
-        rules,
-        run,
-        is_of_start: false,
-    }
+    let parts = &PARTS;
+    Check { rules, run, parts }
 }
 
+/// A check of a process as it starts.
 const fn of_start(rules: &'static [&'static str], run: RunCheck) -> Check {
-    Check {
-        rules,
-        run,
-        is_of_start: true,
-    }
+    let parts = &[KitPart::Alone];
+    Check { rules, run, parts }
+}
+
+/// A check of what begins another epoch, or another incarnation.
+const fn of_epochs(rules: &'static [&'static str], run: RunCheck) -> Check {
+    let parts = &[KitPart::Alone, KitPart::LaterEpoch];
+    Check { rules, run, parts }
 }
 
 /// Checks that need nothing but the usual ticks before; those that take longest begin.
-const CHECKS: [Check; 41] = [
+const CHECKS: [Check; 42] = [
     of_start(&["join.refused"], joining::refused),
     rules(&["end.gone"], ends::gone_for_a_while),
     rules(&["end.gone"], ends::gone_forever),
@@ -75,13 +81,14 @@ const CHECKS: [Check; 41] = [
     rules(&["query.once"], queries::once),
     rules(&["end.clock"], ends::clock),
     rules(&["news.wait"], news::wait),
-    rules(&["epoch.init"], epochs::init),
-    rules(&["epoch.init"], epochs::other_welcome),
-    rules(&["epoch.init"], epochs::while_waiting),
-    rules(&["epoch.late"], epochs::late),
+    of_epochs(&["epoch.init"], epochs::init),
+    of_start(&["epoch.init"], epochs::after_rejoining),
+    of_epochs(&["epoch.init"], epochs::other_welcome),
+    of_epochs(&["epoch.init"], epochs::while_waiting),
+    of_epochs(&["epoch.late"], epochs::late),
     of_start(&["return.generation"], returns::generation),
     of_start(&["return.generation"], returns::commanded),
-    rules(&["return.rejoin"], returns::rejoin),
+    of_epochs(&["return.rejoin"], returns::rejoin),
     of_start(&["join.ready-last"], joining::ready_last),
     rules(
         &[
@@ -108,7 +115,7 @@ const CHECKS: [Check; 41] = [
     rules(&["robust.malformed"], tolerance::malformed),
     rules(&["wire.keys"], tolerance::commands_of_others),
     rules(&["tick.answer"], ticks::unasked),
-    rules(&["epoch.init", "determinism.seed"], epochs::streams),
+    of_epochs(&["epoch.init", "determinism.seed"], epochs::streams),
 ];
 
 /// Checks of programs that `cars exec` runs.
@@ -128,7 +135,7 @@ const PRESUMED: [(&str, &str); 9] = [
 ];
 
 /// Processes of the robot that run at the same time.
-const WORKERS: usize = 4;
+const WORKERS: usize = 8;
 
 /// Checks the robot that `command` starts: all rules, or those in `rules`. Tells how many checks are done, and of how many.
 ///
@@ -182,6 +189,15 @@ struct AllFindings {
     in_run: Option<PlayedRun>,
 }
 
+/// Plays the usual ticks in this part, for comparison.
+fn usual_again(kit: &Kit) -> Result<(), RuleFailure> {
+    let played = played(kit, &PlayScript::usual(kit))?;
+    if kit.usual().set(played).is_err() {
+        unreachable!("they are played once in each part");
+    }
+    Ok(())
+}
+
 /// Takes the robot through all checks that the wanted rules need.
 fn all(
     kit: &Kit,
@@ -210,15 +226,26 @@ fn all(
 
     let is_wanted =
         |rules: &[&str]| wanted.is_empty() || wanted.iter().any(|rule| rules.contains(&rule.name));
-    let later = kit.of_part(KitPart::LaterEpoch);
+    let kits = PARTS.map(|part| kit.of_part(part));
+    let mut found = BTreeMap::new();
     let mut due = Vec::new();
-    for check in CHECKS.iter().chain(&STDIO_CHECKS) {
-        if is_wanted(check.rules) {
-            due.push((check, kit));
-            if !check.is_of_start {
-                due.push((check, &later));
-            }
+    for kit in &kits {
+        // What a robot does that has joined again is compared with what it does then without any disturbance.
+        if kit.part() == KitPart::Rejoined
+            && let Err(failure) = usual_again(kit)
+        {
+            let mut own = Findings::default();
+            own.fail("return.rejoin", failure);
+            found.insert(kit.part(), own.of_part(kit.part()));
+            continue;
         }
+        let checks = CHECKS.iter().chain(&STDIO_CHECKS);
+        let of_part = checks.filter(|check| check.parts.contains(&kit.part()));
+        due.extend(
+            of_part
+                .filter(|check| is_wanted(check.rules))
+                .map(|check| (check, kit)),
+        );
     }
     // It waits most of the time, beside the other checks.
     let play_run = || {
@@ -228,7 +255,7 @@ fn all(
     };
     progress(0, due.len());
     let [next, done] = [0, 0].map(AtomicUsize::new);
-    let all = Mutex::new((findings, Findings::default()));
+    let found = Mutex::new(found);
     let work = || {
         while let Some((check, kit)) = due.get(next.fetch_add(1, Ordering::Relaxed)) {
             let mut own = Findings::default();
@@ -236,11 +263,12 @@ fn all(
             // Each check finds for itself, and is merged as a whole: the order in which they end
             // changes nothing.
             own.close(check.rules, end);
-            let (alone, later) = &mut *all.lock().unwrap_or_else(PoisonError::into_inner);
-            match kit.part() {
-                KitPart::LaterEpoch => later.merge(own.of_part(KitPart::LaterEpoch)),
-                KitPart::Alone | KitPart::InRun => alone.merge(own),
+            if kit.part() != KitPart::Alone {
+                own = own.of_part(kit.part());
             }
+            let mut found = found.lock().unwrap_or_else(PoisonError::into_inner);
+            found.entry(kit.part()).or_default().merge(own);
+            drop(found);
             progress(done.fetch_add(1, Ordering::Relaxed) + 1, due.len());
         }
     };
@@ -258,15 +286,15 @@ fn all(
         }
     });
 
-    let (mut findings, mut later) = all.into_inner().unwrap_or_else(PoisonError::into_inner);
-    later.presume(&PRESUMED);
     // A robot that breaks a rule alone breaks others by it later and in a run, where nothing is for itself.
-    for further in [later, found_in_run] {
+    let mut found = found.into_inner().unwrap_or_else(PoisonError::into_inner);
+    found.insert(KitPart::InRun, found_in_run);
+    for mut further in found.into_values() {
+        further.presume(&PRESUMED);
         if !findings.is_broken() {
             findings.merge(further);
         }
     }
-    findings.presume(&PRESUMED);
     stdio::judge(kit, &mut findings);
     Ok(AllFindings {
         verdicts: findings.0,

@@ -570,7 +570,9 @@ pub(super) fn once(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     }
     for other in harness.fake_peers.names() {
         let key = harness.keys.query(other, STATE);
-        let replies = kit.bus.get_all(&key, &of_tick_4(&harness), ALL_REPLIES)?;
+        let replies = kit
+            .bus
+            .get_all(&key, &of_next_tick(&harness), ALL_REPLIES)?;
         if replies.len() > 1 {
             let expected = format!("no reply of its own to a query of {other}");
             return Err(RuleFailure::new(
@@ -582,9 +584,9 @@ pub(super) fn once(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     Ok(())
 }
 
-/// The parameters of a query in tick 4.
-fn of_tick_4(harness: &Harness<'_>) -> String {
-    format!("tick=4;epoch={}", harness.epoch())
+/// The parameters of a query in the next tick.
+fn of_next_tick(harness: &Harness<'_>) -> String {
+    format!("tick={};epoch={}", harness.next_tick(), harness.epoch())
 }
 
 /// One reply, and the end of the query with it: a query that is not released takes all the time that the kit has.
@@ -599,7 +601,7 @@ fn demand_one_reply(
     let replies = harness
         .kit
         .bus
-        .get_all(&key, &of_tick_4(harness), patience)?;
+        .get_all(&key, &of_next_tick(harness), patience)?;
     let took = begun.elapsed();
 
     if replies.len() != 1 {
@@ -628,7 +630,7 @@ fn demand_own_key(
     let replies = harness
         .kit
         .bus
-        .get_all(&asked, &of_tick_4(harness), patience)?;
+        .get_all(&asked, &of_next_tick(harness), patience)?;
 
     if replies.iter().filter(|reply| reply.key == own).count() == 1 {
         return Ok(());

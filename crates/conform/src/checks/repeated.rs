@@ -18,6 +18,9 @@ use harness::{Harness, HarnessOptions};
 
 /// One clock in so many comes again, and each whose tick had commands.
 const EVERY: Tick = 3;
+/// One in so many comes so often.
+const MORE_EVERY: Tick = 12;
+const TIMES: usize = 3;
 /// How long a robot may still send what belongs to the tick itself.
 const BEFORE_REPEATING: Duration = Duration::from_millis(50);
 /// How long the commands may take that should have come before the report that is there.
@@ -40,7 +43,15 @@ pub(super) fn duplicate(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> 
             if entry.tick.is_multiple_of(EVERY) || !entry.commands.is_empty() {
                 // An observer may have come since, or be gone.
                 harness.shows_panels = !harness.shows_panels;
-                repeat(harness, entry)?;
+                // It may come more than once.
+                let times = if entry.tick.is_multiple_of(MORE_EVERY) {
+                    TIMES
+                } else {
+                    1
+                };
+                for _ in 0..times {
+                    repeat(harness, entry)?;
+                }
             }
             Ok(())
         }
@@ -59,7 +70,7 @@ pub(super) fn duplicate(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> 
 }
 
 /// Repeats the clock of a tick, and waits for its report and its commands.
-fn repeat(harness: &mut Harness<'_>, entry: &PlayedTick) -> Result<(), RuleFailure> {
+pub(super) fn repeat(harness: &mut Harness<'_>, entry: &PlayedTick) -> Result<(), RuleFailure> {
     // A robot that reports twice by itself breaks another rule: what it still sends is not the repetition.
     harness.pass(BEFORE_REPEATING);
     // What comes from here on follows the repetition.

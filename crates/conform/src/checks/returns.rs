@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use protocol::messages::{Clock, Correction, TickUpdate};
+use protocol::messages::{Clock, Correction, Refusal, TickUpdate};
 use protocol::{Generation, Tick};
 
 use harness::comparison::{demand_same, is_same};
@@ -15,11 +15,13 @@ use harness::script::{
     ArrivingCommand, PlayScript, Straight, inherit, play, played, step, usual, with_robot,
 };
 use harness::transcript::PlayedTick;
-use harness::{Harness, HarnessOptions};
+use harness::{Harness, HarnessOptions, Joining};
 
 /// The last tick of the predecessor.
 const LAST: Tick = 8;
 const GENERATION: Generation = 2;
+/// How many requests of a robot that joins again have no answer.
+const UNANSWERED: usize = 4;
 /// Ticks that a further incarnation is played.
 const TICKS: Tick = 5;
 /// Streams of a further incarnation, of which a robot cannot know the names.
@@ -47,6 +49,13 @@ fn returned<'k>(
         stream.clone_into(&mut harness.template.stream);
     }
     harness.admit_first()?;
+    Ok(harness)
+}
+
+/// A further incarnation that waits for the news that name it.
+pub(super) fn returned_once(kit: &Kit) -> Result<Harness<'_>, RuleFailure> {
+    let mut harness = returned(kit, &[LAST], first_ticks(kit)?, None)?;
+    harness.settle(QUIET);
     Ok(harness)
 }
 
@@ -161,15 +170,36 @@ pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         demand_same(kit, "to join again instead of a new process", &anew, &again)?;
         reported = again;
     }
-    Ok(())
+
+    // It is lost again before it had its turn.
+    join_again(&mut harness)?;
+    join_again(&mut harness)?;
+    let again = play(&mut harness, &PlayScript::quiet(1), &mut Straight)?;
+    demand_generation(&again, harness.generation())
 }
 
-/// The robot misses a tick, its news ask it to join again, and it does, as the process that it is.
+/// The robot misses a tick, its news ask it to join again, and it does, as the process that it is, also where the first requests have
+/// no answer.
 fn join_again(harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
+    harness.keeps_requests = true;
     harness.miss()?;
-    let generation = harness.generation();
     harness.open(&TickUpdate::default())?;
-    harness.until_rejoined(generation)?;
+    for _ in 0..UNANSWERED {
+        let unanswered = next_request(harness)?;
+        drop(unanswered);
+    }
+    let joining = next_request(harness)?;
+    // That may become its own: only the answer decides whether it has been replaced.
+    harness.put_news(&TickUpdate {
+        epoch: harness.epoch(),
+        tick: harness.next_tick(),
+        joined: Some(harness.generation() + 1),
+        correction: Some(harness.body.confirmed()),
+        ..TickUpdate::default()
+    })?;
+    harness.settle(QUIET);
+    harness.admit(joining);
+    harness.keeps_requests = false;
 
     let mut instances = Vec::new();
     for request in harness.seen.requests.iter().flatten() {
@@ -181,6 +211,37 @@ fn join_again(harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
         return Err(RuleFailure::new("the same instance in all requests", came));
     }
     Ok(())
+}
+
+/// The next request of a robot that is to join again.
+fn next_request(harness: &mut Harness<'_>) -> Result<Joining, RuleFailure> {
+    let news = TickUpdate {
+        rejoin: Some(harness.generation()),
+        ..harness.open_news()
+    };
+    harness.until_put(
+        "another request to join when its news have its generation as `rejoin`",
+        PATIENCE,
+        |harness| harness.put_news(&news),
+        Harness::take_join,
+    )
+}
+
+/// A robot that is to join again, and whose place is taken meanwhile, has been replaced.
+fn demand_place_taken(kit: &Kit) -> Result<(), RuleFailure> {
+    let mut harness = with_robot(kit, HarnessOptions::default())?;
+    play(&mut harness, &PlayScript::quiet(3), &mut Straight)?;
+    harness.keeps_requests = true;
+    harness.miss()?;
+    harness.open(&TickUpdate::default())?;
+    let joining = next_request(&mut harness)?;
+    harness.refuse_join(joining, Refusal::NameTaken, "another process is this robot");
+    let expected = "its process ends, with an exit status other than 0, when its place is taken as it joins again";
+    let status = harness.until_ended(expected, PATIENCE)?;
+    if status.success() {
+        return Err(RuleFailure::new(expected, format!("{status}")));
+    }
+    harness.until_gone()
 }
 
 /// A further incarnation executes commands as the first one does, from the news on that name it.
@@ -253,6 +314,7 @@ pub(super) fn demand_streams(kit: &Kit, findings: &mut Findings) -> Result<(), R
 
 /// News that name a later incarnation: this one ends.
 pub(super) fn replaced(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
+    demand_place_taken(kit)?;
     let mut harness = with_robot(kit, HarnessOptions::default())?;
     play(&mut harness, &PlayScript::quiet(3), &mut Straight)?;
     let tick = harness.next_tick();

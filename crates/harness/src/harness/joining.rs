@@ -105,11 +105,14 @@ impl Harness<'_> {
         self.play(&subject, OWN_INSTANCE);
     }
 
+    /// The oldest request to join that is queued.
+    pub fn take_join(&mut self) -> Option<Joining> {
+        self.joins.pop_front()
+    }
+
     /// The next request to join.
     pub fn next_join(&mut self, patience: Duration) -> Result<Joining, RuleFailure> {
-        self.until("a request to join", patience, |harness| {
-            harness.joins.pop_front()
-        })
+        self.until("a request to join", patience, Self::take_join)
     }
 
     /// Admits the robot, and waits until its token is declared. From now on its requests are answered as they come.
