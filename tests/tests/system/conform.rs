@@ -168,7 +168,7 @@ fn the_robots_of_the_project_conform_with_default_parameters() {
 }
 
 /// Further ways to break a rule, after the one that is named like the rule.
-const OTHERWISE: [&str; 117] = [
+const OTHERWISE: [&str; 127] = [
     "command.twice:hundred",
     "command.payload:ascii",
     "return.generation:placed",
@@ -286,6 +286,16 @@ const OTHERWISE: [&str; 117] = [
     "return.generation:deaf",
     "command.order:many",
     "query.asking:first",
+    "query.asking:some",
+    "end.gone:second",
+    "clock.duplicate:twice",
+    "end.clock:unnamed",
+    "return.rejoin:unnamed",
+    "return.rejoin:three",
+    "return.replaced:taken",
+    "epoch.init:rejoined",
+    "epoch.init:field",
+    "command.order:again",
 ];
 
 /// Further ways that are about how a message is written or put.
@@ -310,7 +320,7 @@ const OTHERWISE_ON_THE_WIRE: [&str; 17] = [
 ];
 
 /// How many kits run at the same time: their robots mostly wait.
-const KITS: usize = 5;
+const KITS: usize = 3;
 
 /// The rule that a robot breaks, from the way in which it does.
 fn rule_of(how: &str) -> &str {

@@ -19,9 +19,8 @@ mod wire;
 
 use std::collections::BTreeMap;
 use std::process::Command;
-use std::sync::Mutex;
-use std::sync::PoisonError;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread::Builder;
 
 use harness::findings::{Findings, VerdictsByRule};
@@ -121,7 +120,7 @@ const CHECKS: [Check; 42] = [
 /// Checks of programs that `cars exec` runs.
 const STDIO_CHECKS: [Check; 1] = [of_start(&[rules::STDIO_END], stdio::end)];
 /// Rules whose checks presume that the robot keeps another one: without it they show nothing.
-const PRESUMED: [(&str, &str); 9] = [
+const PRESUMED: [(&str, &str); 11] = [
     // On a loaded machine a clock may come again in any check.
     ("news.wait", "clock.duplicate"),
     ("epoch.late", "clock.duplicate"),
@@ -129,6 +128,8 @@ const PRESUMED: [(&str, &str); 9] = [
     ("command.order", "operator.commands"),
     ("epoch.init", "clock.duplicate"),
     ("epoch.init", "tick.initial"),
+    ("epoch.init", "return.rejoin"),
+    ("return.replaced", "return.rejoin"),
     ("tick.newest", "news.wait"),
     ("query.reply", "news.wait"),
     ("query.reply", "query.again"),
@@ -189,6 +190,75 @@ struct AllFindings {
     in_run: Option<PlayedRun>,
 }
 
+/// The checks that are due, each with the kit of its part, and what they found.
+struct Checks<'k> {
+    alone: Vec<(&'k Check, &'k Kit)>,
+    later: Vec<(&'k Check, &'k Kit)>,
+    /// In each part, in the order in which it counts.
+    found: Mutex<BTreeMap<KitPart, Findings>>,
+    done: AtomicUsize,
+    progress: &'k (dyn Fn(usize, usize) + Sync),
+}
+
+impl Checks<'_> {
+    /// What fails later would not count where something fails before, and takes as long again.
+    fn play_all(&self, kits: &[Kit]) {
+        self.play(&self.alone);
+        let is_broken = self.found().values().any(Findings::is_broken);
+        if is_broken || self.later.is_empty() {
+            return;
+        }
+
+        // What a robot does that has joined again is compared with what it does then without any disturbance.
+        for kit in kits.iter().filter(|kit| kit.part() == KitPart::Rejoined) {
+            if let Err(failure) = usual_again(kit) {
+                return self.add(kit, &["return.rejoin"], Findings::default(), Err(failure));
+            }
+        }
+        self.play(&self.later);
+    }
+
+    /// Takes the robot through checks side by side.
+    fn play(&self, due: &[(&Check, &Kit)]) {
+        let next = AtomicUsize::new(0);
+        let work = || {
+            while let Some((check, kit)) = due.get(next.fetch_add(1, Ordering::Relaxed)) {
+                let mut own = Findings::default();
+                let end = (check.run)(kit, &mut own);
+                self.add(kit, check.rules, own, end);
+                let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
+                (self.progress)(done, self.alone.len() + self.later.len());
+            }
+        };
+        std::thread::scope(|scope| {
+            // This thread is a worker, too, so the checks are made even if the system starts no other one.
+            for _ in 1..WORKERS {
+                let _fewer_at_once = Builder::new().spawn_scoped(scope, work);
+            }
+            work();
+        });
+    }
+
+    /// Each check finds for itself, and is merged as a whole: the order in which they end changes nothing.
+    fn add(
+        &self,
+        kit: &Kit,
+        rules: &[&'static str],
+        mut own: Findings,
+        end: Result<(), RuleFailure>,
+    ) {
+        own.close(rules, end);
+        if kit.part() != KitPart::Alone {
+            own = own.of_part(kit.part());
+        }
+        self.found().entry(kit.part()).or_default().merge(own);
+    }
+
+    fn found(&self) -> MutexGuard<'_, BTreeMap<KitPart, Findings>> {
+        self.found.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
 /// Plays the usual ticks in this part, for comparison.
 fn usual_again(kit: &Kit) -> Result<(), RuleFailure> {
     let played = played(kit, &PlayScript::usual(kit))?;
@@ -227,25 +297,25 @@ fn all(
     let is_wanted =
         |rules: &[&str]| wanted.is_empty() || wanted.iter().any(|rule| rules.contains(&rule.name));
     let kits = PARTS.map(|part| kit.of_part(part));
-    let mut found = BTreeMap::new();
-    let mut due = Vec::new();
+    let mut checks = Checks {
+        alone: Vec::new(),
+        later: Vec::new(),
+        found: Mutex::default(),
+        done: AtomicUsize::new(0),
+        progress,
+    };
     for kit in &kits {
-        // What a robot does that has joined again is compared with what it does then without any disturbance.
-        if kit.part() == KitPart::Rejoined
-            && let Err(failure) = usual_again(kit)
-        {
-            let mut own = Findings::default();
-            own.fail("return.rejoin", failure);
-            found.insert(kit.part(), own.of_part(kit.part()));
-            continue;
+        for check in CHECKS.iter().chain(&STDIO_CHECKS) {
+            if check.parts.contains(&kit.part()) && is_wanted(check.rules) {
+                let is_alone = kit.part() == KitPart::Alone;
+                let due = if is_alone {
+                    &mut checks.alone
+                } else {
+                    &mut checks.later
+                };
+                due.push((check, kit));
+            }
         }
-        let checks = CHECKS.iter().chain(&STDIO_CHECKS);
-        let of_part = checks.filter(|check| check.parts.contains(&kit.part()));
-        due.extend(
-            of_part
-                .filter(|check| is_wanted(check.rules))
-                .map(|check| (check, kit)),
-        );
     }
     // It waits most of the time, beside the other checks.
     let play_run = || {
@@ -253,32 +323,9 @@ fn all(
         let run = is_wanted(&run::RULES).then(|| run::check(kit, &mut own));
         (run, own)
     };
-    progress(0, due.len());
-    let [next, done] = [0, 0].map(AtomicUsize::new);
-    let found = Mutex::new(found);
-    let work = || {
-        while let Some((check, kit)) = due.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let mut own = Findings::default();
-            let end = (check.run)(kit, &mut own);
-            // Each check finds for itself, and is merged as a whole: the order in which they end
-            // changes nothing.
-            own.close(check.rules, end);
-            if kit.part() != KitPart::Alone {
-                own = own.of_part(kit.part());
-            }
-            let mut found = found.lock().unwrap_or_else(PoisonError::into_inner);
-            found.entry(kit.part()).or_default().merge(own);
-            drop(found);
-            progress(done.fetch_add(1, Ordering::Relaxed) + 1, due.len());
-        }
-    };
     let (in_run, found_in_run) = std::thread::scope(|scope| {
         let run = Builder::new().spawn_scoped(scope, play_run);
-        // This thread is a worker, too, so the checks are made even if the system starts no other one.
-        for _ in 1..WORKERS {
-            let _fewer_at_once = Builder::new().spawn_scoped(scope, work);
-        }
-        work();
+        checks.play_all(&kits);
         match run.map(std::thread::ScopedJoinHandle::join) {
             Ok(Ok(run)) => run,
             Ok(Err(panic)) => std::panic::resume_unwind(panic),
@@ -287,7 +334,8 @@ fn all(
     });
 
     // A robot that breaks a rule alone breaks others by it later and in a run, where nothing is for itself.
-    let mut found = found.into_inner().unwrap_or_else(PoisonError::into_inner);
+    let found = checks.found.into_inner();
+    let mut found = found.unwrap_or_else(PoisonError::into_inner);
     found.insert(KitPart::InRun, found_in_run);
     for mut further in found.into_values() {
         further.presume(&PRESUMED);

@@ -12,6 +12,8 @@ use crate::walker::Walker;
 
 /// After so many epochs it ends, if it is to.
 const MAX_EPOCHS: Epoch = 10;
+/// After so many requests without an answer it ends, if it is to.
+const MAX_UNANSWERED: usize = 3;
 /// Delay of a declaration that is made too late.
 const LATE: Duration = Duration::from_millis(1500);
 
@@ -108,6 +110,10 @@ impl Host {
         if is_new {
             self.last_clock = clock;
         }
+        self.repetitions = if is_new { 0 } else { self.repetitions + 1 };
+        if self.repetitions > 1 && self.wrong.is("clock.duplicate:twice") {
+            return Ok(());
+        }
         if !is_new && clock.panels && self.wrong.is("clock.duplicate:panels") {
             return Ok(());
         }
@@ -133,7 +139,8 @@ impl Host {
             Some(End::Stopped) if self.wrong.is("end.clock:stopped") => true,
             Some(End::Aborted) if self.wrong.is("end.clock:aborted") => true,
             Some(_) => {
-                self.wrong.is("end.clock:news") && self.shared.is_in(Phase::AwaitingNews)
+                self.wrong.is("end.clock:unnamed") && self.welcome.is_some() && !self.has_begun
+                    || self.wrong.is("end.clock:news") && self.shared.is_in(Phase::AwaitingNews)
                     || self.wrong.is("end.clock:answer") && self.shared.is_in(Phase::Asking)
             }
         }
@@ -169,6 +176,7 @@ impl Host {
         }
         if self.wrong.is("return.rejoin")
             || self.wrong.is("return.rejoin:once") && news.rejoin.is_some_and(|of| of > 1)
+            || self.wrong.is("return.rejoin:unnamed") && !self.has_begun
         {
             news.rejoin = None;
         }
@@ -233,7 +241,18 @@ impl Host {
         let reply = self.bus.get(&key, "", Some(encode(&request)))?;
         let bytes = reply.and_then(|reply| reply.result.ok());
         match bytes.and_then(|bytes| self.wrong.read(&key, &bytes)) {
-            None => self.drive(lockstep::Participant::unanswered),
+            None => {
+                self.unanswered += usize::from(is_again);
+                if self.unanswered >= MAX_UNANSWERED && self.wrong.is("return.rejoin:three") {
+                    self.leave = Some(Leave::Stopped);
+                }
+                self.drive(lockstep::Participant::unanswered)
+            }
+            Some(JoinAnswer::Refused { .. })
+                if is_again && self.wrong.is("return.replaced:taken") =>
+            {
+                self.drive(lockstep::Participant::unanswered)
+            }
             Some(JoinAnswer::Refused {
                 reason,
                 explanation,
@@ -264,6 +283,7 @@ impl Host {
         let admission = Admission::from(&welcome);
         let before = self.welcome.as_ref().map(Admission::from);
         if before.is_some_and(|before| before != admission) {
+            self.has_rejoined |= before.is_some_and(|before| before.epoch == admission.epoch);
             self.has_begun = false;
             self.queued.clear();
             // The news that it waited for are those of a tick that it forgets.

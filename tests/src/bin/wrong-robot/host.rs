@@ -85,6 +85,14 @@ pub(crate) struct Host {
     gone: Option<Instant>,
     /// Whether it has had no answer to its query, if it is to give up then.
     pub(crate) has_given_up: bool,
+    /// How often the simulator was gone.
+    losses: usize,
+    /// How often the last clock came again.
+    pub(crate) repetitions: usize,
+    /// How many requests to join had no answer.
+    pub(crate) unanswered: usize,
+    /// Whether it was welcomed again in the same epoch.
+    pub(crate) has_rejoined: bool,
     /// How often it has queried again.
     queries: usize,
     /// Whether the queryables are still to be declared.
@@ -156,6 +164,10 @@ impl Host {
             newest: None,
             gone: None,
             has_given_up: false,
+            losses: 0,
+            repetitions: 0,
+            unanswered: 0,
+            has_rejoined: false,
             queries: 0,
             is_unserved: false,
         };
@@ -398,6 +410,10 @@ impl Host {
             Event::Clock(clock) => self.on_clock(clock),
             Event::News(news) => self.on_news(*news),
             Event::Simulator(is_present) => {
+                self.losses += usize::from(!is_present);
+                if self.losses > 1 && self.wrong.is("end.gone:second") {
+                    return Ok(());
+                }
                 if !is_present && self.wrong.is("end.gone:hasty") {
                     self.leave.get_or_insert(Leave::SimulatorGone);
                 }

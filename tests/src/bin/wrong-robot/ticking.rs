@@ -98,8 +98,14 @@ impl Host {
 
         let mut walker = Walker::new(welcome, &self.wrong);
         if let Some(before) = self.walker.take() {
-            if self.wrong.is("epoch.init:random") {
+            let is_mixed = self.has_rejoined && welcome.epoch > 1;
+            if self.wrong.is("epoch.init:random")
+                || is_mixed && self.wrong.is("epoch.init:rejoined")
+            {
                 walker.random = before.random;
+            }
+            if self.wrong.is("epoch.init:field") {
+                walker.height_m = before.height_m;
             }
             if self.wrong.is("epoch.init:parameters") {
                 walker.step_m = before.step_m;
@@ -156,6 +162,13 @@ impl Host {
         if wrong.is("command.order:many") && deliveries.len() > HUNDRED {
             // Of many only those that are like the first.
             deliveries.dedup_by(|next, one| next.command != one.command);
+        }
+        if let [one, other, again] = &deliveries[..]
+            && wrong.is("command.order:again")
+            && one.command == again.command
+            && one.command != other.command
+        {
+            deliveries.pop();
         }
         if wrong.is("return.generation:deaf") && news.joined.is_some() {
             deliveries.clear();
@@ -258,6 +271,7 @@ impl Host {
         let mut state_variables: StateVariables = [
             ("received".to_owned(), Variable::from(walker.received)),
             ("last".to_owned(), Variable::from(walker.last.clone())),
+            ("height_m".to_owned(), Variable::from(walker.height_m)),
         ]
         .into();
         if let Some(seen) = seen {
@@ -345,8 +359,9 @@ impl Host {
         is_awake: bool,
     ) -> Result<Option<Point>, Failure> {
         let mut others = welcome.roster.iter().filter(|name| **name != self.name);
-        let heeds_first = self.wrong.is("query.asking:first");
-        let other = if heeds_first {
+        let takes_first = self.wrong.is("query.asking:first");
+        let takes_some = self.wrong.is("query.asking:some");
+        let other = if takes_first || takes_some {
             others.next_back()
         } else {
             others.next()
@@ -362,8 +377,16 @@ impl Host {
             return Ok(None);
         }
         let mut is_unreachable = !news.can_query(&other);
-        if heeds_first && news.in_range.is_none() {
+        if takes_first && news.in_range.is_none() {
             is_unreachable = news.unreachable.first() == Some(&other);
+        }
+        if takes_some
+            && news
+                .in_range
+                .as_ref()
+                .is_some_and(|names| !names.is_empty())
+        {
+            is_unreachable = false;
         }
         // The participant does not know of a tick that is run a second time.
         let is_running = self.shared.is_in(Phase::Computing);

@@ -16,6 +16,8 @@ pub(crate) struct Walker {
     pub(crate) proposal: Point,
     /// Side of the square in which a step ends, meters.
     pub(crate) step_m: f64,
+    /// Height of the field, meters.
+    pub(crate) height_m: f64,
     pub(crate) received: u32,
     pub(crate) sent: u32,
     pub(crate) last: String,
@@ -53,6 +55,7 @@ impl Walker {
             at: welcome.location,
             proposal: welcome.location,
             step_m: step_m.unwrap_or(STEP_M),
+            height_m: welcome.field_m[1],
             received: 0,
             sent: 0,
             last: String::new(),
