@@ -12,7 +12,7 @@ use harness::comparison::{PlayDifference, demand_same, difference};
 use harness::findings::Findings;
 use harness::kit::Kit;
 use harness::patience::PATIENCE;
-use harness::report::{KitPart, RuleFailure};
+use harness::report::RuleFailure;
 use harness::script::{
     ArrivingCommand, Disturbance, PlayScript, Straight, play, usual, with_robot,
 };
@@ -25,6 +25,8 @@ const QUIET: Duration = Duration::from_millis(300);
 const LATER: Epoch = 4;
 /// Ticks of an epoch that is to leave nothing behind, commands among them; in the last one the robot's move is refused.
 const BUSY: Tick = 25;
+/// So many ticks after it have news, and no clock.
+const NEVER_GRANTED: Tick = 4;
 /// So many streams and seeds are tried, for so many ticks each.
 const DRAWS: u64 = 16;
 const DRAWN: Tick = 12;
@@ -236,13 +238,15 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     let mut harness = with_robot(kit, HarnessOptions::default())?;
     play(&mut harness, &busy(kit), &mut Straight)?;
     let [text, _] = kit.texts();
-    // News of a tick that is never granted must not be taken for those of the next epoch.
-    harness.put_news(&TickUpdate {
-        epoch: harness.epoch(),
-        tick: harness.next_tick(),
-        commands: vec![ArrivingCommand::new(&kit.sender(), &text, harness.next_tick()).delivery()],
-        ..TickUpdate::default()
-    })?;
+    // News of ticks that are never granted must not be taken for those of the next epoch.
+    for tick in harness.next_tick()..harness.next_tick() + NEVER_GRANTED {
+        harness.put_news(&TickUpdate {
+            epoch: harness.epoch(),
+            tick,
+            commands: vec![ArrivingCommand::new(&kit.sender(), &text, tick).delivery()],
+            ..TickUpdate::default()
+        })?;
+    }
 
     harness.begin_epoch(harness.epoch() + 1);
     harness.keeps_requests = true;
@@ -341,8 +345,7 @@ pub(super) fn after_rejoining(kit: &Kit, _: &mut Findings) -> Result<(), RuleFai
     anew.admit_first()?;
     let expected = play(&mut anew, &busy, &mut Straight)?;
 
-    let rejoined = kit.of_part(KitPart::Rejoined);
-    let mut harness = with_robot(&rejoined, HarnessOptions::default())?;
+    let mut harness = with_robot(kit, HarnessOptions::default())?;
     play(&mut harness, &busy, &mut Straight)?;
     harness.begin_epoch(harness.epoch() + 1);
     let played = play(&mut harness, &busy, &mut Straight)?;

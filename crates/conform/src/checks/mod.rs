@@ -23,13 +23,14 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread::Builder;
 
+use harness::HarnessOptions;
 use harness::findings::{Findings, VerdictsByRule};
 use harness::kit::{CannotRun, Kit};
 use harness::report::{
     AnswerTimes, CheckReport, KitPart, PlayedRun, RuleFailure, RuleOutcome, RuleVerdict,
 };
 use harness::rules::{self, ProtocolRule};
-use harness::script::{PlayScript, played};
+use harness::script::{PlayScript, Straight, play, with_robot};
 use harness::setting::CheckSetting;
 
 /// What a check does.
@@ -57,6 +58,12 @@ const fn of_start(rules: &'static [&'static str], run: RunCheck) -> Check {
     Check { rules, run, parts }
 }
 
+/// A check of a process that has joined again.
+const fn of_return(rules: &'static [&'static str], run: RunCheck) -> Check {
+    let parts = &[KitPart::Rejoined];
+    Check { rules, run, parts }
+}
+
 /// A check of what begins another epoch, or another incarnation.
 const fn of_epochs(rules: &'static [&'static str], run: RunCheck) -> Check {
     let parts = &[KitPart::Alone, KitPart::LaterEpoch];
@@ -81,7 +88,7 @@ const CHECKS: [Check; 42] = [
     rules(&["end.clock"], ends::clock),
     rules(&["news.wait"], news::wait),
     of_epochs(&["epoch.init"], epochs::init),
-    of_start(&["epoch.init"], epochs::after_rejoining),
+    of_return(&["epoch.init"], epochs::after_rejoining),
     of_epochs(&["epoch.init"], epochs::other_welcome),
     of_epochs(&["epoch.init"], epochs::while_waiting),
     of_epochs(&["epoch.late"], epochs::late),
@@ -120,11 +127,14 @@ const CHECKS: [Check; 42] = [
 /// Checks of programs that `cars exec` runs.
 const STDIO_CHECKS: [Check; 1] = [of_start(&[rules::STDIO_END], stdio::end)];
 /// Rules whose checks presume that the robot keeps another one: without it they show nothing.
-const PRESUMED: [(&str, &str); 11] = [
+const PRESUMED: [(&str, &str); 14] = [
     // On a loaded machine a clock may come again in any check.
     ("news.wait", "clock.duplicate"),
     ("epoch.late", "clock.duplicate"),
     ("query.reply", "clock.duplicate"),
+    ("command.order", "command.payload"),
+    ("operator.commands", "command.payload"),
+    ("end.gone", "clock.duplicate"),
     ("command.order", "operator.commands"),
     ("epoch.init", "clock.duplicate"),
     ("epoch.init", "tick.initial"),
@@ -211,8 +221,8 @@ impl Checks<'_> {
 
         // What a robot does that has joined again is compared with what it does then without any disturbance.
         for kit in kits.iter().filter(|kit| kit.part() == KitPart::Rejoined) {
-            if let Err(failure) = usual_again(kit) {
-                return self.add(kit, &["return.rejoin"], Findings::default(), Err(failure));
+            if let Err((rule, failure)) = usual_again(kit) {
+                return self.add(kit, &[rule], Findings::default(), Err(failure));
             }
         }
         self.play(&self.later);
@@ -259,13 +269,18 @@ impl Checks<'_> {
     }
 }
 
-/// Plays the usual ticks in this part, for comparison.
-fn usual_again(kit: &Kit) -> Result<(), RuleFailure> {
-    let played = played(kit, &PlayScript::usual(kit))?;
-    if kit.usual().set(played).is_err() {
-        unreachable!("they are played once in each part");
+/// Plays the usual ticks in this part, for comparison. Returns the rule that keeps the robot from getting through them.
+fn usual_again(kit: &Kit) -> Result<(), (&'static str, RuleFailure)> {
+    let options = HarnessOptions::default();
+    let mut harness = with_robot(kit, options).map_err(|failure| ("return.rejoin", failure))?;
+    match play(&mut harness, &PlayScript::usual(kit), &mut Straight) {
+        Ok(played) => match kit.usual().set(played) {
+            Ok(()) => Ok(()),
+            Err(_) => unreachable!("they are played once in each part"),
+        },
+        Err(failure) if harness.has_wrong_commands() => Err(("command.sent", failure)),
+        Err(failure) => Err(("return.rejoin", failure)),
     }
-    Ok(())
 }
 
 /// Takes the robot through all checks that the wanted rules need.

@@ -173,9 +173,18 @@ pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
 
     // It is lost again before it had its turn.
     join_again(&mut harness)?;
+    let lost = harness.generation();
     join_again(&mut harness)?;
     let again = play(&mut harness, &PlayScript::quiet(1), &mut Straight)?;
-    demand_generation(&again, harness.generation())
+    demand_generation(&again, harness.generation())?;
+    let mut answers = harness.seen.answers.iter();
+    match answers.find(|answer| answer.reading.report.generation == lost) {
+        None => Ok(()),
+        Some(answer) => Err(RuleFailure::new(
+            "no report for news that name its generation as `joined` and as `rejoin`",
+            format!("one for tick {}", answer.reading.report.tick),
+        )),
+    }
 }
 
 /// The robot misses a tick, its news ask it to join again, and it does, as the process that it is, also where the first requests have

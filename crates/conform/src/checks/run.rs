@@ -261,9 +261,7 @@ fn played(kit: &Kit, is_disturbed: bool) -> Result<(Transcript, Findings), Broke
         match played_tick(&mut harness, &script, &mut play, &transcript) {
             Ok(entry) => transcript.push(entry),
             Err(failure) => {
-                let has_wrong_commands =
-                    harness.incomplete().is_some() || harness.misstamped().is_some();
-                let rule = if has_wrong_commands {
+                let rule = if harness.has_wrong_commands() {
                     "command.sent"
                 } else if is_disturbed {
                     rule_of(tick)

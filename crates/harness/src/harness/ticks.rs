@@ -242,8 +242,13 @@ impl Harness<'_> {
         ))
     }
 
+    /// Whether the commands of the open tick are not those that the report states, or not of the robot's generation.
+    pub fn has_wrong_commands(&self) -> bool {
+        self.incomplete().is_some() || self.misstamped().is_some()
+    }
+
     /// A command of the open tick that has another generation than the robot, in words.
-    pub fn misstamped(&self) -> Option<String> {
+    fn misstamped(&self) -> Option<String> {
         let generation = self.generation();
         let at = (self.epoch, self.next.saturating_sub(1));
         self.seen

@@ -176,7 +176,6 @@ impl Host {
         }
         if self.wrong.is("return.rejoin")
             || self.wrong.is("return.rejoin:once") && news.rejoin.is_some_and(|of| of > 1)
-            || self.wrong.is("return.rejoin:unnamed") && !self.has_begun
         {
             news.rejoin = None;
         }

@@ -100,7 +100,7 @@ impl Host {
         if let Some(before) = self.walker.take() {
             let is_mixed = self.has_rejoined && welcome.epoch > 1;
             if self.wrong.is("epoch.init:random")
-                || is_mixed && self.wrong.is("epoch.init:rejoined")
+                || is_mixed && self.wrong.is("return.rejoin:later")
             {
                 walker.random = before.random;
             }
