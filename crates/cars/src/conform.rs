@@ -22,8 +22,9 @@ const SPIN: Duration = Duration::from_millis(100);
 
 /// `cars conform`.
 ///
-/// Starts the robot COMMAND several times, acts as its simulator, and checks the rules of docs/protocol.md one by one. A second
-/// part, "in a run", takes it through a run of three robots with all that happens to a robot there; failures say in which part they were seen.
+/// Starts the robot COMMAND several times, acts as its simulator, and checks the rules of docs/protocol.md one by one: alone, and where
+/// nothing fails in a later epoch of the process, after it has joined again, and in a run of three robots with all that happens to a
+/// robot there. Failures say in which of these parts they were seen.
 /// Exit status: 0 all passed, 1 some failed, 2 nothing could be checked.
 #[derive(Debug, Args)]
 pub(crate) struct ConformArgs {

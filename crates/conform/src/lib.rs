@@ -9,8 +9,9 @@
 //! messages, or while they withhold what the robot waits for; a late answer counts only if it is late in each of several
 //! repetitions and the kit's own queryable replies in time (`harness/src/patience.rs`, `checks/computing.rs`).
 //!
-//! A second part (`checks/run.rs`) plays a run of at least three robots, in which all of it happens: it finds what shows only
-//! there. Its failures count where no rule is broken alone, and say that they are of that part.
+//! What holds for a process that begins must hold later, too: the same checks are made in its second epoch, and after it has joined again.
+//! A last part (`checks/run.rs`) plays a run of at least three robots, in which all of it happens. Failures of these parts count where no
+//! rule is broken before, and say in which part they were seen.
 //!
 //! Much of the contract is about what must *not* make a difference: a repeated clock, an unknown field, news that come
 //! late. Such a rule is checked by playing the same ticks twice, with the disturbance and without it: reports and commands
