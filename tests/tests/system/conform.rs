@@ -319,7 +319,7 @@ const OTHERWISE_ON_THE_WIRE: [&str; 17] = [
 ];
 
 /// How many kits run at the same time: their robots mostly wait.
-const KITS: usize = 4;
+const KITS: usize = 2;
 
 /// The rule that a robot breaks, from the way in which it does.
 fn rule_of(how: &str) -> &str {
