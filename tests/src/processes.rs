@@ -125,6 +125,20 @@ impl Running {
         })
     }
 
+    /// Waits until no process of the run with this program runs: all are stopped, or gone. One that was told to stop, or was killed, may
+    /// do further ticks before that.
+    pub fn until_down(&self, program: &str) {
+        eventually("a process to be stopped", || {
+            let mut processes = find(&self.run);
+            processes.retain(|(_, name)| name == program);
+            let is_stopped = |pid: u32| stat(pid).is_none_or(|stat| stat[0] == "T");
+            processes
+                .iter()
+                .all(|(pid, _)| is_stopped(*pid))
+                .then_some(())
+        });
+    }
+
     /// The processes of the run: those with its name in their environment or arguments, and the names of their programs.
     #[must_use]
     pub fn processes(&self) -> Vec<(u32, String)> {

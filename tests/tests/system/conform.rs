@@ -8,7 +8,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::process::Command;
 
-use conform::{CheckSetting, PAGE, ProtocolRule, RULES, RosterRobot};
+use conform::{CheckSetting, KitPart, PAGE, ProtocolRule, RULES, RosterRobot};
 use protocol::RobotName;
 use protocol::messages::Point;
 use system_tests::tools::has_python;
@@ -21,8 +21,9 @@ type Passing = (
     &'static [&'static str],
 );
 
-const ROBOTS: [Passing; 3] = [
-    ("a robot by hand", &[], &["wrong-robot"]),
+const BY_HAND: Passing = ("a robot by hand", &[], &["wrong-robot"]);
+
+const IN_SCENARIOS: [Passing; 4] = [
     (
         "Butler in the hall",
         &["--scenario", "configs/hors_doeuvres.toml"],
@@ -33,9 +34,6 @@ const ROBOTS: [Passing; 3] = [
         &["--scenario", "tests/tests/system/conform/rover.toml"],
         &["rover"],
     ),
-];
-
-const FURTHER: [Passing; 2] = [
     (
         "Leguin in the hall",
         &["--scenario", "launch/hors_doeuvres.toml"],
@@ -151,14 +149,14 @@ fn conform(robots: &[Passing]) {
 }
 
 #[test]
-fn the_robots_of_the_project_conform() {
-    conform(&ROBOTS);
+fn a_robot_by_hand_conforms() {
+    conforms(BY_HAND);
 }
 
 #[test]
 #[ignore = "thorough: with `-- --include-ignored`"]
-fn further_robots_of_the_project_conform() {
-    conform(&FURTHER);
+fn the_robots_of_the_project_conform() {
+    conform(&IN_SCENARIOS);
 }
 
 #[test]
@@ -349,14 +347,22 @@ fn judge(robots: &[(&str, Vec<ProtocolRule>)]) {
     assert!(misjudgments.is_empty(), "{}", misjudgments.join("\n"));
 }
 
-/// One rule of each section of the page: the others are checked with `--include-ignored`.
+/// One of each part of the kit that is about one thing at a time: the others are checked with `--include-ignored`.
 #[test]
-fn a_wrong_robot_fails_by_the_rule_that_it_breaks() {
-    let mut rules = RULES.to_vec();
-    rules.dedup_by_key(|rule| rule.section);
-    let robots: Vec<(&str, Vec<ProtocolRule>)> =
-        rules.iter().map(|rule| (rule.name, vec![*rule])).collect();
-    judge(&robots);
+fn a_wrong_robot_fails_in_the_part_in_which_it_is_wrong() {
+    let robots = [
+        ("query.once", KitPart::Alone),
+        ("return.rejoin:later", KitPart::LaterEpoch),
+        ("command.sent:generation", KitPart::Rejoined),
+    ];
+    let misjudgments = objections(&robots, KITS, |(how, part)| {
+        let rule = ProtocolRule::named(rule_of(how)).unwrap();
+        let checked = conform::check(&wrong(how), &setting_of_walker(), &[rule], &|_, _| ());
+        let report = checked.unwrap();
+        let parts: Vec<KitPart> = report.failed().map(|(_, failure)| failure.part).collect();
+        (parts != [*part]).then(|| format!("{how}: {report}"))
+    });
+    assert!(misjudgments.is_empty(), "{}", misjudgments.join("\n"));
 }
 
 #[test]
