@@ -13,13 +13,15 @@ use crate::stdio::{in_python, walk};
 const PAGE: &str = "docs/zenoh-pico.md";
 
 /// What the kit does not see of Walker, which asks nobody and obeys nobody.
-const SKIPPED: [&str; 6] = [
+const SKIPPED: [&str; 8] = [
     "command.order",
     "command.twice",
     "command.sent",
     "operator.commands",
+    "query.reply",
+    "query.again",
+    "query.waiting",
     "query.at-once",
-    "query.asking",
 ];
 
 /// The words of `pkg-config`, if it knows these packages.
