@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use protocol::messages::{Delivery, Payload, Performative, TickUpdate};
 use protocol::{Generation, RobotName, Tick};
+use serde_json::Value;
 
 use crate::body::{ROUND, RobotBody};
 use crate::comparison::demand_same;
@@ -48,6 +49,14 @@ impl ArrivingCommand {
             text: text.to_owned(),
             payload: None,
             tick,
+        }
+    }
+
+    /// The same with a payload.
+    pub fn with_payload(self, payload: &Value) -> Self {
+        Self {
+            payload: Payload::new(payload.clone()),
+            ..self
         }
     }
 

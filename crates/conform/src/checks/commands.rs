@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use protocol::messages::{
-    Correction, MAX_PAYLOAD_BYTES, MAX_PAYLOAD_DEPTH, MAX_TEXT_BYTES, Payload, TickUpdate, Variable,
+    Correction, MAX_PAYLOAD_BYTES, MAX_PAYLOAD_DEPTH, MAX_TEXT_BYTES, TickUpdate, Variable,
 };
 use protocol::{RobotName, Tick};
 use serde_json::{Value, json};
@@ -190,16 +190,13 @@ fn order_of_senders(kit: &Kit, one: &str, two: &str) -> Result<(), RuleFailure> 
 /// The last command in the news of a tick is executed, whatever is listed before it, if it is in the tick after it.
 fn last_of_many(kit: &Kit, one: &str, two: &str) -> Result<(), RuleFailure> {
     let sender = kit.sender();
-    let command = |text: &str, payload: Value| ArrivingCommand {
-        payload: Payload::new(payload),
-        ..ArrivingCommand::new(&sender, text, LAST)
-    };
-    let plain = |text| ArrivingCommand::new(&sender, text, LAST);
+    let [one, two] = [one, two].map(|text| ArrivingCommand::new(&sender, text, LAST));
+    let [first, second] = [1, 2].map(|number| one.clone().with_payload(&json!(number)));
     for (listed, last) in [
-        (vec![plain(one); MANY], plain(two)),
-        (vec![plain(two); MANY], plain(one)),
-        (vec![plain(one), plain(two)], plain(one)),
-        (vec![command(one, json!(1))], command(one, json!(2))),
+        (vec![one.clone(); MANY], &two),
+        (vec![two.clone(); MANY], &one),
+        (vec![one.clone(), two.clone()], &one),
+        (vec![first], &second),
     ] {
         let effect = |last: Option<ArrivingCommand>| {
             let commands = listed.iter().cloned().chain(last).collect();
@@ -210,7 +207,9 @@ fn last_of_many(kit: &Kit, one: &str, two: &str) -> Result<(), RuleFailure> {
             tick: LAST + 1,
             ..last.clone()
         };
-        if !is_same(&effect(Some(after))?, &without) && is_same(&effect(Some(last))?, &without) {
+        if !is_same(&effect(Some(after))?, &without)
+            && is_same(&effect(Some(last.clone()))?, &without)
+        {
             let texts: Vec<&str> = listed
                 .iter()
                 .map(|command| &*command.text)
@@ -496,10 +495,7 @@ pub(super) fn payload(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         ("an empty object as payload", json!({})),
     ];
     let with_payload = |text: &str, payload: &Value| {
-        let arrival = ArrivingCommand {
-            payload: Payload::new(payload.clone()),
-            ..ArrivingCommand::new(&kit.sender(), text, LAST)
-        };
+        let arrival = ArrivingCommand::new(&kit.sender(), text, LAST).with_payload(payload);
         played(kit, &PlayScript::with(TICKS, vec![arrival]))
     };
     for (_, payload) in &payloads {
@@ -616,10 +612,7 @@ fn sent(transcript: &Transcript) -> usize {
 fn demand_payload_of_operator(kit: &Kit, text: &str) -> Result<(), RuleFailure> {
     let makes_difference = |from: &RobotName| {
         let plain = ArrivingCommand::new(from, text, LAST);
-        let with_payload = ArrivingCommand {
-            payload: Payload::new(json!({ "task": 3 })),
-            ..plain.clone()
-        };
+        let with_payload = plain.clone().with_payload(&json!({ "task": 3 }));
         let plain = played(kit, &PlayScript::with(TICKS, vec![plain]))?;
         let with_payload = played(kit, &PlayScript::with(TICKS, vec![with_payload]))?;
         Ok::<bool, RuleFailure>(!is_same(&plain, &with_payload))

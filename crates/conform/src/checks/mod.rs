@@ -52,27 +52,21 @@ const fn rules(rules: &'static [&'static str], run: RunCheck) -> Check {
     Check { rules, run, parts }
 }
 
-/// A check of a process as it starts.
-const fn of_start(rules: &'static [&'static str], run: RunCheck) -> Check {
-    let parts = &[KitPart::Alone];
-    Check { rules, run, parts }
+impl Check {
+    /// The same check, in these parts only.
+    const fn only(self, parts: &'static [KitPart]) -> Self {
+        Self { parts, ..self }
+    }
 }
 
-/// A check of a process that has joined again.
-const fn of_return(rules: &'static [&'static str], run: RunCheck) -> Check {
-    let parts = &[KitPart::Rejoined];
-    Check { rules, run, parts }
-}
-
-/// A check of what begins another epoch, or another incarnation.
-const fn of_epochs(rules: &'static [&'static str], run: RunCheck) -> Check {
-    let parts = &[KitPart::Alone, KitPart::LaterEpoch];
-    Check { rules, run, parts }
-}
+/// Those of a process as it starts, of what begins another epoch or incarnation, and of a process that has joined again.
+const START: [KitPart; 1] = [KitPart::Alone];
+const EPOCHS: [KitPart; 2] = [KitPart::Alone, KitPart::LaterEpoch];
+const RETURN: [KitPart; 1] = [KitPart::Rejoined];
 
 /// Checks that need nothing but the usual ticks before; those that take longest begin.
 const CHECKS: [Check; 42] = [
-    of_start(&["join.refused"], joining::refused),
+    rules(&["join.refused"], joining::refused).only(&START),
     rules(&["end.gone"], ends::gone_for_a_while),
     rules(&["end.gone"], ends::gone_forever),
     rules(&["end.gone"], ends::back_in_time),
@@ -87,15 +81,15 @@ const CHECKS: [Check; 42] = [
     rules(&["query.once"], queries::once),
     rules(&["end.clock"], ends::clock),
     rules(&["news.wait"], news::wait),
-    of_epochs(&["epoch.init"], epochs::init),
-    of_return(&["epoch.init"], epochs::after_rejoining),
-    of_epochs(&["epoch.init"], epochs::other_welcome),
-    of_epochs(&["epoch.init"], epochs::while_waiting),
-    of_epochs(&["epoch.late"], epochs::late),
-    of_start(&["return.generation"], returns::generation),
-    of_start(&["return.generation"], returns::commanded),
-    of_epochs(&["return.rejoin"], returns::rejoin),
-    of_start(&["join.ready-last"], joining::ready_last),
+    rules(&["epoch.init"], epochs::init).only(&EPOCHS),
+    rules(&["epoch.init"], epochs::after_rejoining).only(&RETURN),
+    rules(&["epoch.init"], epochs::other_welcome).only(&EPOCHS),
+    rules(&["epoch.init"], epochs::while_waiting).only(&EPOCHS),
+    rules(&["epoch.late"], epochs::late).only(&EPOCHS),
+    rules(&["return.generation"], returns::generation).only(&START),
+    rules(&["return.generation"], returns::commanded).only(&START),
+    rules(&["return.rejoin"], returns::rejoin).only(&EPOCHS),
+    rules(&["join.ready-last"], joining::ready_last).only(&START),
     rules(
         &[
             "query.tick",
@@ -121,11 +115,11 @@ const CHECKS: [Check; 42] = [
     rules(&["robust.malformed"], tolerance::malformed),
     rules(&["wire.keys"], tolerance::commands_of_others),
     rules(&["tick.answer"], ticks::unasked),
-    of_epochs(&["epoch.init", "determinism.seed"], epochs::streams),
+    rules(&["epoch.init", "determinism.seed"], epochs::streams).only(&EPOCHS),
 ];
 
 /// Checks of programs that `cars exec` runs.
-const STDIO_CHECKS: [Check; 1] = [of_start(&[rules::STDIO_END], stdio::end)];
+const STDIO_CHECKS: [Check; 1] = [rules(&[rules::STDIO_END], stdio::end).only(&START)];
 /// Rules whose checks presume that the robot keeps another one: without it they show nothing.
 const PRESUMED: [(&str, &str); 14] = [
     // On a loaded machine a clock may come again in any check.
@@ -212,7 +206,7 @@ struct Checks<'k> {
 
 impl Checks<'_> {
     /// What fails later would not count where something fails before, and takes as long again.
-    fn play_all(&self, kits: &[Kit]) {
+    fn play_all(&self, rejoined: &Kit) {
         self.play(&self.alone);
         let is_broken = self.found().values().any(Findings::is_broken);
         if is_broken || self.later.is_empty() {
@@ -220,10 +214,8 @@ impl Checks<'_> {
         }
 
         // What a robot does that has joined again is compared with what it does then without any disturbance.
-        for kit in kits.iter().filter(|kit| kit.part() == KitPart::Rejoined) {
-            if let Err((rule, failure)) = usual_again(kit) {
-                return self.add(kit, &[rule], Findings::default(), Err(failure));
-            }
+        if let Err((rule, failure)) = usual_again(rejoined) {
+            return self.add(rejoined, &[rule], Findings::default(), Err(failure));
         }
         self.play(&self.later);
     }
@@ -340,7 +332,7 @@ fn all(
     };
     let (in_run, found_in_run) = std::thread::scope(|scope| {
         let run = Builder::new().spawn_scoped(scope, play_run);
-        checks.play_all(&kits);
+        checks.play_all(&kit.of_part(KitPart::Rejoined));
         match run.map(std::thread::ScopedJoinHandle::join) {
             Ok(Ok(run)) => run,
             Ok(Err(panic)) => std::panic::resume_unwind(panic),

@@ -15,7 +15,7 @@ use harness::script::{
     ArrivingCommand, PlayScript, Straight, inherit, play, played, step, usual, with_robot,
 };
 use harness::transcript::PlayedTick;
-use harness::{Harness, HarnessOptions, Joining};
+use harness::{Harness, HarnessOptions};
 
 /// The last tick of the predecessor.
 const LAST: Tick = 8;
@@ -190,14 +190,11 @@ pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
 /// The robot misses a tick, its news ask it to join again, and it does, as the process that it is, also where the first requests have
 /// no answer.
 fn join_again(harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
-    harness.keeps_requests = true;
-    harness.miss()?;
-    harness.open(&TickUpdate::default())?;
+    lose(harness)?;
     for _ in 0..UNANSWERED {
-        let unanswered = next_request(harness)?;
-        drop(unanswered);
+        drop(harness.next_rejoin()?);
     }
-    let joining = next_request(harness)?;
+    let joining = harness.next_rejoin()?;
     // That may become its own: only the answer decides whether it has been replaced.
     harness.put_news(&TickUpdate {
         epoch: harness.epoch(),
@@ -222,28 +219,19 @@ fn join_again(harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
     Ok(())
 }
 
-/// The next request of a robot that is to join again.
-fn next_request(harness: &mut Harness<'_>) -> Result<Joining, RuleFailure> {
-    let news = TickUpdate {
-        rejoin: Some(harness.generation()),
-        ..harness.open_news()
-    };
-    harness.until_put(
-        "another request to join when its news have its generation as `rejoin`",
-        PATIENCE,
-        |harness| harness.put_news(&news),
-        Harness::take_join,
-    )
+/// The robot misses a tick, and its news ask it to join again. Its requests are queued.
+fn lose(harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
+    harness.keeps_requests = true;
+    harness.miss()?;
+    harness.open(&TickUpdate::default())
 }
 
 /// A robot that is to join again, and whose place is taken meanwhile, has been replaced.
 fn demand_place_taken(kit: &Kit) -> Result<(), RuleFailure> {
     let mut harness = with_robot(kit, HarnessOptions::default())?;
     play(&mut harness, &PlayScript::quiet(3), &mut Straight)?;
-    harness.keeps_requests = true;
-    harness.miss()?;
-    harness.open(&TickUpdate::default())?;
-    let joining = next_request(&mut harness)?;
+    lose(&mut harness)?;
+    let joining = harness.next_rejoin()?;
     harness.refuse_join(joining, Refusal::NameTaken, "another process is this robot");
     let expected = "its process ends, with an exit status other than 0, when its place is taken as it joins again";
     let status = harness.until_ended(expected, PATIENCE)?;

@@ -106,7 +106,7 @@ impl Harness<'_> {
     }
 
     /// The oldest request to join that is queued.
-    pub fn take_join(&mut self) -> Option<Joining> {
+    fn take_join(&mut self) -> Option<Joining> {
         self.joins.pop_front()
     }
 
@@ -277,15 +277,31 @@ impl Harness<'_> {
 
     /// Waits until the robot, whose news ask it to, has joined again.
     pub fn until_rejoined(&mut self, before: Generation) -> Result<(), RuleFailure> {
+        self.until_asked_again(before, |harness| {
+            (harness.generation() > before && harness.is_present()).then_some(())
+        })
+    }
+
+    /// The next request to join of the robot, whose news ask it to join again.
+    pub fn next_rejoin(&mut self) -> Result<Joining, RuleFailure> {
+        self.until_asked_again(self.generation(), Self::take_join)
+    }
+
+    /// Puts news that ask this incarnation to join again, until that is found which follows.
+    fn until_asked_again<T>(
+        &mut self,
+        generation: Generation,
+        found: impl FnMut(&mut Self) -> Option<T>,
+    ) -> Result<T, RuleFailure> {
         let news = TickUpdate {
-            rejoin: Some(before),
+            rejoin: Some(generation),
             ..self.open_news()
         };
         self.until_put(
             "another request to join when its news have its generation as `rejoin`",
             PATIENCE,
             |harness| harness.put_news(&news),
-            |harness| (harness.generation() > before && harness.is_present()).then_some(()),
+            found,
         )
     }
 
