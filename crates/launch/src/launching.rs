@@ -463,7 +463,7 @@ impl Launch {
             config: self.observer_config(),
             wants_world,
             screen: screen.handle(),
-            faults: supervisor.queue(),
+            supervisor: supervisor.queue(),
             gone,
         };
         let observer =

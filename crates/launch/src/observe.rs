@@ -32,8 +32,9 @@ pub(super) struct ObserverTask {
     /// Whether to subscribe to frames, for the progress bar.
     pub(super) wants_world: bool,
     pub(super) screen: ScreenHandle,
-    /// The supervisor's queue, for faults of processes: those of the scenario, and those that a person wants.
-    pub(super) faults: UnboundedSender<SupervisorEvent>,
+    /// The supervisor's queue: it waits to be told that the run is observed, and carries out faults of processes, those of the
+    /// scenario and those that a person wants.
+    pub(super) supervisor: UnboundedSender<SupervisorEvent>,
     /// Robots without a process, from the supervisor. Closed when the launch is over.
     pub(super) gone: Receiver<Gone>,
 }
@@ -100,7 +101,10 @@ impl ObserverTask {
         while advance(state, ObserverPhase::Connecting) != ObserverPhase::Over {
             match self.open(end.clone()) {
                 Ok((bus, _declared)) => {
+                    // The queue is closed only when the launch is over.
+                    let _over = self.supervisor.send(SupervisorEvent::Observed);
                     advance(state, ObserverPhase::Observing);
+                    self.show_gathering(&bus);
                     // Until the supervisor is gone, which holds the other end.
                     for gone in &self.gone {
                         self.report(&bus, gone);
@@ -151,12 +155,12 @@ impl ObserverTask {
         if self.wants_world {
             declared.push(self.subscribe_world(&bus, &keys)?);
         }
-        declared.push(subscribe_faults(&bus, &keys, self.faults.clone())?);
+        declared.push(subscribe_faults(&bus, &keys, self.supervisor.clone())?);
         declared.push(watch_token(&bus, &keys, end)?);
 
-        if self.wants_world {
-            self.catch_up(&bus, &keys)?;
-        }
+        // The simulator takes what comes over this link in its order: when it answers, it knows of all that is declared. Its
+        // frames of before do not arrive.
+        self.show_status(&bus, &keys)?;
         Ok((bus, declared))
     }
 
@@ -180,32 +184,33 @@ impl ObserverTask {
         })
     }
 
-    /// Gets the status, because frames put before this observer subscribed do not arrive.
-    fn catch_up(&self, bus: &Bus, keys: &Keys) -> Result<(), BusError> {
-        if self.show_status(bus, keys)? == Some(Phase::Gathering) {
-            std::thread::sleep(GATHERING);
-            self.show_status(bus, keys)?;
+    /// Shows which robots have not joined after a while.
+    fn show_gathering(&self, bus: &Bus) {
+        if !self.wants_world {
+            return;
         }
-        Ok(())
+
+        std::thread::sleep(GATHERING);
+        if let Err(error) = self.show_status(bus, &Keys::new(&self.run)) {
+            tracing::warn!("{error}");
+        }
     }
 
-    /// Shows the progress of the run; returns its phase if the simulator answers.
-    fn show_status(&self, bus: &Bus, keys: &Keys) -> Result<Option<Phase>, BusError> {
-        let Some(answer) = bus.get(&keys.control(), "", Some(encode(&Control::Status)))? else {
-            return Ok(None);
+    /// Shows the progress of the run, if the simulator answers.
+    fn show_status(&self, bus: &Bus, keys: &Keys) -> Result<(), BusError> {
+        let answer = bus.get(&keys.control(), "", Some(encode(&Control::Status)))?;
+        let Some(Reply {
+            key,
+            result: Ok(body),
+        }) = answer
+        else {
+            return Ok(());
         };
 
-        let Ok(body) = answer.result else {
-            return Ok(None);
-        };
-        let Ok(ControlAnswer::Done(status)) = decode(&answer.key, "the simulator", &body) else {
-            return Ok(None);
-        };
-
-        let phase = status.phase;
-        self.screen.progress(RunProgress::from(*status));
-
-        Ok(Some(phase))
+        if let Ok(ControlAnswer::Done(status)) = decode(&key, "the simulator", &body) {
+            self.screen.progress(RunProgress::from(*status));
+        }
+        Ok(())
     }
 }
 

@@ -25,6 +25,9 @@ use super::tail::Tail;
 /// Longest description of an end for the simulator, characters.
 const MAX_REASON: usize = 1000;
 
+/// Robots wait this long for the launcher to observe the run. One that does not reach the simulator must keep none from trying.
+const OBSERVED_WITHIN: Duration = Duration::from_secs(3);
+
 /// A console that no browser shows has ended after this long.
 const UNSEEN: Duration = Duration::from_secs(1);
 
@@ -41,6 +44,8 @@ pub(super) enum SupervisorEvent {
     FaultOver(usize, FaultKind),
     /// A slowed process is stopped (`true`) or continued (`false`).
     Pulse(usize, bool),
+    /// The launcher observes the run, or has had the time to.
+    Observed,
     /// The launcher has received a signal to end.
     Asked(Signal),
     /// The grace period of a phase is over.
@@ -147,6 +152,8 @@ pub(super) struct Supervisor {
     gone: Sender<Gone>,
     queue: UnboundedSender<SupervisorEvent>,
     events: UnboundedReceiver<SupervisorEvent>,
+    /// Processes of robots that start once the run is observed.
+    unstarted: Vec<usize>,
     stage: Shutdown,
     outcome: LaunchOutcome,
 }
@@ -176,6 +183,7 @@ impl Supervisor {
             gone,
             queue,
             events,
+            unstarted: Vec::new(),
             stage: Shutdown::Running,
             outcome: LaunchOutcome {
                 failure: None,
@@ -193,13 +201,21 @@ impl Supervisor {
 
     /// Runs all processes until they have exited.
     pub(super) async fn run(mut self) -> LaunchOutcome {
+        // Robots come after the observer, as the clock may begin with the last of them: in a short run all ticks would be
+        // over before their log is followed, and orders for processes would come too early.
+        let mut processes = self.processes.iter();
+        let has_simulator = processes.any(|process| process.planned.part == Part::Simulator);
         for index in 0..self.processes.len() {
-            if self.processes[index].planned.is_extern {
+            let planned = &self.processes[index].planned;
+            if planned.is_extern {
                 self.announce_extern(index);
+            } else if has_simulator && planned.part == Part::Robots {
+                self.unstarted.push(index);
             } else {
                 self.start(index);
             }
         }
+        self.after(OBSERVED_WITHIN, SupervisorEvent::Observed);
 
         // A run without processes of this launcher goes on: those that the user starts are not its to
         // wait for. From the first step of the end on, the loop lasts as long as a process does; each
@@ -274,8 +290,19 @@ impl Supervisor {
             SupervisorEvent::Faults(orders, done) => self.on_faults(&orders, done),
             SupervisorEvent::FaultOver(index, kind) => self.end_fault(index, kind),
             SupervisorEvent::Pulse(index, stops) => self.pulse(index, stops),
+            SupervisorEvent::Observed => self.on_observed(),
             SupervisorEvent::Asked(signal) => self.on_asked(signal),
             SupervisorEvent::GraceOver(stage) => self.on_grace_over(stage),
+        }
+    }
+
+    fn on_observed(&mut self) {
+        // Both the observer and the limit say it, also where the run has ended before.
+        let unstarted = std::mem::take(&mut self.unstarted);
+        if self.stage == Shutdown::Running {
+            for index in unstarted {
+                self.start(index);
+            }
         }
     }
 

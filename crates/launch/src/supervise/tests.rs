@@ -21,6 +21,8 @@ struct TestLaunch {
     folder: tempfile::TempDir,
     planned: Vec<Planned>,
     grace: Duration,
+    /// Whether the supervisor is told that the run is observed.
+    is_observed: bool,
 }
 
 impl TestLaunch {
@@ -30,6 +32,7 @@ impl TestLaunch {
             folder: tempfile::tempdir().unwrap(),
             planned: Vec::new(),
             grace: Duration::from_secs(20),
+            is_observed: true,
         };
         hall.with(Planned {
             part: Part::Simulator,
@@ -85,6 +88,9 @@ impl TestLaunch {
                 sender,
             );
             let queue = supervisor.queue();
+            if self.is_observed {
+                queue.send(SupervisorEvent::Observed).unwrap();
+            }
             let running = tokio::spawn(supervisor.run());
             Self::ready(self.folder.path(), ready).await;
             for signal in signals {
@@ -159,6 +165,28 @@ fn a_run_that_ends_well_is_no_failure() {
         .with(shell("Leguin", "sleep 0.3"));
     let outcome = hall.run(&[], &[]);
     assert_eq!((outcome.failure, outcome.asked), (None, None));
+}
+
+#[test]
+fn no_robot_starts_before_the_run_is_observed() {
+    let up = "trap 'exit 0' TERM; touch $DIR/up; sleep 600 & wait";
+    for is_observed in [false, true] {
+        let hall = TestLaunch {
+            is_observed,
+            ..TestLaunch::new(up).with(shell("Butler", "touch $DIR/Butler"))
+        };
+        let ready: &[&str] = if is_observed {
+            &["up", "Butler"]
+        } else {
+            &["up"]
+        };
+        let outcome = hall.run(ready, &[Signal::SIGINT]);
+        assert_eq!(
+            (outcome.failure, outcome.asked),
+            (None, Some(Signal::SIGINT))
+        );
+        assert_eq!(hall.path("Butler").exists(), is_observed);
+    }
 }
 
 #[test]
@@ -584,6 +612,7 @@ fn no_process_is_left_behind_when_the_launcher_panics() {
                 Leftovers::unguarded(),
                 std::sync::mpsc::channel().0,
             );
+            supervisor.queue().send(SupervisorEvent::Observed).unwrap();
             tokio::spawn(supervisor.run());
             TestLaunch::ready(hall.folder.path(), &["deaf"]).await;
             panic!("as a defect of the launcher would");
