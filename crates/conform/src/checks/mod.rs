@@ -161,15 +161,16 @@ pub fn check(
 
     let mut outcomes = Vec::new();
     for rule in rules::rules() {
-        let is_shown = if rules.is_empty() {
+        let verdict = verdicts.remove(rule.name);
+        let is_due = if rules.is_empty() {
             kit.stdio.is_program() || !rules::STDIO_RULES.contains(&rule)
         } else {
-            rules.contains(&rule)
+            // What keeps the robot from getting to the wanted rules is shown, too.
+            rules.contains(&rule) || matches!(verdict, Some(RuleVerdict::Failed(_)))
         };
-        if !is_shown {
+        if !is_due {
             continue;
         }
-        let verdict = verdicts.remove(rule.name);
         outcomes.push(RuleOutcome {
             rule,
             verdict: verdict.unwrap_or_else(|| RuleVerdict::Skipped {

@@ -3,9 +3,10 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use protocol::messages::{Clock, Correction, Refusal, TickUpdate};
+use protocol::messages::{Clock, Correction, Refusal, TickUpdate, Welcome};
 use protocol::{Generation, Tick};
 
+use super::epochs;
 use harness::comparison::{demand_same, is_same};
 use harness::findings::Findings;
 use harness::kit::Kit;
@@ -30,12 +31,12 @@ const STREAMS: [&str; 3] = ["one", "other", "further"];
 const QUIET: Duration = Duration::from_millis(300);
 
 /// A harness on which the robot has joined in the place of incarnations that were gone after these ticks, of which the last one
-/// has reported this. It draws from `stream`, or else from the one that is named after its generation.
+/// has reported this. Its welcome may have changes.
 fn returned<'k>(
     kit: &'k Kit,
     last_ticks: &[Tick],
     reported: &[PlayedTick],
-    stream: Option<&str>,
+    change: impl FnOnce(&mut Welcome),
 ) -> Result<Harness<'k>, RuleFailure> {
     let mut harness = Harness::open_run(kit, HarnessOptions::default())?;
     harness.prepare()?;
@@ -45,16 +46,14 @@ fn returned<'k>(
         generation += 1;
     }
     inherit(&mut harness, reported, generation);
-    if let Some(stream) = stream {
-        stream.clone_into(&mut harness.template.stream);
-    }
+    change(&mut harness.template);
     harness.admit_first()?;
     Ok(harness)
 }
 
 /// A further incarnation that waits for the news that name it.
 pub(super) fn returned_once(kit: &Kit) -> Result<Harness<'_>, RuleFailure> {
-    let mut harness = returned(kit, &[LAST], first_ticks(kit)?, None)?;
+    let mut harness = returned(kit, &[LAST], first_ticks(kit)?, |_| ())?;
     harness.settle(QUIET);
     Ok(harness)
 }
@@ -68,7 +67,7 @@ fn first_ticks(kit: &Kit) -> Result<&[PlayedTick], RuleFailure> {
 
 /// It waits for the news that name it, shows meanwhile what its predecessor reported, and reports as what it is.
 pub(super) fn generation(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
-    let mut harness = returned(kit, &[LAST], first_ticks(kit)?, None)?;
+    let mut harness = returned(kit, &[LAST], first_ticks(kit)?, |_| ())?;
     // The last tick was its predecessor's; the next one may go on without it.
     harness.repeat();
     harness.put_clock(&Clock {
@@ -152,9 +151,16 @@ pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
 
     let mut reported = first_ticks(kit)?.to_vec();
     let mut last_ticks = Vec::new();
+    // A robot may refuse such numbers, and end.
+    let takes_change = returned(kit, &[LAST], &reported, change_parameters)
+        .and_then(|mut anew| play(&mut anew, &PlayScript::quiet(0), &mut Straight))
+        .is_ok();
     for generation in [harness.generation() + 1, harness.generation() + 2] {
         // The welcome of the further incarnation is set before the barrier asks for it.
         inherit(&mut harness, &reported, generation);
+        if takes_change {
+            change_parameters(&mut harness.template);
+        }
         join_again(&mut harness)?;
         last_ticks.push(harness.next_tick() - 1);
         // Its turn is the next tick, whose news name it.
@@ -164,8 +170,17 @@ pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         harness.demand_token_kept("it joins again")?;
 
         // What a new process does in the same place is what it has to do.
-        let stream = harness.template.stream.clone();
-        let mut anew = returned(kit, &last_ticks, &reported, Some(&stream))?;
+        let mut anew = returned(kit, &last_ticks, &reported, |welcome| {
+            let Welcome {
+                stream,
+                parameters,
+                earlier_parameters,
+                ..
+            } = &harness.template;
+            welcome.stream.clone_from(stream);
+            welcome.parameters.clone_from(parameters);
+            welcome.earlier_parameters.clone_from(earlier_parameters);
+        })?;
         let anew = play(&mut anew, &PlayScript::quiet(5), &mut Straight)?;
         demand_same(kit, "to join again instead of a new process", &anew, &again)?;
         reported = again;
@@ -185,6 +200,13 @@ pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
             format!("one for tick {}", answer.reading.report.tick),
         )),
     }
+}
+
+/// Changes its parameters in the middle of an epoch, as the scenario or a person may.
+fn change_parameters(welcome: &mut Welcome) {
+    let before = welcome.parameters.clone();
+    welcome.earlier_parameters.insert(0, before);
+    welcome.parameters.values_mut().for_each(epochs::shrink);
 }
 
 /// The robot misses a tick, its news ask it to join again, and it does, as the process that it is, also where the first requests have
@@ -253,7 +275,7 @@ pub(super) fn commanded(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> 
     };
     let first = |command| played(kit, &script(command, LAST + TICKS));
     let further = |command| {
-        let mut harness = returned(kit, &[LAST], &reported, None)?;
+        let mut harness = returned(kit, &[LAST], &reported, |_| ())?;
         play(&mut harness, &script(command, TICKS), &mut Straight)
     };
 
@@ -287,7 +309,10 @@ pub(super) fn demand_streams(kit: &Kit, findings: &mut Findings) -> Result<(), R
     let reported = play(&mut straight, &PlayScript::quiet(LAST + 2), &mut Straight)?;
     let mut turns = BTreeSet::new();
     for stream in STREAMS {
-        let mut harness = returned(kit, &[LAST, LAST + 2], &reported, Some(stream))?;
+        let last_ticks = [LAST, LAST + 2];
+        let mut harness = returned(kit, &last_ticks, &reported, |welcome| {
+            stream.clone_into(&mut welcome.stream);
+        })?;
         let played = play(&mut harness, &PlayScript::quiet(LAST), &mut Straight)?;
         let directions = played
             .iter()
