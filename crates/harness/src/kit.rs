@@ -36,6 +36,10 @@ pub enum KitRoster {
     Usual,
     /// Those and as many more as make two others than the robot.
     InRun,
+    /// Those and so many more that the robot has the highest flag, with names of all kinds.
+    Crowd,
+    /// The robot only.
+    Alone,
 }
 
 /// A router session, a command, and what was learned, for the checks of one part.
@@ -187,8 +191,15 @@ impl SharedKit {
         self.learned().request.sdk.clone()
     }
 
-    fn robots(learned: &Learned, roster: KitRoster) -> BTreeMap<RobotName, RosterRobot> {
+    fn robots(&self, learned: &Learned, roster: KitRoster) -> BTreeMap<RobotName, RosterRobot> {
+        let name = &learned.request.name;
         match roster {
+            KitRoster::Crowd => self.setting.with_crowd(&learned.fake_peers, name),
+            KitRoster::Alone => {
+                let mut robots = learned.fake_peers.clone();
+                robots.retain(|robot, _| robot == name);
+                robots
+            }
             KitRoster::Usual => learned.fake_peers.clone(),
             KitRoster::InRun => learned.in_run.clone(),
         }
@@ -197,7 +208,7 @@ impl SharedKit {
     /// The robots that the kit plays.
     pub fn others(&self, roster: KitRoster) -> BTreeMap<RobotName, RosterRobot> {
         let learned = self.learned();
-        let mut others = Self::robots(learned, roster);
+        let mut others = self.robots(learned, roster);
         others.remove(&learned.request.name);
         others
     }
@@ -274,7 +285,7 @@ impl SharedKit {
         let learned = self.learned.get();
         let name = learned.map_or_else(RobotName::operator, |learned| learned.request.name.clone());
         let fake_peers = learned
-            .map(|learned| Self::robots(learned, roster))
+            .map(|learned| self.robots(learned, roster))
             .unwrap_or_default();
         let role = fake_peers.get(&name).cloned().unwrap_or_default();
         let setting = &self.setting;

@@ -95,8 +95,8 @@ def point(value: Json) -> tuple[float, float]:
 
 
 def items(value: object) -> list[Json]:
-    """A list of at most as many objects as a message may have."""
-    if not isinstance(value, list) or len(value) > 1024 or not all(isinstance(item, dict) for item in value):
+    """A list of objects. How many commands arrive in a tick is limited by their bytes, not by their number."""
+    if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
         raise ValueError("not a list of objects")
     return value
 

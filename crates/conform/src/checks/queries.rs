@@ -217,6 +217,11 @@ impl StateQueries {
         if came != *before {
             return Err(RuleFailure::new(expected, format!("{came:?}")));
         }
+        if tick.is_multiple_of(ROUND) {
+            check_six(harness, epoch, tick - 1, before)?;
+            // That of the next tick is asked for too early, and has to be there nevertheless when it is.
+            let _refused = harness.state_in(epoch, tick + 2)?;
+        }
         Ok(())
     }
 }
@@ -279,16 +284,25 @@ fn check_state(entry: &PlayedTick, now: &PublicState) -> Result<(), RuleFailure>
     ))
 }
 
-/// Queried without parameters, it shows its newest state.
+/// Queried without tick or epoch, or without both, it shows its newest state.
 fn check_newest(harness: &Harness<'_>, tick: Tick, now: &PublicState) -> Result<(), RuleFailure> {
     if !tick.is_multiple_of(ROUND) {
         return Ok(());
     }
 
-    let expected = format!("asked without parameters after tick {tick}, the state of tick {tick}");
-    let came = state(harness.ask(STATE, "")?, &expected)?;
-    if came != *now {
-        return Err(RuleFailure::new(expected, format!("{came:?}")));
+    let next = tick + 1;
+    let epoch = now.epoch;
+    for parameters in [
+        String::new(),
+        format!("epoch={epoch}"),
+        format!("tick={next}"),
+    ] {
+        let expected =
+            format!("asked with {parameters:?} after tick {tick}, the state of tick {tick}");
+        let came = state(harness.ask(STATE, &parameters)?, &expected)?;
+        if came != *now {
+            return Err(RuleFailure::new(expected, format!("{came:?}")));
+        }
     }
     Ok(())
 }

@@ -103,6 +103,14 @@ pub(super) fn generation(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure>
         ));
     }
 
+    demand_inherited(&harness)?;
+
+    let transcript = play(&mut harness, &PlayScript::quiet(5), &mut Straight)?;
+    demand_generation(&transcript, GENERATION)
+}
+
+/// Until its first report it shows what its predecessor reported.
+fn demand_inherited(harness: &Harness<'_>) -> Result<(), RuleFailure> {
     let states = [
         harness.template.state_before.clone(),
         harness.template.last_state.clone(),
@@ -112,7 +120,8 @@ pub(super) fn generation(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure>
             "queried before its first report, the state of tick {} of its welcome",
             state.tick
         );
-        let came = super::queries::state(harness.state_in(1, state.tick + 1)?, &expected)?;
+        let came =
+            super::queries::state(harness.state_in(state.epoch, state.tick + 1)?, &expected)?;
         if came != state {
             return Err(RuleFailure::new(
                 expected,
@@ -120,9 +129,7 @@ pub(super) fn generation(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure>
             ));
         }
     }
-
-    let transcript = play(&mut harness, &PlayScript::quiet(5), &mut Straight)?;
-    demand_generation(&transcript, GENERATION)
+    Ok(())
 }
 
 fn demand_generation(transcript: &[PlayedTick], generation: Generation) -> Result<(), RuleFailure> {
@@ -165,6 +172,7 @@ pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         last_ticks.push(harness.next_tick() - 1);
         // Its turn is the next tick, whose news name it.
         harness.settle(QUIET);
+        demand_inherited(&harness)?;
         let again = play(&mut harness, &PlayScript::quiet(5), &mut Straight)?;
         demand_generation(&again, generation)?;
         harness.demand_token_kept("it joins again")?;
@@ -242,7 +250,7 @@ fn join_again(harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
 }
 
 /// The robot misses a tick, and its news ask it to join again. Its requests are queued.
-fn lose(harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
+pub(super) fn lose(harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
     harness.keeps_requests = true;
     harness.miss()?;
     harness.open(&TickUpdate::default())
