@@ -166,8 +166,10 @@ pub fn check(
         let is_due = if rules.is_empty() {
             kit.stdio.is_program() || !rules::STDIO_RULES.contains(&rule)
         } else {
-            // What keeps the robot from getting to the wanted rules is shown, too.
-            rules.contains(&rule) || matches!(verdict, Some(RuleVerdict::Failed(_)))
+            // What keeps the robot from getting to the wanted rules after joining again is shown, too.
+            let is_again = |failure: &RuleFailure| failure.part == KitPart::Rejoined;
+            rules.contains(&rule)
+                || matches!(&verdict, Some(RuleVerdict::Failed(failure)) if is_again(failure))
         };
         if !is_due {
             continue;
