@@ -29,12 +29,8 @@ fn outcome(entry: &PlayedTick) -> Value {
 
     let mut commands = Vec::new();
     for sent in &entry.commands {
-        let command = sent.command.as_ref().ok();
-        commands.push(serde_json::json!({
-            "to": sent.to,
-            "command": command.map(|command| &command.command),
-            "payload": command.and_then(|command| command.payload.as_ref()),
-        }));
+        let text = sent.command.as_ref().map(|command| command.command.clone());
+        commands.push(format!("{} to {}", text.unwrap_or_default(), sent.to));
     }
     value["commands put"] = commands.into();
 

@@ -107,10 +107,7 @@ impl Host {
             if self.wrong.is("epoch.init:field") {
                 walker.height_m = before.height_m;
             }
-            let is_further = welcome.generation > 1;
-            if self.wrong.is("epoch.init:parameters")
-                || is_further && self.wrong.is("return.rejoin:parameters")
-            {
+            if self.wrong.is("epoch.init:parameters") {
                 walker.step_m = before.step_m;
             }
             if self.wrong.is("epoch.init:variables") {
@@ -119,7 +116,7 @@ impl Host {
             if self.wrong.is("epoch.init:count") {
                 walker.sent = before.sent;
             }
-            if is_further && self.wrong.is("return.rejoin:variables") {
+            if self.wrong.is("return.rejoin:variables") && welcome.generation > 1 {
                 walker.received = before.received;
             }
         }
@@ -245,17 +242,13 @@ impl Host {
             commands.truncate(TEN);
         }
 
-        let mut reseeds = &welcome.reseeds[..];
+        let mut reseeds = welcome.reseeds.iter();
         if wrong.is("determinism.seed:reseeds-first") {
-            reseeds = welcome.reseeds.get(..1).unwrap_or_default();
+            reseeds = welcome.reseeds.get(..1).unwrap_or_default().iter();
         }
-        let due = reseeds.partition_point(|reseed| reseed.tick <= tick);
-        let skips = wrong.is("determinism.seed:reseeds-skipped");
-        if let Some(reseed) = reseeds[walker.reseeded..due].last()
+        if let Some(reseed) = reseeds.find(|reseed| reseed.tick == tick)
             && !wrong.is("determinism.seed:reseeds")
-            && !(skips && reseed.tick < tick)
         {
-            walker.reseeded = due;
             let name = if wrong.is("determinism.seed:reseeds-stream") {
                 welcome.name.as_str()
             } else {
