@@ -29,8 +29,12 @@ fn outcome(entry: &PlayedTick) -> Value {
 
     let mut commands = Vec::new();
     for sent in &entry.commands {
-        let text = sent.command.as_ref().map(|command| command.command.clone());
-        commands.push(format!("{} to {}", text.unwrap_or_default(), sent.to));
+        let command = sent.command.as_ref().ok();
+        commands.push(serde_json::json!({
+            "to": sent.to,
+            "command": command.map(|command| &command.command),
+            "payload": command.and_then(|command| command.payload.as_ref()),
+        }));
     }
     value["commands put"] = commands.into();
 

@@ -349,12 +349,20 @@ impl FakePeers {
 }
 
 /// Fields that are left out where they have their default, by the type, list or object that they belong to.
-const DEFAULTS: [(&str, &str, &str); 6] = [
+const DEFAULTS: [(&str, &str, &str); 10] = [
     (
         "JoinAnswer",
         "known_sites earlier_parameters later_parameters reseeds",
         "[]",
     ),
+    ("JoinAnswer", "rays drive last_state state_before", "null"),
+    ("Clock", "end", "null"),
+    (
+        "TickUpdate",
+        "joined rejoin correction pose in_range",
+        "null",
+    ),
+    ("commands", "payload", "null"),
     ("Clock", "news", "0"),
     ("Clock", "panels", "false"),
     (

@@ -29,6 +29,19 @@ pub enum CannotRun {
     Robot(String),
 }
 
+/// The robots of which a run's roster consists.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum KitRoster {
+    /// Those of the setting.
+    Usual,
+    /// Those and as many more as make two others than the robot.
+    InRun,
+    /// Those and so many more that the robot has the highest flag, with names of all kinds.
+    Crowd,
+    /// The robot only.
+    Alone,
+}
+
 /// A router session, a command, and what was learned, for the checks of one part.
 pub struct Kit {
     shared: Arc<SharedKit>,
@@ -178,25 +191,31 @@ impl SharedKit {
         self.learned().request.sdk.clone()
     }
 
-    /// The robots of a roster: the usual one, or that of the part in a run.
-    fn roster(learned: &Learned, part: KitPart) -> BTreeMap<RobotName, RosterRobot> {
-        match part {
-            KitPart::Alone | KitPart::LaterEpoch | KitPart::Rejoined => learned.fake_peers.clone(),
-            KitPart::InRun => learned.in_run.clone(),
+    fn robots(&self, learned: &Learned, roster: KitRoster) -> BTreeMap<RobotName, RosterRobot> {
+        let name = &learned.request.name;
+        match roster {
+            KitRoster::Crowd => self.setting.with_crowd(&learned.fake_peers, name),
+            KitRoster::Alone => {
+                let mut robots = learned.fake_peers.clone();
+                robots.retain(|robot, _| robot == name);
+                robots
+            }
+            KitRoster::Usual => learned.fake_peers.clone(),
+            KitRoster::InRun => learned.in_run.clone(),
         }
     }
 
     /// The robots that the kit plays.
-    pub fn others(&self, part: KitPart) -> BTreeMap<RobotName, RosterRobot> {
+    pub fn others(&self, roster: KitRoster) -> BTreeMap<RobotName, RosterRobot> {
         let learned = self.learned();
-        let mut others = Self::roster(learned, part);
+        let mut others = self.robots(learned, roster);
         others.remove(&learned.request.name);
         others
     }
 
     /// The sender of the robot's commands: the first of the others, or the operator.
     pub fn sender(&self) -> RobotName {
-        self.others(KitPart::Alone)
+        self.others(KitRoster::Usual)
             .into_keys()
             .next()
             .unwrap_or_else(RobotName::operator)
@@ -262,11 +281,11 @@ impl SharedKit {
     }
 
     /// What the robot is welcomed with at tick 0.
-    pub fn template(&self, run: &RunName, part: KitPart) -> Welcome {
+    pub fn template(&self, run: &RunName, roster: KitRoster) -> Welcome {
         let learned = self.learned.get();
         let name = learned.map_or_else(RobotName::operator, |learned| learned.request.name.clone());
         let fake_peers = learned
-            .map(|learned| Self::roster(learned, part))
+            .map(|learned| self.robots(learned, roster))
             .unwrap_or_default();
         let role = fake_peers.get(&name).cloned().unwrap_or_default();
         let setting = &self.setting;

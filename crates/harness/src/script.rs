@@ -3,21 +3,23 @@
 
 use std::time::Duration;
 
-use protocol::messages::{Delivery, Payload, Performative, TickUpdate};
+use protocol::messages::{Delivery, Payload, Performative, PublicState, TickUpdate};
 use protocol::{Generation, RobotName, Tick};
 use serde_json::Value;
 
 use crate::body::{ROUND, RobotBody};
 use crate::comparison::demand_same;
 use crate::harness::{Harness, HarnessOptions};
-use crate::kit::Kit;
+use crate::kit::{Kit, KitRoster};
 use crate::report::{KitPart, RuleFailure};
 use crate::transcript::{PlayedTick, Transcript};
 
-/// In a round of ticks: the robot senses another one, and it cannot query any other.
+/// In a round of ticks: the robot senses another one.
 const SENSES: Tick = 12;
-const CUT_OFF: Tick = 14;
-const OUT_OF_RANGE: Tick = 8;
+/// In a round of ticks: it can query no other one, because none is reachable.
+pub const CUT_OFF: Tick = 14;
+/// The same, because none is in range.
+pub const OUT_OF_RANGE: Tick = 8;
 const FIRST_IN_RANGE: Tick = 6;
 /// The first of the words that come in turn, and how far they are apart, ticks.
 const FIRST_WORD: Tick = 5;
@@ -215,7 +217,11 @@ fn rejoin(harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
 
 /// Further welcomes are those of an incarnation whose predecessor has reported this.
 pub fn inherit(harness: &mut Harness<'_>, reported: &[PlayedTick], generation: Generation) {
-    let mut last_first = reported.iter().rev().map(PlayedTick::state);
+    let epoch = harness.epoch();
+    let mut last_first = reported.iter().rev().map(|entry| PublicState {
+        epoch,
+        ..entry.state()
+    });
     harness.template.last_state = last_first.next();
     harness.template.state_before = last_first.next();
     harness.template.stream = format!("robot/{}#{generation}", harness.template.name);
@@ -226,7 +232,20 @@ pub fn inherit(harness: &mut Harness<'_>, reported: &[PlayedTick], generation: G
 
 /// A process of its own, taken straight through a script.
 pub fn played(kit: &Kit, script: &PlayScript) -> Result<Transcript, RuleFailure> {
-    let mut harness = with_robot(kit, HarnessOptions::default())?;
+    played_among(kit, KitRoster::Usual, script)
+}
+
+/// The same in a roster.
+pub fn played_among(
+    kit: &Kit,
+    roster: KitRoster,
+    script: &PlayScript,
+) -> Result<Transcript, RuleFailure> {
+    let options = HarnessOptions {
+        roster,
+        ..HarnessOptions::default()
+    };
+    let mut harness = with_robot(kit, options)?;
     play(&mut harness, script, &mut Straight)
 }
 

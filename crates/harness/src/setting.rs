@@ -2,8 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use protocol::messages::{DriveLimits, KnownSite, Parameters, Point, PublicState, Rays};
-use protocol::{RobotName, Tick};
+use protocol::messages::{
+    DriveLimits, KnownSite, NEWS_FLAGS, Parameters, Point, PublicState, Rays,
+};
+use protocol::{MAX_NAME_LEN, RobotName, Tick};
 
 /// What a conformance check plays.
 #[derive(Debug, Clone)]
@@ -71,6 +73,10 @@ const BESIDE: Point = Point { x: 7.0, y: 6.0 };
 const OTHERS: [&str; 4] = ["Echo", "Zoe", "Echo3", "Echo4"];
 /// Robots of the part in a run, at least.
 const RUN_ROBOTS: usize = 3;
+/// Those of a crowd, of which the first ones sort before the second ones, byte by byte: an upper-case letter, the operator's name.
+pub const IN_ORDER: [[&str; 2]; 2] = [["Zoe", "amy"], ["operator", "zed"]];
+/// What their names have beside letters and digits.
+const MARKS: &str = "-._";
 
 impl Default for CheckSetting {
     /// A small field with one other robot, and no parameters.
@@ -122,17 +128,45 @@ impl CheckSetting {
         roster: &BTreeMap<RobotName, RosterRobot>,
     ) -> BTreeMap<RobotName, RosterRobot> {
         let mut roster = roster.clone();
-        let [width_m, height_m] = self.field_m;
         for name in OTHERS.iter().filter_map(|other| RobotName::new(other).ok()) {
             if roster.len() >= RUN_ROBOTS {
                 break;
             }
-            roster.entry(name).or_insert_with(|| RosterRobot {
-                location: Point::new(width_m / 4.0, height_m * 0.75),
-                ..RosterRobot::default()
-            });
+            roster.entry(name).or_insert_with(|| self.standing_still());
         }
         roster
+    }
+
+    /// A large roster, in which this robot has the highest flag, if it is not of a larger one already: the robots of `roster`, others
+    /// with names as long as they may be, and those of [`IN_ORDER`].
+    pub fn with_crowd(
+        &self,
+        roster: &BTreeMap<RobotName, RosterRobot>,
+        name: &RobotName,
+    ) -> BTreeMap<RobotName, RosterRobot> {
+        let mut roster = roster.clone();
+        let before = roster.keys().filter(|other| *other < name).count();
+        let missing = (NEWS_FLAGS as usize - 1).saturating_sub(before);
+        let long = (0..missing).map(|number| {
+            let rest = MAX_NAME_LEN - 2 - MARKS.len();
+            format!("{number:02}{MARKS}{}", "a".repeat(rest))
+        });
+        let short = IN_ORDER.iter().flatten().map(|name| (*name).to_owned());
+        for name in long
+            .chain(short)
+            .filter_map(|name| RobotName::new(&name).ok())
+        {
+            roster.entry(name).or_insert_with(|| self.standing_still());
+        }
+        roster
+    }
+
+    fn standing_still(&self) -> RosterRobot {
+        let [width_m, height_m] = self.field_m;
+        RosterRobot {
+            location: Point::new(width_m / 4.0, height_m * 0.75),
+            ..RosterRobot::default()
+        }
     }
 }
 

@@ -10,20 +10,28 @@ use serde_json::{Value, json};
 
 use harness::comparison::is_same;
 use harness::findings::Findings;
-use harness::kit::Kit;
-use harness::report::RuleFailure;
-use harness::script::{ArrivingCommand, Disturbance, PlayScript, play, played, with_robot};
+use harness::kit::{Kit, KitRoster};
+use harness::report::{KitPart, RuleFailure};
+use harness::script::{
+    ArrivingCommand, CUT_OFF, Disturbance, OUT_OF_RANGE, PlayScript, play, played, played_among,
+    with_robot,
+};
+use harness::setting::IN_ORDER;
 use harness::transcript::Transcript;
 use harness::{Harness, HarnessOptions};
 
+/// The first tick that is played in all parts: one that has joined again has been through those before.
+const FIRST: Tick = 4;
 /// The tick in whose news the last commands of these checks arrive, and the last tick.
-const LAST: Tick = 6;
-const TICKS: Tick = 12;
+const LAST: Tick = FIRST + 3;
+const TICKS: Tick = LAST + 6;
 /// More commands in the news of a tick than a robot that counts on few of them has room for, and so few that each has.
-const MANY: usize = 300;
+const MANY: usize = 520;
+/// So many long ones are most of what may arrive in a tick.
+const MANY_LONG: usize = 200;
 const FEW: usize = 7;
 /// The last tick where as many come in few in each tick.
-const LAST_OF_MANY: Tick = (MANY / FEW) as Tick + 1;
+const LAST_OF_MANY: Tick = FIRST + (MANY / FEW) as Tick;
 const SHORT_TEXT: usize = 90;
 /// Most bytes that a line has in which a text is quoted, beside the text.
 const QUOTED_BY: usize = 96;
@@ -150,21 +158,45 @@ pub(super) fn order(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailur
     Ok(())
 }
 
-/// The same of commands from two senders: news list all of the first one before those of the second one.
+/// The same of commands from two senders, and of one with a payload: news list all of the first one before those of the second one.
 fn order_of_senders(kit: &Kit, one: &str, two: &str) -> Result<(), RuleFailure> {
+    let from = |sender: &RobotName, text: &str| ArrivingCommand::new(sender, text, LAST);
     let [first, second] = two_senders(kit);
-    for commands in [
-        &[(&first, one), (&second, two)][..],
-        &[(&first, one), (&first, two), (&second, one)],
-    ] {
+    let mut cases = vec![
+        (
+            KitRoster::Usual,
+            vec![from(&first, one), from(&first, two), from(&second, one)],
+        ),
+        (
+            KitRoster::Usual,
+            vec![from(&first, one).with_payload(&json!(1)), from(&first, two)],
+        ),
+    ];
+    let in_crowd = IN_ORDER.map(|names| (KitRoster::Crowd, names.map(crowd_name)));
+    // Who sends is the same in all parts.
+    let in_crowd = in_crowd
+        .into_iter()
+        .filter(|_| kit.part() == KitPart::Alone);
+    for (roster, [first, second]) in [(KitRoster::Usual, [first, second])]
+        .into_iter()
+        .chain(in_crowd)
+    {
+        cases.push((roster, vec![from(&first, one), from(&second, two)]));
+    }
+
+    for (roster, commands) in cases {
         // The tick of the last command comes first, and there may be one too many.
         let effect = |ticks: [Tick; 3]| {
             let mut arriving = Vec::new();
-            for ((from, text), tick) in commands.iter().rev().zip(ticks) {
-                arriving.push(ArrivingCommand::new(from, text, tick));
+            for (command, tick) in commands.iter().rev().zip(ticks) {
+                arriving.push(ArrivingCommand {
+                    tick,
+                    ..command.clone()
+                });
             }
             arriving.reverse();
-            played(kit, &PlayScript::with(TICKS, arriving)).map(|played| values(&played))
+            played_among(kit, roster, &PlayScript::with(TICKS, arriving))
+                .map(|played| values(&played))
         };
 
         let votes = vote(
@@ -175,7 +207,7 @@ fn order_of_senders(kit: &Kit, one: &str, two: &str) -> Result<(), RuleFailure> 
         if votes.is_broken() {
             let listed: Vec<String> = commands
                 .iter()
-                .map(|(from, text)| format!("{text:?} of {from}"))
+                .map(|command| format!("{:?} of {}", command.text, command.from))
                 .collect();
             let listed = listed.join(" and then ");
             return Err(RuleFailure::new(
@@ -187,37 +219,64 @@ fn order_of_senders(kit: &Kit, one: &str, two: &str) -> Result<(), RuleFailure> 
     Ok(())
 }
 
-/// The last command in the news of a tick is executed, whatever is listed before it, if it is in the tick after it.
+/// The name of a robot of the crowd, or the operator's.
+fn crowd_name(name: &str) -> RobotName {
+    RobotName::new(name).unwrap_or_else(|_| RobotName::operator())
+}
+
+/// The last command in the news of a tick is executed, whatever is listed before it and whomever the robot can query, if it is in the tick
+/// after it.
 fn last_of_many(kit: &Kit, one: &str, two: &str) -> Result<(), RuleFailure> {
     let sender = kit.sender();
-    let [one, two] = [one, two].map(|text| ArrivingCommand::new(&sender, text, LAST));
+    let at = |from: &RobotName, text: &str, tick| ArrivingCommand::new(from, text, tick);
+    let [one, two] = [one, two].map(|text| at(&sender, text, LAST));
     let [first, second] = [1, 2].map(|number| one.clone().with_payload(&json!(number)));
-    for (listed, last) in [
-        (vec![one.clone(); MANY], &two),
-        (vec![two.clone(); MANY], &one),
-        (vec![one.clone(), two.clone()], &one),
-        (vec![first], &second),
+    let long = at(&sender, &"x".repeat(MAX_TEXT_BYTES / 2), LAST);
+    let operator = RobotName::operator();
+    let of_operator = [&one, &two].map(|command| at(&operator, &command.text, LAST));
+    let crowd: Vec<RobotName> = kit.others(KitRoster::Crowd).into_keys().collect();
+    let of_crowd = crowd.iter().map(|from| at(from, &one.text, LAST));
+    let of_last = crowd
+        .last()
+        .map_or_else(|| two.clone(), |from| at(from, &two.text, LAST));
+
+    let usual = KitRoster::Usual;
+    for (roster, listed, last) in [
+        (usual, vec![one.clone(); MANY], &two),
+        (usual, vec![two.clone(); MANY], &one),
+        (usual, vec![one.clone(), two.clone()], &one),
+        (usual, vec![first], &second),
+        (usual, vec![long; MANY_LONG], &two),
+        (usual, vec![of_operator[0].clone()], &of_operator[1]),
+        (usual, Vec::new(), &at(&sender, &two.text, CUT_OFF)),
+        (usual, Vec::new(), &at(&sender, &two.text, OUT_OF_RANGE)),
+        (KitRoster::Crowd, of_crowd.take(FEW).collect(), &of_last),
     ] {
         let effect = |last: Option<ArrivingCommand>| {
             let commands = listed.iter().cloned().chain(last).collect();
-            played(kit, &PlayScript::with(TICKS, commands))
+            played_among(
+                kit,
+                roster,
+                &PlayScript::with(CUT_OFF + FEW as Tick, commands),
+            )
         };
         let without = effect(None)?;
         let after = ArrivingCommand {
-            tick: LAST + 1,
+            tick: last.tick + 1,
             ..last.clone()
         };
         if !is_same(&effect(Some(after))?, &without)
             && is_same(&effect(Some(last.clone()))?, &without)
         {
-            let texts: Vec<&str> = listed
+            let texts: Vec<String> = listed
                 .iter()
-                .map(|command| &*command.text)
+                .map(|command| command.text.chars().take(FEW).collect())
                 .take(2)
                 .collect();
             return Err(RuleFailure::new(
                 format!(
-                    "a command that news list after {} others, {texts:?}, has an effect, as in the tick after it",
+                    "a command that news of tick {} list after {} others, {texts:?}, has an effect, as in the tick after it",
+                    last.tick,
                     listed.len()
                 ),
                 "none at all",
@@ -310,7 +369,7 @@ impl ManyPlays {
             text: text.to_owned(),
             none: played(&mut std::iter::empty())?,
             once: played(&mut std::iter::once(LAST))?,
-            apart: played(&mut (0..MANY).map(|at| 1 + (at / FEW) as Tick))?,
+            apart: played(&mut (0..MANY).map(|at| FIRST + (at / FEW) as Tick))?,
             together: played(&mut std::iter::repeat_n(LAST, MANY))?,
         })
     }

@@ -24,6 +24,8 @@ const LONG_GONE_S: u32 = 60;
 const BRIEFLY: Duration = Duration::from_millis(50);
 /// The tick after which the simulator is gone.
 const CUT_AFTER: u64 = 12;
+/// How long no clock comes in a pause: longer than any patience that a robot may have by mistake and that can be waited for here.
+const PAUSED: Duration = Duration::from_secs(12);
 /// How long the simulator's token is away: longer than any lease, as after a cut.
 const CUT: Duration = Duration::from_secs(7);
 
@@ -35,15 +37,27 @@ pub(super) fn clock(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         demand_end(&mut harness, end, "between two ticks")?;
     }
 
-    // The robot may have missed that another epoch began.
-    let mut harness = with_robot(kit, HarnessOptions::default())?;
-    play(&mut harness, &PlayScript::quiet(3), &mut Straight)?;
-    let later = Clock {
-        epoch: harness.epoch() + 1,
-        end: Some(End::Stopped),
-        ..Clock::default()
-    };
-    demand_ended(&mut harness, &later, "of a later epoch, at tick 0")?;
+    // The robot may have missed that another epoch began, or be in one that has no clock yet.
+    for when in [
+        "of a later epoch",
+        "of an earlier epoch",
+        "of its last tick",
+    ] {
+        let mut harness = with_robot(kit, HarnessOptions::default())?;
+        play(&mut harness, &PlayScript::quiet(3), &mut Straight)?;
+        let (epoch, tick) = match when {
+            "of a later epoch" => (harness.epoch() + 1, 0),
+            "of an earlier epoch" => (harness.epoch() - 1, 0),
+            _ => (harness.epoch(), harness.next_tick() - 1),
+        };
+        let clock = Clock {
+            epoch,
+            tick,
+            end: Some(End::Stopped),
+            ..Clock::default()
+        };
+        demand_ended(&mut harness, &clock, when)?;
+    }
 
     // The end must also reach a robot that waits: nothing else would ever end its wait.
     let mut harness = waiting::for_news(kit)?;
@@ -52,6 +66,12 @@ pub(super) fn clock(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     let mut harness = returns::returned_once(kit)?;
     let when = "while it waits for the news that name it";
     demand_end(&mut harness, End::Stopped, when)?;
+
+    let mut harness = with_robot(kit, HarnessOptions::default())?;
+    play(&mut harness, &PlayScript::quiet(3), &mut Straight)?;
+    returns::lose(&mut harness)?;
+    let _unanswered = harness.next_rejoin()?;
+    demand_end(&mut harness, End::Stopped, "while it joins again")?;
 
     let (mut harness, is_asking) = waiting::for_another(kit)?;
     if is_asking {
@@ -80,14 +100,26 @@ fn demand_ended(harness: &mut Harness<'_>, clock: &Clock, when: &str) -> Result<
     harness.until_gone()
 }
 
-/// It is asked to end by a signal, in the middle of a run.
+/// It is asked to end by a signal, in the middle of a run, whatever it waits for.
 pub(super) fn sigterm(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     let mut harness = with_robot(kit, HarnessOptions::default())?;
     play(&mut harness, &PlayScript::quiet(3), &mut Straight)?;
+    let (asking, _) = waiting::for_another(kit)?;
 
-    harness.process.signal(Signal::SIGTERM);
-    harness.until_ended("its process ends within 2 s of SIGTERM", END_PATIENCE)?;
-    harness.until_gone()
+    for (mut harness, when) in [
+        (harness, "between two ticks"),
+        (waiting::for_news(kit)?, "while it waits for its news"),
+        (
+            asking,
+            "while it waits for another robot's answer, if it queries any",
+        ),
+    ] {
+        harness.process.signal(Signal::SIGTERM);
+        let expected = format!("its process ends within 2 s of SIGTERM {when}");
+        harness.until_ended(&expected, END_PATIENCE)?;
+        harness.until_gone()?;
+    }
+    Ok(())
 }
 
 /// A robot that lost its simulator, and is to wait so long for it.
@@ -122,6 +154,7 @@ pub(super) fn gone_for_a_while(kit: &Kit, _: &mut Findings) -> Result<(), RuleFa
             );
             demand_running(harness, &expected)?;
             harness.show_simulator(true)?;
+            repeated::demand_last_two(harness, entry)?;
             repeated::repeat(harness, entry)
         }
     }
@@ -159,10 +192,42 @@ fn back_within(kit: &Kit, gone_patience_s: u32) -> Result<(), RuleFailure> {
         &mut harness,
         "it goes on when the simulator is back in time, and waits no longer",
     )?;
+    // It has all of its patience again.
+    harness.show_simulator(false)?;
+    harness.pass(patience / 4);
+    harness.show_simulator(true)?;
+    demand_running(
+        &mut harness,
+        "it waits as long when the simulator is gone a second time",
+    )?;
     step(&mut harness, &PlayScript::quiet(1), &mut Straight).map(drop)
 }
 
-/// The simulator does not come back.
+/// The clock stands still, and the simulator is there: a person may have paused the run.
+pub(super) fn paused(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
+    struct Pause;
+    impl Disturbance for Pause {
+        fn after(
+            &mut self,
+            harness: &mut Harness<'_>,
+            entry: &PlayedTick,
+        ) -> Result<(), RuleFailure> {
+            if entry.tick == CUT_AFTER {
+                harness.pass(PAUSED);
+                demand_running(
+                    harness,
+                    "it waits for the next clock while the simulator is there",
+                )?;
+            }
+            Ok(())
+        }
+    }
+    let mut harness = with_robot(kit, HarnessOptions::default())?;
+    let what = format!("that no clock comes for {} s", PAUSED.as_secs());
+    demand_usual(&mut harness, &what, &mut Pause)
+}
+
+/// The simulator does not come back, also where the robot waits for its news.
 pub(super) fn gone_forever(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
     let mut harness = without_simulator(kit, GONE_S)?;
     // Tokens that are left now are the robot's: it has one.
@@ -171,6 +236,21 @@ pub(super) fn gone_forever(kit: &Kit, findings: &mut Findings) -> Result<(), Rul
         let expected = "the robot's own token, and none of the simulator or of another robot";
         findings.fail("wire.keys", RuleFailure::new(expected, key));
     }
+    demand_given_up(&mut harness)?;
+
+    let options = HarnessOptions {
+        gone_patience_s: GONE_S,
+        ..HarnessOptions::default()
+    };
+    let mut harness = with_robot(kit, options)?;
+    play(&mut harness, &PlayScript::quiet(3), &mut Straight)?;
+    waiting::withhold_news(&mut harness)?;
+    harness.show_simulator(false)?;
+    demand_given_up(&mut harness)
+}
+
+/// It ends when its patience with a simulator that is gone is over.
+fn demand_given_up(harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
     let expected = format!("its process ends when the simulator was gone for {GONE_S} s");
     let patience = PATIENCE + Duration::from_secs(GONE_S.into());
     let status = harness.until_ended(&expected, patience)?;

@@ -6,7 +6,7 @@ use protocol::messages::{Clock, JoinRequest, KnownSite, Point, StreamReseed, Tic
 use protocol::{Epoch, Tick};
 use serde_json::Value;
 
-use super::{returns, waiting};
+use super::{peers, returns, waiting};
 use harness::Joining;
 use harness::comparison::{PlayDifference, demand_same, difference};
 use harness::findings::Findings;
@@ -180,7 +180,29 @@ fn demand_reseeded(
             "the same",
         );
     }
+
+    let skipped = moves_after_skipped(harness, &[])?;
+    if turns && skipped == moves_after_skipped(harness, &reseeds[..1])? {
+        let expected = format!("{what}, also where it skips the clock of that tick");
+        fail(expected, "the same moves as without");
+    }
     Ok(())
+}
+
+/// In which directions the robot moves in a further epoch after it has skipped the tick [`RESEEDED`] and the one that follows.
+fn moves_after_skipped(
+    harness: &mut Harness<'_>,
+    reseeds: &[StreamReseed],
+) -> Result<Vec<f64>, RuleFailure> {
+    harness.template.reseeds = reseeds.to_vec();
+    harness.begin_epoch(harness.epoch() + 1);
+    play(harness, &PlayScript::quiet(RESEEDED - 1), &mut Straight)?;
+    waiting::withhold_news(harness)?;
+    let reports = peers::after_skipped(harness, &[])?;
+    harness.withholds_news = false;
+
+    let directions_rad = reports.iter().map(|report| report.direction_rad);
+    Ok(directions_rad.collect())
 }
 
 fn are_all_the_same(moves: &[Moves]) -> bool {
@@ -322,7 +344,7 @@ fn differ(welcome: &mut Welcome, differs: Differing) {
 }
 
 /// Makes all numbers with a fraction smaller; whole ones may be counts.
-fn shrink(value: &mut Value) {
+pub(super) fn shrink(value: &mut Value) {
     match value {
         Value::Array(values) => values.iter_mut().for_each(shrink),
         Value::Object(fields) => fields.values_mut().for_each(shrink),

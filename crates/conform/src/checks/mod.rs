@@ -65,11 +65,14 @@ const EPOCHS: [KitPart; 2] = [KitPart::Alone, KitPart::LaterEpoch];
 const RETURN: [KitPart; 1] = [KitPart::Rejoined];
 
 /// Checks that need nothing but the usual ticks before; those that take longest begin.
-const CHECKS: [Check; 42] = [
+const CHECKS: [Check; 43] = [
     rules(&["join.refused"], joining::refused).only(&START),
+    rules(&["news.wait"], news::wait),
+    rules(&["command.order"], commands::order),
     rules(&["end.gone"], ends::gone_for_a_while),
     rules(&["end.gone"], ends::gone_forever),
     rules(&["end.gone"], ends::back_in_time),
+    rules(&["end.gone"], ends::paused).only(&START),
     rules(&["query.again"], peers::patient),
     rules(&["tick.newest"], peers::newest),
     rules(&["tick.newest"], peers::newer),
@@ -80,7 +83,6 @@ const CHECKS: [Check; 42] = [
     rules(&["query.at-once"], queries::at_once),
     rules(&["query.once"], queries::once),
     rules(&["end.clock"], ends::clock),
-    rules(&["news.wait"], news::wait),
     rules(&["epoch.init"], epochs::init).only(&EPOCHS),
     rules(&["epoch.init"], epochs::after_rejoining).only(&RETURN),
     rules(&["epoch.init"], epochs::other_welcome).only(&EPOCHS),
@@ -102,7 +104,6 @@ const CHECKS: [Check; 42] = [
     rules(&["query.asking"], queries::asking),
     rules(&["query.asking"], queries::unreachable),
     rules(&["query.unknown"], queries::unknown),
-    rules(&["command.order"], commands::order),
     rules(&["command.twice", "command.sent"], commands::many),
     rules(&["command.payload"], commands::payload),
     rules(&["operator.commands"], commands::from_operator),
@@ -161,15 +162,18 @@ pub fn check(
 
     let mut outcomes = Vec::new();
     for rule in rules::rules() {
-        let is_shown = if rules.is_empty() {
+        let verdict = verdicts.remove(rule.name);
+        let is_due = if rules.is_empty() {
             kit.stdio.is_program() || !rules::STDIO_RULES.contains(&rule)
         } else {
+            // What keeps the robot from getting to the wanted rules after joining again is shown, too.
+            let is_again = |failure: &RuleFailure| failure.part == KitPart::Rejoined;
             rules.contains(&rule)
+                || matches!(&verdict, Some(RuleVerdict::Failed(failure)) if is_again(failure))
         };
-        if !is_shown {
+        if !is_due {
             continue;
         }
-        let verdict = verdicts.remove(rule.name);
         outcomes.push(RuleOutcome {
             rule,
             verdict: verdict.unwrap_or_else(|| RuleVerdict::Skipped {

@@ -39,8 +39,8 @@ fn shorter(kit: &Kit) -> PlayScript {
 pub(super) fn newest(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     let [text, _] = kit.texts();
     let command = ArrivingCommand::new(&kit.sender(), &text, 0);
-    let without = after_skipped(kit, &[])?;
-    let with = after_skipped(kit, &[command.delivery()])?;
+    let without = after_skipped(&mut waiting::for_news(kit)?, &[])?;
+    let with = after_skipped(&mut waiting::for_news(kit)?, &[command.delivery()])?;
 
     if kit.is_deterministic.get() != Some(&false) && with != without {
         return Err(RuleFailure::new(
@@ -53,11 +53,13 @@ pub(super) fn newest(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     Ok(())
 }
 
-/// What the robot reports for the newest of three clocks, and for the one after it. The news of those before list these commands.
-fn after_skipped(kit: &Kit, commands: &[Delivery]) -> Result<Vec<Report>, RuleFailure> {
-    let mut harness = waiting::for_news(kit)?;
-    // It waits for the news of this tick. Two clocks more, and only the last one has its news: which of them
-    // it answers does not depend on how fast it reads.
+/// What a robot that waits for its news reports for the newest of three clocks, of which the first is that of the open tick, and for
+/// the one after it. The news of those before list these commands.
+pub(super) fn after_skipped(
+    harness: &mut Harness<'_>,
+    commands: &[Delivery],
+) -> Result<Vec<Report>, RuleFailure> {
+    // Two clocks more, and only the last one has its news: which of them it answers does not depend on how fast it reads.
     let held = harness.next_tick() - 1;
     let newest = held + 2;
     // The others are in that tick, too.
@@ -86,7 +88,7 @@ fn after_skipped(kit: &Kit, commands: &[Delivery]) -> Result<Vec<Report>, RuleFa
         skipped.try_for_each(|tick| harness.put_clock(&Clock { tick, ..clock }))
     };
     // A robot may receive clocks and news on threads of their own, of which either may be the first.
-    put_clocks(&harness)?;
+    put_clocks(harness)?;
     harness.settle(ARRIVED);
     harness.until_put(
         &expected,
@@ -129,9 +131,10 @@ fn after_skipped(kit: &Kit, commands: &[Delivery]) -> Result<Vec<Report>, RuleFa
     )?;
     let mut reports = Vec::new();
     for tick in [newest, after] {
-        let mut answers = harness.seen.answers.iter();
-        let answer = answers.find(|answer| answer.reading.report.tick == tick);
-        reports.extend(answer.map(|answer| answer.reading.report.clone()));
+        let answers = harness.seen.answers.iter();
+        let mut came = answers.map(|answer| &answer.reading.report);
+        let report = came.find(|report| (report.epoch, report.tick) == (harness.epoch(), tick));
+        reports.extend(report.cloned());
     }
     Ok(reports)
 }

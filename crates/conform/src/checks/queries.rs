@@ -5,14 +5,14 @@ use std::time::{Duration, Instant};
 use bus::Reply;
 use protocol::keys::{QUERIES, STATE};
 use protocol::messages::{Answer, Point, PublicState, TickUpdate};
-use protocol::{Epoch, Tick, decode};
+use protocol::{Epoch, Tick, decode, encode};
 
 use super::{computing, waiting, wire};
 use harness::fake_peers::ReceivedQuery;
 use harness::findings::Findings;
-use harness::kit::Kit;
+use harness::kit::{Kit, KitRoster};
 use harness::patience::{PATIENCE, in_each_attempt};
-use harness::report::{KitPart, RuleFailure};
+use harness::report::RuleFailure;
 use harness::script::{
     Disturbance, PlayScript, Straight, can_query, demand_usual, play, with_robot,
 };
@@ -157,7 +157,10 @@ impl Disturbance for StateQueries {
         let matched = check_state(entry, &now)
             .and_then(|()| self.check_before(harness, epoch, tick))
             .and_then(|()| check_newest(harness, tick, &now))
-            .and_then(|()| check_six(harness, epoch, tick, &now));
+            .and_then(|()| match tick.is_multiple_of(ROUND) {
+                true => check_six(harness, epoch, tick, &now),
+                false => Ok(()),
+            });
         self.findings.settle("query.tick", matched);
 
         self.before = Some(now);
@@ -213,6 +216,11 @@ impl StateQueries {
 
         if came != *before {
             return Err(RuleFailure::new(expected, format!("{came:?}")));
+        }
+        if tick.is_multiple_of(ROUND) {
+            check_six(harness, epoch, tick - 1, before)?;
+            // That of the next tick is asked for too early, and has to be there nevertheless when it is.
+            let _refused = harness.state_in(epoch, tick + 2)?;
         }
         Ok(())
     }
@@ -276,16 +284,25 @@ fn check_state(entry: &PlayedTick, now: &PublicState) -> Result<(), RuleFailure>
     ))
 }
 
-/// Queried without parameters, it shows its newest state.
+/// Queried without tick or epoch, or without both, it shows its newest state.
 fn check_newest(harness: &Harness<'_>, tick: Tick, now: &PublicState) -> Result<(), RuleFailure> {
     if !tick.is_multiple_of(ROUND) {
         return Ok(());
     }
 
-    let expected = format!("asked without parameters after tick {tick}, the state of tick {tick}");
-    let came = state(harness.ask(STATE, "")?, &expected)?;
-    if came != *now {
-        return Err(RuleFailure::new(expected, format!("{came:?}")));
+    let next = tick + 1;
+    let epoch = now.epoch;
+    for parameters in [
+        String::new(),
+        format!("epoch={epoch}"),
+        format!("tick={next}"),
+    ] {
+        let expected =
+            format!("asked with {parameters:?} after tick {tick}, the state of tick {tick}");
+        let came = state(harness.ask(STATE, &parameters)?, &expected)?;
+        if came != *now {
+            return Err(RuleFailure::new(expected, format!("{came:?}")));
+        }
     }
     Ok(())
 }
@@ -297,14 +314,12 @@ fn check_six(
     tick: Tick,
     now: &PublicState,
 ) -> Result<(), RuleFailure> {
-    if !tick.is_multiple_of(ROUND) {
-        return Ok(());
-    }
-
     for what in QUERIES {
+        let text = |answer: &Answer| String::from_utf8_lossy(&encode(answer)).into_owned();
+        let wanted = now.answer(what);
         let expected = format!(
-            "the answer to {what} for tick {tick}: {:?}",
-            now.answer(what)
+            "the answer to {what} for tick {tick}: {}",
+            wanted.as_ref().map_or_else(String::new, text)
         );
         let came = match harness.ask(what, &format!("tick={};epoch={epoch}", tick + 1))? {
             Some(Reply {
@@ -317,12 +332,12 @@ fn check_six(
             }) => return Err(RuleFailure::new(expected, reason)),
             None => return Err(RuleFailure::new(expected, "no answer")),
         };
-        let is_same = now.answer(what).is_some_and(|wanted| {
+        let is_same = wanted.is_some_and(|wanted| {
             (wanted.epoch, wanted.tick) == (came.epoch, came.tick)
                 && same_value(&wanted.value, &came.value)
         });
         if !is_same {
-            return Err(RuleFailure::new(expected, format!("{came:?}")));
+            return Err(RuleFailure::new(expected, text(&came)));
         }
     }
     Ok(())
@@ -430,6 +445,7 @@ fn demand_replies(harness: &mut Harness<'_>, when: &str) -> Result<(), RuleFailu
                 format!("the state of tick {}", came.tick),
             ));
         }
+        check_six(harness, came.epoch, came.tick, &came)?;
         harness.pass(APART);
     }
     Ok(())
@@ -465,8 +481,8 @@ pub(super) fn asking(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailu
     let mut has_asked = false;
     for script in [spoken, PlayScript::quiet(ticks)] {
         // Several others, of which none can be queried in some of the ticks.
-        for part in [KitPart::Alone, KitPart::InRun] {
-            let mut harness = waiting::of_queries_in(kit, part)?;
+        for roster in [KitRoster::Usual, KitRoster::InRun] {
+            let mut harness = waiting::of_queries_in(kit, roster)?;
             let played = play(&mut harness, &script, &mut Straight)?;
             let asked = harness.fake_peers.asked();
             // Where news have no list, all others are in range.

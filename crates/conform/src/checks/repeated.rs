@@ -6,7 +6,7 @@ use std::time::Duration;
 use protocol::messages::{Clock, Correction, Point, TickUpdate};
 use protocol::{Epoch, Tick};
 
-use super::waiting;
+use super::{queries, waiting};
 use harness::findings::Findings;
 use harness::kit::Kit;
 use harness::patience::PATIENCE;
@@ -52,6 +52,7 @@ pub(super) fn duplicate(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> 
                 for _ in 0..times {
                     repeat(harness, entry)?;
                 }
+                demand_last_two(harness, entry)?;
             }
             Ok(())
         }
@@ -67,6 +68,30 @@ pub(super) fn duplicate(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> 
             Ok(())
         },
     )
+}
+
+/// Its last two states are those of this tick and of the one before, for those who still query in this tick.
+pub(super) fn demand_last_two(
+    harness: &Harness<'_>,
+    entry: &PlayedTick,
+) -> Result<(), RuleFailure> {
+    for tick in [entry.tick.checked_sub(1), Some(entry.tick)]
+        .into_iter()
+        .flatten()
+    {
+        let expected = format!(
+            "asked with tick={}, still the state of tick {tick}",
+            tick + 1
+        );
+        let came = queries::state(harness.state_in(entry.epoch, tick + 1)?, &expected)?;
+        if came.tick != tick {
+            return Err(RuleFailure::new(
+                expected,
+                format!("that of tick {}", came.tick),
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// Repeats the clock of a tick, and waits for its report and its commands.

@@ -3,9 +3,10 @@
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-use protocol::messages::{Clock, Correction, Refusal, TickUpdate};
+use protocol::messages::{Clock, Correction, Refusal, TickUpdate, Welcome};
 use protocol::{Generation, Tick};
 
+use super::epochs;
 use harness::comparison::{demand_same, is_same};
 use harness::findings::Findings;
 use harness::kit::Kit;
@@ -30,12 +31,12 @@ const STREAMS: [&str; 3] = ["one", "other", "further"];
 const QUIET: Duration = Duration::from_millis(300);
 
 /// A harness on which the robot has joined in the place of incarnations that were gone after these ticks, of which the last one
-/// has reported this. It draws from `stream`, or else from the one that is named after its generation.
+/// has reported this. Its welcome may have changes.
 fn returned<'k>(
     kit: &'k Kit,
     last_ticks: &[Tick],
     reported: &[PlayedTick],
-    stream: Option<&str>,
+    change: impl FnOnce(&mut Welcome),
 ) -> Result<Harness<'k>, RuleFailure> {
     let mut harness = Harness::open_run(kit, HarnessOptions::default())?;
     harness.prepare()?;
@@ -45,16 +46,14 @@ fn returned<'k>(
         generation += 1;
     }
     inherit(&mut harness, reported, generation);
-    if let Some(stream) = stream {
-        stream.clone_into(&mut harness.template.stream);
-    }
+    change(&mut harness.template);
     harness.admit_first()?;
     Ok(harness)
 }
 
 /// A further incarnation that waits for the news that name it.
 pub(super) fn returned_once(kit: &Kit) -> Result<Harness<'_>, RuleFailure> {
-    let mut harness = returned(kit, &[LAST], first_ticks(kit)?, None)?;
+    let mut harness = returned(kit, &[LAST], first_ticks(kit)?, |_| ())?;
     harness.settle(QUIET);
     Ok(harness)
 }
@@ -68,7 +67,7 @@ fn first_ticks(kit: &Kit) -> Result<&[PlayedTick], RuleFailure> {
 
 /// It waits for the news that name it, shows meanwhile what its predecessor reported, and reports as what it is.
 pub(super) fn generation(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
-    let mut harness = returned(kit, &[LAST], first_ticks(kit)?, None)?;
+    let mut harness = returned(kit, &[LAST], first_ticks(kit)?, |_| ())?;
     // The last tick was its predecessor's; the next one may go on without it.
     harness.repeat();
     harness.put_clock(&Clock {
@@ -104,6 +103,14 @@ pub(super) fn generation(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure>
         ));
     }
 
+    demand_inherited(&harness)?;
+
+    let transcript = play(&mut harness, &PlayScript::quiet(5), &mut Straight)?;
+    demand_generation(&transcript, GENERATION)
+}
+
+/// Until its first report it shows what its predecessor reported.
+fn demand_inherited(harness: &Harness<'_>) -> Result<(), RuleFailure> {
     let states = [
         harness.template.state_before.clone(),
         harness.template.last_state.clone(),
@@ -113,7 +120,8 @@ pub(super) fn generation(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure>
             "queried before its first report, the state of tick {} of its welcome",
             state.tick
         );
-        let came = super::queries::state(harness.state_in(1, state.tick + 1)?, &expected)?;
+        let came =
+            super::queries::state(harness.state_in(state.epoch, state.tick + 1)?, &expected)?;
         if came != state {
             return Err(RuleFailure::new(
                 expected,
@@ -121,9 +129,7 @@ pub(super) fn generation(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure>
             ));
         }
     }
-
-    let transcript = play(&mut harness, &PlayScript::quiet(5), &mut Straight)?;
-    demand_generation(&transcript, GENERATION)
+    Ok(())
 }
 
 fn demand_generation(transcript: &[PlayedTick], generation: Generation) -> Result<(), RuleFailure> {
@@ -152,20 +158,37 @@ pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
 
     let mut reported = first_ticks(kit)?.to_vec();
     let mut last_ticks = Vec::new();
+    // A robot may refuse such numbers, and end.
+    let takes_change = returned(kit, &[LAST], &reported, change_parameters)
+        .and_then(|mut anew| play(&mut anew, &PlayScript::quiet(0), &mut Straight))
+        .is_ok();
     for generation in [harness.generation() + 1, harness.generation() + 2] {
         // The welcome of the further incarnation is set before the barrier asks for it.
         inherit(&mut harness, &reported, generation);
+        if takes_change {
+            change_parameters(&mut harness.template);
+        }
         join_again(&mut harness)?;
         last_ticks.push(harness.next_tick() - 1);
         // Its turn is the next tick, whose news name it.
         harness.settle(QUIET);
+        demand_inherited(&harness)?;
         let again = play(&mut harness, &PlayScript::quiet(5), &mut Straight)?;
         demand_generation(&again, generation)?;
         harness.demand_token_kept("it joins again")?;
 
         // What a new process does in the same place is what it has to do.
-        let stream = harness.template.stream.clone();
-        let mut anew = returned(kit, &last_ticks, &reported, Some(&stream))?;
+        let mut anew = returned(kit, &last_ticks, &reported, |welcome| {
+            let Welcome {
+                stream,
+                parameters,
+                earlier_parameters,
+                ..
+            } = &harness.template;
+            welcome.stream.clone_from(stream);
+            welcome.parameters.clone_from(parameters);
+            welcome.earlier_parameters.clone_from(earlier_parameters);
+        })?;
         let anew = play(&mut anew, &PlayScript::quiet(5), &mut Straight)?;
         demand_same(kit, "to join again instead of a new process", &anew, &again)?;
         reported = again;
@@ -185,6 +208,13 @@ pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
             format!("one for tick {}", answer.reading.report.tick),
         )),
     }
+}
+
+/// Changes its parameters in the middle of an epoch, as the scenario or a person may.
+fn change_parameters(welcome: &mut Welcome) {
+    let before = welcome.parameters.clone();
+    welcome.earlier_parameters.insert(0, before);
+    welcome.parameters.values_mut().for_each(epochs::shrink);
 }
 
 /// The robot misses a tick, its news ask it to join again, and it does, as the process that it is, also where the first requests have
@@ -220,7 +250,7 @@ fn join_again(harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
 }
 
 /// The robot misses a tick, and its news ask it to join again. Its requests are queued.
-fn lose(harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
+pub(super) fn lose(harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
     harness.keeps_requests = true;
     harness.miss()?;
     harness.open(&TickUpdate::default())
@@ -253,7 +283,7 @@ pub(super) fn commanded(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> 
     };
     let first = |command| played(kit, &script(command, LAST + TICKS));
     let further = |command| {
-        let mut harness = returned(kit, &[LAST], &reported, None)?;
+        let mut harness = returned(kit, &[LAST], &reported, |_| ())?;
         play(&mut harness, &script(command, TICKS), &mut Straight)
     };
 
@@ -287,7 +317,10 @@ pub(super) fn demand_streams(kit: &Kit, findings: &mut Findings) -> Result<(), R
     let reported = play(&mut straight, &PlayScript::quiet(LAST + 2), &mut Straight)?;
     let mut turns = BTreeSet::new();
     for stream in STREAMS {
-        let mut harness = returned(kit, &[LAST, LAST + 2], &reported, Some(stream))?;
+        let last_ticks = [LAST, LAST + 2];
+        let mut harness = returned(kit, &last_ticks, &reported, |welcome| {
+            stream.clone_into(&mut welcome.stream);
+        })?;
         let played = play(&mut harness, &PlayScript::quiet(LAST), &mut Straight)?;
         let directions = played
             .iter()

@@ -17,7 +17,7 @@ use super::{ticks, wire};
 use harness::comparison::difference;
 use harness::fake_peers::Unhelpful;
 use harness::findings::Findings;
-use harness::kit::Kit;
+use harness::kit::{Kit, KitRoster};
 use harness::report::{KitPart, PlayedRun, RuleFailure};
 use harness::script::{Disturbance, PlayScript, inherit, step, with_robot};
 use harness::transcript::{PlayedTick, Transcript};
@@ -239,7 +239,7 @@ impl Disturbance for RunPlay {
 /// Commands of both words in turn, from all others at once, to the end: whichever of the words sends a robot to sleep, it is
 /// awake in half of the ticks.
 fn script(kit: &Kit) -> PlayScript {
-    let senders: Vec<RobotName> = kit.others(KitPart::InRun).into_keys().collect();
+    let senders: Vec<RobotName> = kit.others(KitRoster::InRun).into_keys().collect();
     PlayScript::in_turn(kit, &senders, TICKS)
 }
 
@@ -247,7 +247,7 @@ fn script(kit: &Kit) -> PlayScript {
 fn played(kit: &Kit, is_disturbed: bool) -> Result<(Transcript, Findings), BrokenRule> {
     let options = HarnessOptions {
         gone_patience_s: GONE_PATIENCE_S,
-        part: KitPart::InRun,
+        roster: KitRoster::InRun,
         ..HarnessOptions::default()
     };
     let mut harness = with_robot(kit, options).map_err(|failure| ("tick.answer", failure))?;
@@ -367,7 +367,7 @@ pub(super) fn check(kit: &Kit, findings: &mut Findings) -> PlayedRun {
         findings.fail(rule, failure);
     }
     PlayedRun {
-        robots: kit.others(KitPart::InRun).len() + 1,
+        robots: kit.others(KitRoster::InRun).len() + 1,
         ticks: TICKS,
         plays: PLAYS,
     }

@@ -6,8 +6,8 @@ use protocol::Tick;
 use protocol::messages::{Correction, TickUpdate};
 
 use harness::comparison::demand_same;
-use harness::kit::Kit;
-use harness::report::{KitPart, RuleFailure};
+use harness::kit::{Kit, KitRoster};
+use harness::report::RuleFailure;
 use harness::script::{Disturbance, PlayScript, Straight, play, with_robot};
 use harness::{Harness, HarnessOptions};
 
@@ -18,16 +18,16 @@ const TICKS: Tick = 24;
 
 /// A harness on which the other robots put no states, so that a robot that wants to know them must query.
 pub(super) fn of_queries(kit: &Kit) -> Result<Harness<'_>, RuleFailure> {
-    of_queries_in(kit, KitPart::Alone)
+    of_queries_in(kit, KitRoster::Usual)
 }
 
-/// The same with the roster of a part of the kit.
-pub(super) fn of_queries_in(kit: &Kit, part: KitPart) -> Result<Harness<'_>, RuleFailure> {
+/// The same with this roster.
+pub(super) fn of_queries_in(kit: &Kit, roster: KitRoster) -> Result<Harness<'_>, RuleFailure> {
     with_robot(
         kit,
         HarnessOptions {
             puts_states: false,
-            part,
+            roster,
             ..HarnessOptions::default()
         },
     )
@@ -75,7 +75,12 @@ pub(super) fn while_asking(
 pub(super) fn for_news(kit: &Kit) -> Result<Harness<'_>, RuleFailure> {
     let mut harness = with_robot(kit, HarnessOptions::default())?;
     play(&mut harness, &PlayScript::quiet(3), &mut Straight)?;
+    withhold_news(&mut harness)?;
+    Ok(harness)
+}
 
+/// The next tick begins, and the robot waits for its news.
+pub(super) fn withhold_news(harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
     // The clock says that there are news: without them the robot must not begin.
     harness.withholds_news = true;
     harness.open(&TickUpdate {
@@ -86,7 +91,7 @@ pub(super) fn for_news(kit: &Kit) -> Result<Harness<'_>, RuleFailure> {
         ..TickUpdate::default()
     })?;
     harness.settle(UNDER_WAY);
-    Ok(harness)
+    Ok(())
 }
 
 /// A robot that waits for an answer that the others hold back, if it queries others at all. With it, whether it does: the

@@ -27,9 +27,9 @@ impl Harness<'_> {
     pub fn prepare(&mut self) -> Result<(), RuleFailure> {
         let kit = self.kit;
         let subject = kit.subject();
-        self.template = kit.template(&self.run, self.options.part);
+        self.template = kit.template(&self.run, self.options.roster);
         self.fake_peers = FakePeers::new(
-            kit.others(self.options.part),
+            kit.others(self.options.roster),
             self.options.has_extras,
             self.options.writes_integers,
         );

@@ -22,10 +22,10 @@ use protocol::{Epoch, RobotName, RunName, Tick, decode};
 
 use crate::body::RobotBody;
 use crate::fake_peers::FakePeers;
-use crate::kit::Kit;
+use crate::kit::{Kit, KitRoster};
 use crate::patience::{Limit, PATIENCE};
 use crate::process::RobotProcess;
-use crate::report::{KitPart, RuleFailure};
+use crate::report::RuleFailure;
 use crate::seen::{ReportedCommand, Seen};
 use crate::stdio::STDIO_VARIABLE;
 use crate::wire::{Joining, Wire, WireEvent};
@@ -69,8 +69,8 @@ pub struct HarnessOptions {
     pub is_followed: bool,
     /// Whether the other robots put their states, so that a robot that subscribes need not query.
     pub puts_states: bool,
-    /// Whose roster it has.
-    pub part: KitPart,
+    /// Which robots take part.
+    pub roster: KitRoster,
 }
 
 impl Default for HarnessOptions {
@@ -83,7 +83,7 @@ impl Default for HarnessOptions {
             writes_integers: false,
             is_followed: false,
             puts_states: true,
-            part: KitPart::Alone,
+            roster: KitRoster::Usual,
         }
     }
 }
@@ -188,7 +188,7 @@ impl<'k> Harness<'k> {
             process,
             body: RobotBody::default(),
             repeated: BTreeSet::new(),
-            template: kit.template(&run, options.part),
+            template: kit.template(&run, options.roster),
             run,
             keeps_requests: true,
             is_cut_off: false,

@@ -107,7 +107,10 @@ impl Host {
             if self.wrong.is("epoch.init:field") {
                 walker.height_m = before.height_m;
             }
-            if self.wrong.is("epoch.init:parameters") {
+            let is_further = welcome.generation > 1;
+            if self.wrong.is("epoch.init:parameters")
+                || is_further && self.wrong.is("return.rejoin:parameters")
+            {
                 walker.step_m = before.step_m;
             }
             if self.wrong.is("epoch.init:variables") {
@@ -116,7 +119,7 @@ impl Host {
             if self.wrong.is("epoch.init:count") {
                 walker.sent = before.sent;
             }
-            if self.wrong.is("return.rejoin:variables") && welcome.generation > 1 {
+            if is_further && self.wrong.is("return.rejoin:variables") {
                 walker.received = before.received;
             }
         }
@@ -242,13 +245,17 @@ impl Host {
             commands.truncate(TEN);
         }
 
-        let mut reseeds = welcome.reseeds.iter();
+        let mut reseeds = &welcome.reseeds[..];
         if wrong.is("determinism.seed:reseeds-first") {
-            reseeds = welcome.reseeds.get(..1).unwrap_or_default().iter();
+            reseeds = welcome.reseeds.get(..1).unwrap_or_default();
         }
-        if let Some(reseed) = reseeds.find(|reseed| reseed.tick == tick)
+        let due = reseeds.partition_point(|reseed| reseed.tick <= tick);
+        let skips = wrong.is("determinism.seed:reseeds-skipped");
+        if let Some(reseed) = reseeds[walker.reseeded..due].last()
             && !wrong.is("determinism.seed:reseeds")
+            && !(skips && reseed.tick < tick)
         {
+            walker.reseeded = due;
             let name = if wrong.is("determinism.seed:reseeds-stream") {
                 welcome.name.as_str()
             } else {

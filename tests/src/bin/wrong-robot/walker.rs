@@ -12,6 +12,8 @@ const STEP_M: f64 = 0.2;
 /// Walks at random, counts commands and replies to them, and queries another robot in some ticks.
 pub(crate) struct Walker {
     pub(crate) random: Stream,
+    /// How many `reseeds` it has followed.
+    pub(crate) reseeded: usize,
     pub(crate) at: Point,
     pub(crate) proposal: Point,
     /// Side of the square in which a step ends, meters.
@@ -52,6 +54,7 @@ impl Walker {
 
         Self {
             random: stream(seed, &name),
+            reseeded: 0,
             at: welcome.location,
             proposal: welcome.location,
             step_m: step_m.unwrap_or(STEP_M),
