@@ -14,7 +14,7 @@ use crate::setting::RosterRobot;
 /// Below this, each whole number has a floating-point number of its own.
 const MAX_WHOLE: f64 = 9_007_199_254_740_992.0;
 
-/// How far from its place a robot is shown where that must make no difference, meters.
+/// How far from its place a robot is, or is shown where that must make no difference, meters.
 const MISPLACED_M: f64 = 1.5;
 /// How far apart the bodies are that a robot senses, meters.
 const BESIDE_M: f64 = 0.75;
@@ -42,6 +42,8 @@ pub enum Unhelpful {
     Refusal,
     /// The state of an earlier tick, which says so.
     EarlierState,
+    /// The state of this tick in the epoch before, which says so.
+    EarlierEpoch,
     /// No reply, as where the query was lost.
     Silence,
 }
@@ -54,6 +56,8 @@ struct PeersState {
     holds_before: Option<(Epoch, Tick)>,
     /// States that are put show the robots elsewhere than they are.
     misplaces: bool,
+    /// They are elsewhere than the script has them.
+    are_elsewhere: bool,
     /// How the next queries of each robot are replied to, instead of with its state.
     unhelpful: BTreeMap<RobotName, Vec<Unhelpful>>,
     held: Vec<(RobotName, String, Query)>,
@@ -122,6 +126,11 @@ impl FakePeers {
     /// States that are put show them elsewhere than they are, or no longer do.
     pub fn misplace(&self, misplaces: bool) {
         self.state().misplaces = misplaces;
+    }
+
+    /// They are elsewhere than usual from now on, or no longer are.
+    pub fn displace(&self, are_elsewhere: bool) {
+        self.state().are_elsewhere = are_elsewhere;
     }
 
     /// They reply in this order to the next queries of each robot, and then as usual.
@@ -194,9 +203,14 @@ impl FakePeers {
             behavior_state: "STAND".to_owned(),
         });
 
+        let mut location = state.location;
+        if self.state().are_elsewhere {
+            location.x += MISPLACED_M;
+        }
         Some(PublicState {
             epoch,
             tick,
+            location,
             ..state
         })
     }
@@ -309,13 +323,22 @@ impl FakePeers {
             .parameter("tick")
             .and_then(|tick| tick.parse::<Tick>().ok())
             .unwrap_or(now);
-        let Some(state) = tick
-            .checked_sub(1 + u64::from(unhelpful.is_some()))
-            .and_then(|tick| self.state_of(name, epoch, tick))
-        else {
+        let is_earlier = unhelpful == Some(Unhelpful::EarlierState);
+        let of_epoch = match unhelpful {
+            Some(Unhelpful::EarlierEpoch) => epoch.saturating_sub(1),
+            _ => epoch,
+        };
+        let state = tick
+            .checked_sub(1 + u64::from(is_earlier))
+            .and_then(|tick| self.state_of(name, of_epoch, tick));
+        let Some(mut state) = state else {
             return query.reply_err("nothing is known before tick 1");
         };
 
+        // Who takes it for that of this epoch shows it.
+        if of_epoch != epoch {
+            state.location.x += MISPLACED_M;
+        }
         match state.answer(what) {
             Some(answer) => query.reply(query.key(), self.dress(&answer)),
             None => query.reply(query.key(), self.dress(&state)),

@@ -19,7 +19,7 @@ readonly DECIMAL='^(-?)([0-9]{1,9})(\.([0-9]+))?$'
 readonly LOCATION='"location":\{"x":([0-9.eE+-]+),"y":([0-9.eE+-]+)\}'
 readonly VALUE='^\{"type":"answer","value":([0-9.eE+-]+)\}'
 readonly TICK_S='"tick_s":([0-9.]+)'
-readonly HELLO='"from":"([A-Za-z0-9_.-]+)"[^}]*"command":"hello"'
+readonly HELLO='"from":"([A-Za-z0-9_.-]+)","performative":"[^"]*","command":"hello"'
 
 fail() { printf 'stroller: %s\n' "$*" >&2; exit 1; }
 
@@ -153,7 +153,8 @@ while hear; do
             [[ $line == *'"tick":0,'* ]] || continue # it takes over, and answers the tick that follows
             ;;
         '{"type":"tick"'*)
-            [[ $line == *'"blocked":true'* ]] && is_blocked=1
+            # In what stands before the commands: a payload may have any field.
+            [[ ${line%%'"commands":'*} == *'"blocked":true'* ]] && is_blocked=1
             read_location "$line"
             greet "$line"
             update_state_variables

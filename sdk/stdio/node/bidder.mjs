@@ -25,7 +25,7 @@ for await (const line of createInterface({ input: process.stdin })) {
   }
 
   for (const { from, command, payload } of commands) {
-    if (command !== "bid") continue;
+    if (command !== "bid" || typeof payload?.distance_m !== "number") continue;
     const bid = { bidder: from, distance_m: payload.distance_m };
     if (isBetter(bid, best)) best = bid;
   }

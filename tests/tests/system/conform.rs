@@ -166,7 +166,7 @@ fn the_robots_of_the_project_conform_with_default_parameters() {
 }
 
 /// Further ways to break a rule, after the one that is named like the rule.
-const OTHERWISE: [&str; 129] = [
+const OTHERWISE: [&str; 142] = [
     "command.twice:hundred",
     "command.payload:ascii",
     "return.generation:placed",
@@ -296,6 +296,19 @@ const OTHERWISE: [&str; 129] = [
     "return.rejoin:later",
     "epoch.init:field",
     "command.order:again",
+    "query.reply:epoch",
+    "query.again:tokens",
+    "epoch.init:cache",
+    "epoch.init:seed",
+    "determinism.seed:frames",
+    "determinism.seed:asked",
+    "determinism.seed:hash",
+    "join.refused:ended",
+    "join.refused:ten",
+    "return.generation:zero",
+    "return.replaced:unnamed",
+    "epoch.init:unnamed",
+    "end.clock:repeated",
 ];
 
 /// Further ways that are about how a message is written or put.
@@ -320,7 +333,7 @@ const OTHERWISE_ON_THE_WIRE: [&str; 17] = [
 ];
 
 /// How many kits run at the same time: their robots mostly wait.
-const KITS: usize = 2;
+const KITS: usize = 3;
 
 /// The rule that a robot breaks, from the way in which it does.
 fn rule_of(how: &str) -> &str {
@@ -368,11 +381,22 @@ fn a_wrong_robot_fails_in_the_part_in_which_it_is_wrong() {
     assert!(misjudgments.is_empty(), "{}", misjudgments.join("\n"));
 }
 
+/// All rules are checked of a robot that breaks the first of each section; the others take as long and are played by their rule only.
 #[test]
 #[ignore = "thorough: with `-- --include-ignored`"]
 fn a_wrong_robot_fails_by_the_rule_that_it_breaks_and_by_no_other() {
-    let robots: Vec<(&str, Vec<ProtocolRule>)> =
-        RULES.iter().map(|rule| (rule.name, Vec::new())).collect();
+    let mut robots = Vec::new();
+    let mut before = None;
+    for rule in RULES {
+        let section = rule.name.split('.').next();
+        let rules = if section == before {
+            vec![rule]
+        } else {
+            Vec::new()
+        };
+        robots.push((rule.name, rules));
+        before = section;
+    }
     judge(&robots);
 }
 

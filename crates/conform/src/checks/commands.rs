@@ -27,16 +27,28 @@ const LAST: Tick = FIRST + 3;
 const TICKS: Tick = LAST + 6;
 /// More commands in the news of a tick than a robot that counts on few of them has room for, and so few that each has.
 const MANY: usize = 520;
+/// The same for a program, which may say something of each in its log.
+const MANY_LOGGED: usize = 500;
 /// So many long ones are most of what may arrive in a tick.
 const MANY_LONG: usize = 200;
 const FEW: usize = 7;
 /// The last tick where as many come in few in each tick.
 const LAST_OF_MANY: Tick = FIRST + (MANY / FEW) as Tick;
+
 const SHORT_TEXT: usize = 90;
 /// Most bytes that a line has in which a text is quoted, beside the text.
 const QUOTED_BY: usize = 96;
 /// All kinds of characters that JSON escapes, and such as have two, three and four bytes.
 const ESCAPED_TEXT: &str = " \"a\\b/\t\r\n{\"tick\":9}\u{1}äßﬁ猫🤖 ";
+
+/// How many commands are many for this robot.
+fn many_for(kit: &Kit) -> usize {
+    if kit.stdio.is_program() {
+        MANY_LOGGED
+    } else {
+        MANY
+    }
+}
 
 /// Plays ticks in whose news these commands arrive, each from the sender of the kit's commands.
 fn commanded(kit: &Kit, commands: &[(&str, Tick)]) -> Result<Transcript, RuleFailure> {
@@ -145,8 +157,12 @@ pub(super) fn order(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailur
         }
         // Both ways: a robot that sorts its commands would be right in one of them.
         if votes.right > 0 && back.right > 0 {
-            order_of_senders(kit, &one, &two)?;
-            return last_of_many(kit, &one, &two);
+            // Who sends and how many they are is the same in all parts.
+            if kit.part() == KitPart::Alone {
+                order_of_senders(kit, &one, &two)?;
+                last_of_many(kit, &one, &two)?;
+            }
+            return Ok(());
         }
     }
 
@@ -173,10 +189,6 @@ fn order_of_senders(kit: &Kit, one: &str, two: &str) -> Result<(), RuleFailure> 
         ),
     ];
     let in_crowd = IN_ORDER.map(|names| (KitRoster::Crowd, names.map(crowd_name)));
-    // Who sends is the same in all parts.
-    let in_crowd = in_crowd
-        .into_iter()
-        .filter(|_| kit.part() == KitPart::Alone);
     for (roster, [first, second]) in [(KitRoster::Usual, [first, second])]
         .into_iter()
         .chain(in_crowd)
@@ -242,8 +254,8 @@ fn last_of_many(kit: &Kit, one: &str, two: &str) -> Result<(), RuleFailure> {
 
     let usual = KitRoster::Usual;
     for (roster, listed, last) in [
-        (usual, vec![one.clone(); MANY], &two),
-        (usual, vec![two.clone(); MANY], &one),
+        (usual, vec![one.clone(); many_for(kit)], &two),
+        (usual, vec![two.clone(); many_for(kit)], &one),
         (usual, vec![one.clone(), two.clone()], &one),
         (usual, vec![first], &second),
         (usual, vec![long; MANY_LONG], &two),
@@ -261,13 +273,14 @@ fn last_of_many(kit: &Kit, one: &str, two: &str) -> Result<(), RuleFailure> {
             )
         };
         let without = effect(None)?;
+        if !is_same(&effect(Some(last.clone()))?, &without) {
+            continue;
+        }
         let after = ArrivingCommand {
             tick: last.tick + 1,
             ..last.clone()
         };
-        if !is_same(&effect(Some(after))?, &without)
-            && is_same(&effect(Some(last.clone()))?, &without)
-        {
+        if !is_same(&effect(Some(after))?, &without) {
             let texts: Vec<String> = listed
                 .iter()
                 .map(|command| command.text.chars().take(FEW).collect())
@@ -352,6 +365,7 @@ fn shown(kit: &Kit) -> String {
 /// The same command not at all, once, often in several ticks, and as often in the news of one.
 struct ManyPlays {
     text: String,
+    count: usize,
     none: Transcript,
     once: Transcript,
     apart: Transcript,
@@ -361,16 +375,18 @@ struct ManyPlays {
 impl ManyPlays {
     fn play(kit: &Kit, text: &str) -> Result<Self, RuleFailure> {
         let sender = kit.sender();
+        let count = many_for(kit);
         let played = |commands: &mut dyn Iterator<Item = Tick>| {
             let arrivals = arrivals(&sender, commands.map(|tick| (text, tick)));
             played(kit, &PlayScript::with(LAST_OF_MANY, arrivals))
         };
         Ok(Self {
             text: text.to_owned(),
+            count,
             none: played(&mut std::iter::empty())?,
             once: played(&mut std::iter::once(LAST))?,
-            apart: played(&mut (0..MANY).map(|at| FIRST + (at / FEW) as Tick))?,
-            together: played(&mut std::iter::repeat_n(LAST, MANY))?,
+            apart: played(&mut (0..count).map(|at| FIRST + (at / FEW) as Tick))?,
+            together: played(&mut std::iter::repeat_n(LAST, count))?,
         })
     }
 }
@@ -446,7 +462,10 @@ fn twice(
         }
         if votes.right > 0 {
             from_two(kit, &text, &none, &once)?;
-            return demand_many(plays.insert(ManyPlays::play(kit, &text)?));
+            return match kit.part() {
+                KitPart::Alone => demand_many(plays.insert(ManyPlays::play(kit, &text)?)),
+                _ => Ok(()),
+            };
         }
     }
 
@@ -501,11 +520,13 @@ fn demand_many(plays: &ManyPlays) -> Result<(), RuleFailure> {
             continue;
         };
         // Counted exactly over several ticks: so it counts commands, whatever else it depends on.
-        let is_counter = first - before != 0.0 && wanted - before == MANY as f64 * (first - before);
+        let is_counter =
+            first - before != 0.0 && wanted - before == plays.count as f64 * (first - before);
         if is_counter && came < wanted {
             return Err(RuleFailure::new(
                 format!(
-                    "{MANY} commands in the news of a tick are all executed: {name} = {wanted}"
+                    "{} commands in the news of a tick are all executed: {name} = {wanted}",
+                    plays.count
                 ),
                 format!("{name} = {came}"),
             ));
@@ -553,13 +574,10 @@ pub(super) fn payload(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         ("an empty list as payload", json!([])),
         ("an empty object as payload", json!({})),
     ];
-    let with_payload = |text: &str, payload: &Value| {
-        let arrival = ArrivingCommand::new(&kit.sender(), text, LAST).with_payload(payload);
-        played(kit, &PlayScript::with(TICKS, vec![arrival]))
-    };
-    for (_, payload) in &payloads {
-        with_payload(&text, payload)?;
-    }
+    let understood = payloads
+        .iter()
+        .map(|(_, payload)| (text.as_str(), Some(payload)));
+    played(kit, &one_by_one(kit, understood))?;
 
     // Programs may quote it in a line of their log, which is not to be longer.
     let room = if kit.stdio.is_program() { QUOTED_BY } else { 0 };
@@ -572,9 +590,8 @@ pub(super) fn payload(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     // Of a text that the robot does not know, it expects no payload.
     let short = "x".repeat(SHORT_TEXT);
     let mut unknown = Vec::new();
-    for (what, payload) in payloads {
-        let played = with_payload(&short, &payload)?;
-        unknown.push((format!("a text with {what}"), played));
+    for (what, payload) in &payloads {
+        unknown.push((format!("a text with {what}"), short.as_str(), Some(payload)));
     }
     for (what, text) in [
         (format!("a text of {} bytes", longest.len()), &*longest),
@@ -588,17 +605,35 @@ pub(super) fn payload(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         (format!("the text {ESCAPED_TEXT:?}"), ESCAPED_TEXT),
         ("an empty text".to_owned(), ""),
     ] {
-        unknown.push((what, commanded(kit, &[(text, LAST)])?));
+        unknown.push((what, text, None));
     }
     demand_counted(kit, &short, &unknown)
 }
 
-/// Where a variable counts commands that the robot does not know, it counts the one in each of these plays like a short one.
+/// Each of these texts and payloads in the news of a tick of its own.
+fn one_by_one<'t>(
+    kit: &Kit,
+    commands: impl IntoIterator<Item = (&'t str, Option<&'t Value>)>,
+) -> PlayScript {
+    let mut arriving = Vec::new();
+    for ((text, payload), tick) in commands.into_iter().zip(FIRST..) {
+        let command = ArrivingCommand::new(&kit.sender(), text, tick);
+        arriving.push(match payload {
+            Some(payload) => command.with_payload(payload),
+            None => command,
+        });
+    }
+    PlayScript::with(FIRST + arriving.len() as Tick, arriving)
+}
+
+/// Where a variable counts commands that the robot does not know, it counts each of these like a short one.
 fn demand_counted(
     kit: &Kit,
     short: &str,
-    plays: &[(String, Transcript)],
+    commands: &[(String, &str, Option<&Value>)],
 ) -> Result<(), RuleFailure> {
+    let listed = commands.iter().map(|(_, text, payload)| (*text, *payload));
+    let together = numbers(&played(kit, &one_by_one(kit, listed))?);
     if kit.is_deterministic.get() == Some(&false) {
         return Ok(());
     }
@@ -609,11 +644,16 @@ fn demand_counted(
         let (Some(before), Some(second)) = (none.get(name), apart.get(name)) else {
             continue;
         };
-        let is_counter = counts(before, first, second);
-        for (text, play) in plays {
-            if is_counter && numbers(play).get(name) == Some(before) {
+        let wanted = before + commands.len() as f64 * (first - before);
+        if !counts(before, first, second) || together.get(name) == Some(&wanted) {
+            continue;
+        }
+        // Which one it does not count is seen where it comes alone.
+        for (what, text, payload) in commands {
+            let alone = played(kit, &one_by_one(kit, [(*text, *payload)]))?;
+            if numbers(&alone).get(name) == Some(before) {
                 return Err(RuleFailure::new(
-                    format!("{text} counts as one of {SHORT_TEXT} bytes: {name} = {first}"),
+                    format!("{what} counts as one of {SHORT_TEXT} bytes: {name} = {first}"),
                     format!("{name} = {before}"),
                 ));
             }
@@ -628,6 +668,10 @@ fn many_sent(
     plays: &mut Option<ManyPlays>,
     findings: &mut Findings,
 ) -> Result<(), RuleFailure> {
+    // How many they are is the same in all parts, and takes long.
+    if kit.part() != KitPart::Alone {
+        return Ok(());
+    }
     let none = sent(&commanded(kit, &[])?);
     for [text, _] in kit.pairs() {
         let once = sent(&commanded(kit, &[(&text, LAST)])?);
@@ -644,13 +688,14 @@ fn many_sent(
         let together = sent(&plays.together);
         // Only one that has an answer to each in several ticks shows that it answers them all.
         let answers = sent(&plays.once).saturating_sub(none);
-        if answers == 0 || apart != none + MANY * answers {
+        if answers == 0 || apart != none + plays.count * answers {
             continue;
         }
         if together < apart {
             return Err(RuleFailure::new(
                 format!(
-                    "{apart} commands in answer to {MANY} in the news of a tick, as to those of several ticks"
+                    "{apart} commands in answer to {} in the news of a tick, as to those of several ticks",
+                    plays.count
                 ),
                 format!("{together} commands"),
             ));
@@ -713,7 +758,9 @@ pub(super) fn from_operator(kit: &Kit, findings: &mut Findings) -> Result<(), Ru
         }
 
         is_seen = true;
-        demand_payload_of_operator(kit, &text)?;
+        if kit.part() == KitPart::Alone {
+            demand_payload_of_operator(kit, &text)?;
+        }
         if is_same(&from_operator, &none) {
             let sender = kit.sender();
             return Err(RuleFailure::new(

@@ -67,12 +67,6 @@ pub(super) fn clock(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     let when = "while it waits for the news that name it";
     demand_end(&mut harness, End::Stopped, when)?;
 
-    let mut harness = with_robot(kit, HarnessOptions::default())?;
-    play(&mut harness, &PlayScript::quiet(3), &mut Straight)?;
-    returns::lose(&mut harness)?;
-    let _unanswered = harness.next_rejoin()?;
-    demand_end(&mut harness, End::Stopped, "while it joins again")?;
-
     let (mut harness, is_asking) = waiting::for_another(kit)?;
     if is_asking {
         let when = "while it waits for another robot's answer";

@@ -2,25 +2,29 @@
 
 use std::time::Duration;
 
+use bus::Declared;
+use protocol::keys::STATE;
 use protocol::messages::{Clock, JoinRequest, KnownSite, Point, StreamReseed, TickUpdate, Welcome};
-use protocol::{Epoch, Tick};
-use serde_json::Value;
+use protocol::{Epoch, RobotName, Tick};
+use serde_json::{Value, json};
 
 use super::{peers, returns, waiting};
 use harness::Joining;
 use harness::comparison::{PlayDifference, demand_same, difference};
 use harness::findings::Findings;
-use harness::kit::Kit;
+use harness::kit::{Kit, KitRoster};
 use harness::patience::PATIENCE;
 use harness::report::RuleFailure;
 use harness::script::{
-    ArrivingCommand, Disturbance, PlayScript, Straight, play, usual, with_robot,
+    ArrivingCommand, Disturbance, PlayScript, Straight, play, played_among, usual, with_robot,
 };
 use harness::transcript::PlayedTick;
 use harness::{Harness, HarnessOptions};
 
 /// No report comes within this time where it is not the robot's turn.
 const QUIET: Duration = Duration::from_millis(300);
+/// The tick before which a person asks for its state.
+const ASKED: Tick = 2;
 /// An epoch that follows the first one, where those between were missed.
 const LATER: Epoch = 4;
 /// Ticks of an epoch that is to leave nothing behind, commands among them; in the last one the robot's move is refused.
@@ -40,10 +44,49 @@ const MOVED_M: f64 = 0.25;
 /// By how much numbers differ between epochs.
 const SHRUNK: f64 = 0.875;
 
-/// Another process, the same seed: the same reports.
+/// Who watches: an observer's token, frames and log lines for it, panels, and a person who asks once.
+struct Watched<'k> {
+    kit: &'k Kit,
+    observer: Option<Declared>,
+}
+
+impl Disturbance for Watched<'_> {
+    fn before(&mut self, harness: &mut Harness<'_>, tick: Tick) -> Result<(), RuleFailure> {
+        let bus = &self.kit.bus;
+        if self.observer.is_none() {
+            self.observer = Some(bus.token(&harness.keys.alive_viewer())?);
+        }
+        let frame = json!({
+            "epoch": harness.epoch(),
+            "tick": tick,
+            "robots": harness.fake_peers.sensed(harness.epoch(), tick),
+        });
+        bus.put(&harness.keys.world(), frame.to_string().into())?;
+        bus.put(
+            &harness.keys.log(),
+            json!({ "tick": tick }).to_string().into(),
+        )?;
+
+        harness.shows_panels = true;
+        if tick == ASKED {
+            let _newest = harness.ask(STATE, "")?;
+        }
+        Ok(())
+    }
+}
+
+/// Another process, the same seed: the same reports, whoever watches.
 pub(super) fn same_seed(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
-    let mut harness = with_robot(kit, HarnessOptions::default())?;
-    let again = play(&mut harness, &PlayScript::usual(kit), &mut Straight)?;
+    let options = HarnessOptions {
+        is_followed: true,
+        ..HarnessOptions::default()
+    };
+    let mut harness = with_robot(kit, options)?;
+    let mut watched = Watched {
+        kit,
+        observer: None,
+    };
+    let again = play(&mut harness, &PlayScript::usual(kit), &mut watched)?;
     if let [Ok(request)] = &harness.seen.requests[..]
         && request.instance == kit.first_instance()
     {
@@ -61,7 +104,25 @@ pub(super) fn same_seed(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFa
     match found {
         None => Ok(()),
         Some(PlayDifference { first, second, .. }) => Err(RuleFailure::new(
-            format!("another process reports the same for the same seed: {first}"),
+            format!("another process reports the same for the same seed, whoever watches: {first}"),
+            second,
+        )),
+    }
+}
+
+/// Of many others none is the first by chance: which one a robot turns to must not depend on the iteration order of a hash table.
+pub(super) fn among_many(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
+    if kit.is_deterministic.get() == Some(&false) {
+        return Ok(());
+    }
+    let senders: Vec<RobotName> = kit.others(KitRoster::Crowd).into_keys().collect();
+    let script = PlayScript::in_turn(kit, &senders, BUSY);
+    let first = played_among(kit, KitRoster::Crowd, &script)?;
+    let again = played_among(kit, KitRoster::Crowd, &script)?;
+    match difference(&first, &again) {
+        None => Ok(()),
+        Some(PlayDifference { first, second, .. }) => Err(RuleFailure::new(
+            format!("another process reports the same among many others: {first}"),
             second,
         )),
     }
@@ -258,7 +319,10 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         }
     }
     let mut harness = with_robot(kit, HarnessOptions::default())?;
+    // Whom it knows from the epoch before is elsewhere in this one.
+    harness.fake_peers.displace(true);
     play(&mut harness, &busy(kit), &mut Straight)?;
+    harness.fake_peers.displace(false);
     let [text, _] = kit.texts();
     // News of ticks that are never granted must not be taken for those of the next epoch.
     for tick in harness.next_tick()..harness.next_tick() + NEVER_GRANTED {
@@ -326,7 +390,8 @@ enum Differing {
 }
 
 fn differ(welcome: &mut Welcome, differs: Differing) {
-    welcome.seed += 1;
+    // Also a robot that takes this seed for none must repeat itself.
+    welcome.seed = u64::from(welcome.seed == 0);
     welcome.stream.push_str("#other");
     welcome.location.x += MOVED_M;
     if differs == Differing::All {
@@ -395,7 +460,11 @@ pub(super) fn while_waiting(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailu
         harness.fake_peers.hold_before(LATER, 0);
         begin_later(&mut harness)?;
     }
-    Ok(())
+
+    // Of an incarnation that waits to be named nothing is left.
+    let mut harness = returns::returned_once(kit)?;
+    harness.template = kit.template(&harness.run, KitRoster::Usual);
+    begin_later(&mut harness)
 }
 
 /// A later epoch begins, not always the next one: the robot may have missed some.

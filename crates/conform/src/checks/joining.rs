@@ -14,8 +14,16 @@ use harness::{Harness, HarnessOptions};
 
 /// For how long a welcome is held back, to see whether the robot waits for it.
 const HELD_BACK: Duration = Duration::from_millis(200);
+/// Reasons after which no other attempt can succeed.
+const FOR_GOOD: [Refusal; 5] = [
+    Refusal::UnknownName,
+    Refusal::OtherProtocol,
+    Refusal::OtherRun,
+    Refusal::Malformed,
+    Refusal::Ended,
+];
 /// How often its place is taken before it is free.
-const TAKEN: usize = 3;
+const TAKEN: usize = 25;
 /// How much longer than its patience a robot may try, and end.
 const GRACE: Duration = Duration::from_secs(10);
 
@@ -55,18 +63,20 @@ pub(super) fn ready_last(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure>
 
 /// Refused for good, it ends with the reason on its standard error; refused because its place is taken, it tries again until its patience is over.
 pub(super) fn refused(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
-    refused_for_good(kit)?;
+    for reason in FOR_GOOD {
+        refused_for_good(kit, reason)?;
+    }
     taken_for_a_while(kit)?;
     taken_forever(kit)
 }
 
-fn refused_for_good(kit: &Kit) -> Result<(), RuleFailure> {
+fn refused_for_good(kit: &Kit, reason: Refusal) -> Result<(), RuleFailure> {
     let mut harness = Harness::open_run(kit, HarnessOptions::default())?;
     let joining = harness.next_join(START_PATIENCE)?;
-    let explanation = format!("no robot of {} has this name", harness.run);
-    harness.refuse_join(joining, Refusal::UnknownName, &explanation);
-    let expected = "its process ends when it is refused with unknown_name";
-    let status = harness.until_ended(expected, PATIENCE)?;
+    let explanation = format!("{} wants no robot of this name", harness.run);
+    harness.refuse_join(joining, reason, &explanation);
+    let expected = format!("its process ends when it is refused: {reason:?}");
+    let status = harness.until_ended(&expected, PATIENCE)?;
     if status.success() {
         return Err(RuleFailure::new(
             "an exit status other than 0 when it is refused",

@@ -65,7 +65,7 @@ const EPOCHS: [KitPart; 2] = [KitPart::Alone, KitPart::LaterEpoch];
 const RETURN: [KitPart; 1] = [KitPart::Rejoined];
 
 /// Checks that need nothing but the usual ticks before; those that take longest begin.
-const CHECKS: [Check; 43] = [
+const CHECKS: [Check; 44] = [
     rules(&["join.refused"], joining::refused).only(&START),
     rules(&["news.wait"], news::wait),
     rules(&["command.order"], commands::order),
@@ -88,6 +88,7 @@ const CHECKS: [Check; 43] = [
     rules(&["epoch.init"], epochs::other_welcome).only(&EPOCHS),
     rules(&["epoch.init"], epochs::while_waiting).only(&EPOCHS),
     rules(&["epoch.late"], epochs::late).only(&EPOCHS),
+    rules(&["determinism.seed"], epochs::among_many).only(&START),
     rules(&["return.generation"], returns::generation).only(&START),
     rules(&["return.generation"], returns::commanded).only(&START),
     rules(&["return.rejoin"], returns::rejoin).only(&EPOCHS),
@@ -141,7 +142,7 @@ const PRESUMED: [(&str, &str); 14] = [
 ];
 
 /// Processes of the robot that run at the same time.
-const WORKERS: usize = 8;
+const WORKERS: usize = 12;
 
 /// Checks the robot that `command` starts: all rules, or those in `rules`. Tells how many checks are done, and of how many.
 ///

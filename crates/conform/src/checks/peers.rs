@@ -11,7 +11,7 @@ use harness::fake_peers::Unhelpful;
 use harness::findings::Findings;
 use harness::kit::Kit;
 use harness::patience::PATIENCE;
-use harness::report::RuleFailure;
+use harness::report::{KitPart, RuleFailure};
 use harness::script::{ArrivingCommand, Disturbance, PlayScript, Straight, play, with_robot};
 use harness::transcript::PlayedTick;
 use harness::{Harness, HarnessOptions};
@@ -23,6 +23,7 @@ const ROUND: Tick = 9;
 /// A robot that gives up, gives up in less: after a time, or after so many refusals.
 const SILENCE: Duration = Duration::from_secs(11);
 const REFUSALS: usize = 10;
+const BRIEFLY: Duration = Duration::from_secs(1);
 /// Ticks in which the answers of others are compared, fewer than the usual ones.
 const TICKS: Tick = 30;
 
@@ -154,7 +155,8 @@ pub(super) fn reply(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailur
         fn before(&mut self, harness: &mut Harness<'_>, tick: Tick) -> Result<(), RuleFailure> {
             harness.withholds_news = self.are_early && tick > 0;
             if self.are_early && tick.is_multiple_of(ROUND) {
-                harness.fake_peers.be_unhelpful(&[Unhelpful::EarlierState]);
+                let replies = [Unhelpful::EarlierState, Unhelpful::EarlierEpoch];
+                harness.fake_peers.be_unhelpful(&replies);
             }
             Ok(())
         }
@@ -236,8 +238,10 @@ pub(super) fn again(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailur
         return Ok(());
     }
     let mut harness = waiting::of_queries(kit)?;
+    harness.hide_others();
     let played = play(&mut harness, &shorter(kit), &mut Refusing)?;
-    demand_same(kit, "that others refuse first", &expected, &played)
+    let what = "that others refuse first, and that their tokens are gone";
+    demand_same(kit, what, &expected, &played)
 }
 
 /// It goes on asking robots that do not answer for long, and whose tokens are gone: only a newer clock ends the tick.
@@ -248,11 +252,17 @@ pub(super) fn patient(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFail
         return Ok(());
     }
     harness.hide_others();
-    harness.pass_while(SILENCE, Harness::is_open);
+    // A patience of its own would be the same later.
+    let silence = if kit.part() == KitPart::Alone {
+        SILENCE
+    } else {
+        BRIEFLY
+    };
+    harness.pass_while(silence, Harness::is_open);
     if !harness.is_open() {
         let expected = format!(
             "it asks again for {} s, and puts no report without an answer",
-            SILENCE.as_secs()
+            silence.as_secs()
         );
         return Err(RuleFailure::new(expected, "a report"));
     }

@@ -67,19 +67,27 @@ fn first_ticks(kit: &Kit) -> Result<&[PlayedTick], RuleFailure> {
 
 /// It waits for the news that name it, shows meanwhile what its predecessor reported, and reports as what it is.
 pub(super) fn generation(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
-    let mut harness = returned(kit, &[LAST], first_ticks(kit)?, |_| ())?;
+    let first_ticks = first_ticks(kit)?;
+    // Tick 0 is the turn of a first incarnation only.
+    generation_after(kit, 0, &first_ticks[..1])?;
+    generation_after(kit, LAST, first_ticks)
+}
+
+/// The same after the last tick of its predecessor, which has reported this.
+fn generation_after(kit: &Kit, last: Tick, reported: &[PlayedTick]) -> Result<(), RuleFailure> {
+    let mut harness = returned(kit, &[last], reported, |_| ())?;
     // The last tick was its predecessor's; the next one may go on without it.
     harness.repeat();
     harness.put_clock(&Clock {
         epoch: 1,
-        tick: LAST + 1,
+        tick: last + 1,
         ..Clock::default()
     })?;
     // Nor is it the turn of an incarnation that is placed and not named, or whose predecessor is named.
     for joined in [None, Some(GENERATION - 1)] {
         harness.put_news(&TickUpdate {
             epoch: 1,
-            tick: LAST + 1,
+            tick: last + 1,
             joined,
             correction: Some(Correction {
                 location: harness.template.location,
@@ -89,7 +97,7 @@ pub(super) fn generation(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure>
         })?;
         harness.put_clock(&Clock {
             epoch: 1,
-            tick: LAST + 1,
+            tick: last + 1,
             news: harness.flag(),
             ..Clock::default()
         })?;
@@ -250,7 +258,7 @@ fn join_again(harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
 }
 
 /// The robot misses a tick, and its news ask it to join again. Its requests are queued.
-pub(super) fn lose(harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
+fn lose(harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
     harness.keeps_requests = true;
     harness.miss()?;
     harness.open(&TickUpdate::default())
@@ -345,14 +353,22 @@ pub(super) fn demand_streams(kit: &Kit, findings: &mut Findings) -> Result<(), R
 /// News that name a later incarnation: this one ends.
 pub(super) fn replaced(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     demand_place_taken(kit)?;
+    demand_replaced(returned_once(kit)?, "before it was named itself")?;
     let mut harness = with_robot(kit, HarnessOptions::default())?;
     play(&mut harness, &PlayScript::quiet(3), &mut Straight)?;
+    demand_replaced(harness, "between two ticks")
+}
+
+/// It ends when its news name a later incarnation at this moment.
+fn demand_replaced(mut harness: Harness<'_>, when: &str) -> Result<(), RuleFailure> {
     let tick = harness.next_tick();
     // The robot's own process runs on, as after a cut: it must end by itself.
     harness.play_successor();
     harness.open(&TickUpdate::default())?;
-    let expected = "its process ends, with an exit status other than 0, when its news name a later incarnation";
-    let status = harness.until_ended(expected, PATIENCE)?;
+    let expected = format!(
+        "its process ends, with an exit status other than 0, when its news name a later incarnation {when}"
+    );
+    let status = harness.until_ended(&expected, PATIENCE)?;
     if status.success() {
         return Err(RuleFailure::new(expected, format!("{status}")));
     }

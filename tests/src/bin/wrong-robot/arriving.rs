@@ -14,6 +14,8 @@ use crate::walker::Walker;
 const MAX_EPOCHS: Epoch = 10;
 /// After so many requests without an answer it ends, if it is to.
 const MAX_UNANSWERED: usize = 3;
+/// The same for requests that are refused.
+const MAX_REFUSALS: usize = 10;
 /// Delay of a declaration that is made too late.
 const LATE: Duration = Duration::from_millis(1500);
 
@@ -55,7 +57,16 @@ impl Host {
             self.serve()?;
         }
 
+        let is_unnamed = generation > 1 && !self.has_begun;
         let begins = is_later && clock.end.is_none();
+        if begins && is_unnamed && self.wrong.is("epoch.init:unnamed") {
+            return Ok(());
+        }
+        let is_repeated =
+            clock.tick == self.last_clock.tick && clock.epoch == self.last_clock.epoch;
+        if is_repeated && self.wrong.is("end.clock:repeated") {
+            clock.end = None;
+        }
         if begins && is_asking && self.wrong.is("epoch.init:asking")
             || begins && is_waiting && self.wrong.is("epoch.init:waiting")
             || begins && clock.epoch > own + 1 && self.wrong.is("epoch.late:next")
@@ -96,6 +107,8 @@ impl Host {
             && self.last.is_none_or(|(epoch, _)| epoch < clock.epoch)
             && self.wrong.is("return.generation")
             && own == 1;
+        let is_early =
+            is_early || is_unnamed && clock.tick == 0 && self.wrong.is("return.generation:zero");
         if is_early {
             self.drive(|machine, out| {
                 let naming = IncarnationNotice {
@@ -153,6 +166,10 @@ impl Host {
             .map_or(0, |welcome| welcome.generation);
         if self.wrong.is("return.replaced") && news.joined.is_some_and(|joined| joined > generation)
         {
+            news.joined = None;
+        }
+        let is_later = news.joined.is_some_and(|joined| joined > generation);
+        if is_later && !self.has_begun && self.wrong.is("return.replaced:unnamed") {
             news.joined = None;
         }
         let is_seated = self.last.is_some() && (news.epoch, generation) == (1, 1);
@@ -253,10 +270,20 @@ impl Host {
                 self.drive(lockstep::Participant::unanswered)
             }
             Some(JoinAnswer::Refused {
+                reason: Refusal::Ended,
+                ..
+            }) if self.wrong.is("join.refused:ended") => {
+                self.drive(lockstep::Participant::unanswered)
+            }
+            Some(JoinAnswer::Refused {
                 reason,
                 explanation,
             }) => {
                 self.explanation = explanation;
+                self.refusals += 1;
+                if self.refusals >= MAX_REFUSALS && self.wrong.is("join.refused:ten") {
+                    self.leave = Some(Leave::Refused(reason));
+                }
                 if reason == Refusal::NameTaken && self.wrong.is("join.refused:impatient") {
                     self.leave = Some(Leave::Refused(reason));
                 }

@@ -1,8 +1,8 @@
 //! The robot's process: its session, its loop, its end.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::process::ExitCode;
-use std::sync::atomic::AtomicU8;
+use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -36,6 +36,8 @@ pub(crate) enum Event {
     Clock(Clock),
     News(Box<TickUpdate>),
     Simulator(bool),
+    /// The token of a robot, which may be gone.
+    Token(String, bool),
     Reply(RobotName, Option<Reply>),
     State(Box<PublicState>),
     /// A command on its way to the medium.
@@ -81,6 +83,10 @@ pub(crate) struct Host {
     pub(crate) is_following: bool,
     /// The state of another robot that arrived last, if it is to use that.
     pub(crate) newest: Option<PublicState>,
+    /// The other robots that are there, if it is to query no others.
+    pub(crate) present: BTreeSet<String>,
+    /// States of others by tick, if it is to keep them.
+    pub(crate) cache: BTreeMap<(RobotName, Tick), PublicState>,
     /// Since when the simulator is gone.
     gone: Option<Instant>,
     /// Whether it has had no answer to its query, if it is to give up then.
@@ -91,6 +97,8 @@ pub(crate) struct Host {
     pub(crate) repetitions: usize,
     /// How many requests to join had no answer.
     pub(crate) unanswered: usize,
+    /// How many of them were refused.
+    pub(crate) refusals: usize,
     /// Whether it was welcomed again in the same epoch.
     pub(crate) has_rejoined: bool,
     /// How often it has queried again.
@@ -130,6 +138,7 @@ impl Host {
             phase: Arc::new(AtomicU8::new(Phase::Idle as u8)),
             deferred: Arc::default(),
             has_reported: Arc::default(),
+            is_watched: Arc::default(),
             wrong: wrong.clone(),
         };
         let states = bus.watched_publisher(&keys.query(&name, STATE))?;
@@ -162,11 +171,14 @@ impl Host {
             queued: VecDeque::new(),
             is_following: false,
             newest: None,
+            present: BTreeSet::new(),
+            cache: BTreeMap::new(),
             gone: None,
             has_given_up: false,
             losses: 0,
             repetitions: 0,
             unanswered: 0,
+            refusals: 0,
             has_rejoined: false,
             queries: 0,
             is_unserved: false,
@@ -200,6 +212,22 @@ impl Host {
 
         if wrong.is("join.ready-last:first") {
             self.declare_token()?;
+        }
+        if wrong.is("query.again:tokens") {
+            let queue = self.queue.clone();
+            let keys = self.keys.alive_robots();
+            let tokens = self.bus.liveliness(&keys, move |key, is_present| {
+                let robot = Keys::last_chunk(key).to_owned();
+                let _ = queue.send(Event::Token(robot, is_present));
+            })?;
+            self.declared.push(tokens);
+        }
+        if wrong.is("determinism.seed:frames") {
+            let is_watched = Arc::clone(&self.shared.is_watched);
+            let frames = self.bus.subscribe(&self.keys.world(), move |_, _| {
+                is_watched.store(true, Ordering::SeqCst);
+            })?;
+            self.declared.push(frames);
         }
         Ok(())
     }
@@ -424,6 +452,14 @@ impl Host {
                 self.on_simulator(is_present);
                 self.drive(|machine, out| machine.simulator(is_present, out))
             }
+            Event::Token(robot, true) => {
+                self.present.insert(robot);
+                Ok(())
+            }
+            Event::Token(robot, false) => {
+                self.present.remove(&robot);
+                Ok(())
+            }
             Event::State(state) => {
                 self.newest = Some(*state);
                 Ok(())
@@ -441,7 +477,11 @@ impl Host {
                     if self.wrong.is("query.reply") {
                         tick = self.last_clock.tick.saturating_sub(1);
                     }
-                    lock(&self.shared.machine).heard(of, state.epoch, tick, state);
+                    let mut epoch = state.epoch;
+                    if self.wrong.is("query.reply:epoch") {
+                        epoch = self.last_clock.epoch;
+                    }
+                    lock(&self.shared.machine).heard(of, epoch, tick, state);
                 }
                 Ok(())
             }

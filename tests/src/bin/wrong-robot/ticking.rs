@@ -1,6 +1,7 @@
 //! The robot's ticks.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use lockstep::{Begin, Sent, Turn};
@@ -26,6 +27,8 @@ const LATE_TICK: Tick = 36;
 /// What a robot counts on that has little room: commands, and bytes of a text.
 const TEN: usize = 10;
 const SHORT_TEXT: usize = 100;
+/// So many robots are few.
+const FEW: usize = 4;
 /// The same for a robot that has more.
 const HUNDRED: usize = 100;
 
@@ -281,6 +284,9 @@ impl Host {
             ("height_m".to_owned(), Variable::from(walker.height_m)),
         ]
         .into();
+        if self.shared.is_watched.load(Ordering::SeqCst) {
+            state_variables.insert("watched", Variable::from(1_u32));
+        }
         if let Some(seen) = seen {
             state_variables.insert("seen_x_m", Variable::from(seen.x));
         }
@@ -373,9 +379,18 @@ impl Host {
         } else {
             others.next()
         };
-        let Some(other) = other.cloned() else {
+        let mut other = other.cloned();
+        if welcome.roster.len() > FEW && self.wrong.is("determinism.seed:hash") {
+            let others: HashSet<&RobotName> = welcome.roster.iter().collect();
+            other = others.into_iter().find(|name| **name != self.name).cloned();
+        }
+        let Some(other) = other else {
             return Ok(None);
         };
+        let is_present = self.present.contains(other.as_str());
+        if !is_present && self.wrong.is("query.again:tokens") {
+            return Ok(None);
+        }
         if tick == 0 && self.wrong.is("query.asking:zero") {
             self.query(other, tick, epoch)?;
             return Ok(None);
@@ -429,6 +444,12 @@ impl Host {
     }
 
     fn await_state(&mut self, of: &RobotName) -> Result<Option<PublicState>, Failure> {
+        let at = (of.clone(), self.last_clock.tick);
+        if self.wrong.is("epoch.init:cache") {
+            if let Some(state) = self.cache.get(&at) {
+                return Ok(Some(state.clone()));
+            }
+        }
         if self.wrong.is("query.reply:newest") {
             if !std::mem::replace(&mut self.is_following, true) {
                 self.follow(of)?;
@@ -441,8 +462,9 @@ impl Host {
             let mut actions = Vec::new();
             let found = lock(&self.shared.machine).ask(of, &mut actions);
             self.perform(actions)?;
-            if found.is_some() {
-                return Ok(found);
+            if let Some(state) = found {
+                self.cache.insert(at, state.clone());
+                return Ok(Some(state));
             }
 
             let is_interrupted = lock(&self.shared.machine).is_interrupted();

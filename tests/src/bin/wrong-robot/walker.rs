@@ -29,7 +29,8 @@ pub(crate) struct Walker {
 
 impl Walker {
     pub(crate) fn new(welcome: &Welcome, wrong: &Wrong) -> Self {
-        let seed = if wrong.is("determinism.seed") {
+        let is_none = welcome.seed == 0 && wrong.is("epoch.init:seed");
+        let seed = if wrong.is("determinism.seed") || is_none {
             std::process::id().into()
         } else {
             welcome.seed

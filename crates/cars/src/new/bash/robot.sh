@@ -82,7 +82,8 @@ tick() {
     obey
 
     # Progress.
-    if [[ $line == *'"blocked":true'* ]]; then
+    # In what stands before the commands: a payload may have any field.
+    if [[ ${line%%'"commands":'*} == *'"blocked":true'* ]]; then
         ((held_up_us += tick_us))
     else
         ((held_up_us -= tick_us / 2))

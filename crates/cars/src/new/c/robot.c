@@ -72,10 +72,13 @@ static void turn(void) {
 
 /* Obeys the commands of the line, one after the other. */
 static void obey(const char *line) {
-    const char *const from = "\"from\":\"", *const what = "\"command\":\"";
+    const char *const from = "\"from\":\"";
+    const char *const what = "\",\"performative\":\"achieve\",\"command\":\"";
     while ((line = strstr(line, from))) {
-        const char *sender = line + strlen(from), *command = strstr(sender, what);
-        if (!command) return;
+        const char *sender = line + strlen(from), *command = sender + length(sender);
+        line = sender;
+        /* In a payload, the fields of an object are in the order of their names. */
+        if (strncmp(command, what, strlen(what))) continue;
         command += strlen(what);
         int size = length(command);
         line = command + size;
@@ -98,8 +101,9 @@ static void tick(const char *line) {
     stand(line);
     obey(line);
 
-    /* Progress. */
-    if (strstr(line, "\"blocked\":true"))
+    /* Progress, in what stands before the commands: a payload may have any field. */
+    const char *blocked = strstr(line, "\"blocked\":true"), *commands = strstr(line, "\"commands\":");
+    if (blocked && (!commands || blocked < commands))
         robot.held_up_s += robot.tick_s;
     else
         robot.held_up_s = fmax(robot.held_up_s - robot.tick_s / 2, 0);
