@@ -1,6 +1,8 @@
 //! The ticks that a robot is taken through: what happens to it is a function of the tick and of what it proposed, so that
 //! the same robot meets the same again.
 
+use std::cell::RefCell;
+use std::ops::Deref;
 use std::time::Duration;
 
 use protocol::messages::{Delivery, Payload, Performative, PublicState, TickUpdate};
@@ -241,12 +243,72 @@ pub fn played_among(
     roster: KitRoster,
     script: &PlayScript,
 ) -> Result<Transcript, RuleFailure> {
+    play(&mut with_robot_among(kit, roster)?, script, &mut Straight)
+}
+
+fn with_robot_among(kit: &Kit, roster: KitRoster) -> Result<Harness<'_>, RuleFailure> {
     let options = HarnessOptions {
         roster,
         ..HarnessOptions::default()
     };
-    let mut harness = with_robot(kit, options)?;
-    play(&mut harness, script, &mut Straight)
+    with_robot(kit, options)
+}
+
+/// Many plays that are compared with each other. One process goes through them, in an epoch for each: to start a program takes longer
+/// than a play. One that has joined again is what it is in one epoch only, so there each play has a process of its own.
+pub struct Plays<'k> {
+    kit: &'k Kit,
+    harnesses: RefCell<Vec<(KitRoster, Harness<'k>)>>,
+}
+
+impl Deref for Plays<'_> {
+    type Target = Kit;
+
+    fn deref(&self) -> &Kit {
+        self.kit
+    }
+}
+
+impl<'k> Plays<'k> {
+    /// Before the first of them.
+    pub fn new(kit: &'k Kit) -> Self {
+        Self {
+            kit,
+            harnesses: RefCell::default(),
+        }
+    }
+
+    /// The next of them, in the usual roster.
+    pub fn play(&self, script: &PlayScript) -> Result<Transcript, RuleFailure> {
+        self.play_among(KitRoster::Usual, script, &mut Straight)
+    }
+
+    /// The same in a roster, with a disturbance.
+    pub fn play_among(
+        &self,
+        roster: KitRoster,
+        script: &PlayScript,
+        disturbance: &mut dyn Disturbance,
+    ) -> Result<Transcript, RuleFailure> {
+        let mut harnesses = self.harnesses.borrow_mut();
+        let at = match harnesses.iter().position(|(of, _)| *of == roster) {
+            Some(at) if self.kit.part() != KitPart::Rejoined => {
+                let harness = &mut harnesses[at].1;
+                harness.seen.forget();
+                harness.begin_epoch(harness.epoch() + 1);
+                at
+            }
+            _ => {
+                harnesses.push((roster, with_robot_among(self.kit, roster)?));
+                harnesses.len() - 1
+            }
+        };
+        let played = play(&mut harnesses[at].1, script, disturbance);
+        if self.kit.part() == KitPart::Rejoined {
+            harnesses.clear();
+        }
+        played
+    }
 }
 
 /// The usual ticks, as the robot went through them without any disturbance.

@@ -8,17 +8,16 @@ use protocol::messages::{
 use protocol::{RobotName, Tick};
 use serde_json::{Value, json};
 
+use harness::Harness;
 use harness::comparison::is_same;
 use harness::findings::Findings;
 use harness::kit::{Kit, KitRoster};
 use harness::report::{KitPart, RuleFailure};
 use harness::script::{
-    ArrivingCommand, CUT_OFF, Disturbance, OUT_OF_RANGE, PlayScript, play, played, played_among,
-    with_robot,
+    ArrivingCommand, CUT_OFF, Disturbance, OUT_OF_RANGE, PlayScript, Plays, Straight,
 };
 use harness::setting::IN_ORDER;
 use harness::transcript::Transcript;
-use harness::{Harness, HarnessOptions};
 
 /// The first tick that is played in all parts: one that has joined again has been through those before.
 const FIRST: Tick = 4;
@@ -51,23 +50,23 @@ fn many_for(kit: &Kit) -> usize {
 }
 
 /// Plays ticks in whose news these commands arrive, each from the sender of the kit's commands.
-fn commanded(kit: &Kit, commands: &[(&str, Tick)]) -> Result<Transcript, RuleFailure> {
-    commanded_by(&kit.sender(), kit, commands)
+fn commanded(plays: &Plays<'_>, commands: &[(&str, Tick)]) -> Result<Transcript, RuleFailure> {
+    commanded_by(&plays.sender(), plays, commands)
 }
 
 fn commanded_by(
     from: &RobotName,
-    kit: &Kit,
+    plays: &Plays<'_>,
     commands: &[(&str, Tick)],
 ) -> Result<Transcript, RuleFailure> {
-    played(
-        kit,
-        &PlayScript::with(TICKS, arrivals(from, commands.iter().copied())),
-    )
+    plays.play(&PlayScript::with(
+        TICKS,
+        arrivals(from, commands.iter().copied()),
+    ))
 }
 
 /// Plays a command whose news say that the robot is blocked, where it stands.
-fn commanded_while_blocked(kit: &Kit, text: &str) -> Result<Transcript, RuleFailure> {
+fn commanded_while_blocked(plays: &Plays<'_>, text: &str) -> Result<Transcript, RuleFailure> {
     struct Blocked;
     impl Disturbance for Blocked {
         fn news(&mut self, harness: &Harness<'_>, news: &mut TickUpdate) {
@@ -80,18 +79,20 @@ fn commanded_while_blocked(kit: &Kit, text: &str) -> Result<Transcript, RuleFail
             }
         }
     }
-    let script = PlayScript::with(TICKS, arrivals(&kit.sender(), [(text, LAST)]));
-    let mut harness = with_robot(kit, HarnessOptions::default())?;
-    play(&mut harness, &script, &mut Blocked)
+    let script = PlayScript::with(TICKS, arrivals(&plays.sender(), [(text, LAST)]));
+    plays.play_among(KitRoster::Usual, &script, &mut Blocked)
 }
 
 /// Plays these commands of two senders, in the order in which news list those.
-fn commanded_by_two(kit: &Kit, commands: [(&str, Tick); 2]) -> Result<Transcript, RuleFailure> {
+fn commanded_by_two(
+    plays: &Plays<'_>,
+    commands: [(&str, Tick); 2],
+) -> Result<Transcript, RuleFailure> {
     let mut arrivals = Vec::new();
-    for (from, (text, tick)) in two_senders(kit).iter().zip(commands) {
+    for (from, (text, tick)) in two_senders(plays).iter().zip(commands) {
         arrivals.push(ArrivingCommand::new(from, text, tick));
     }
-    played(kit, &PlayScript::with(TICKS, arrivals))
+    plays.play(&PlayScript::with(TICKS, arrivals))
 }
 
 /// A robot and the operator, in the order in which news list their commands.
@@ -130,13 +131,14 @@ impl Votes {
 
 /// Two commands in the same news have the effect of the same two in two ticks, in the same order.
 pub(super) fn order(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
-    for [one, two] in kit.pairs() {
+    let plays = &Plays::new(kit);
+    for [one, two] in plays.pairs() {
         // Two ticks show what the order of two commands means to this robot; one tick shows which order
         // it takes.
-        let straight = values(&commanded(kit, &[(&one, LAST - 1), (&two, LAST)])?);
-        let swapped = values(&commanded(kit, &[(&two, LAST - 1), (&one, LAST)])?);
-        let in_order = values(&commanded(kit, &[(&one, LAST), (&two, LAST)])?);
-        let reversed = values(&commanded(kit, &[(&two, LAST), (&one, LAST)])?);
+        let straight = values(&commanded(plays, &[(&one, LAST - 1), (&two, LAST)])?);
+        let swapped = values(&commanded(plays, &[(&two, LAST - 1), (&one, LAST)])?);
+        let in_order = values(&commanded(plays, &[(&one, LAST), (&two, LAST)])?);
+        let reversed = values(&commanded(plays, &[(&two, LAST), (&one, LAST)])?);
         // Where both are the same, the order within a tick makes no difference to this robot, or it sorts its commands: only a variable
         // with the text of the last command tells which.
         if in_order == reversed && !shows_last(&straight, &two, &swapped, &one) {
@@ -158,9 +160,9 @@ pub(super) fn order(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailur
         // Both ways: a robot that sorts its commands would be right in one of them.
         if votes.right > 0 && back.right > 0 {
             // Who sends and how many they are is the same in all parts.
-            if kit.part() == KitPart::Alone {
-                order_of_senders(kit, &one, &two)?;
-                last_of_many(kit, &one, &two)?;
+            if plays.part() == KitPart::Alone {
+                order_of_senders(plays, &one, &two)?;
+                last_of_many(plays, &one, &two)?;
             }
             return Ok(());
         }
@@ -168,16 +170,16 @@ pub(super) fn order(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailur
 
     let reason = format!(
         "the robot does not show in which order it executes {}; name commands that it understands with --say",
-        shown(kit)
+        shown(plays)
     );
     findings.skip("command.order", &reason);
     Ok(())
 }
 
 /// The same of commands from two senders, and of one with a payload: news list all of the first one before those of the second one.
-fn order_of_senders(kit: &Kit, one: &str, two: &str) -> Result<(), RuleFailure> {
+fn order_of_senders(plays: &Plays<'_>, one: &str, two: &str) -> Result<(), RuleFailure> {
     let from = |sender: &RobotName, text: &str| ArrivingCommand::new(sender, text, LAST);
-    let [first, second] = two_senders(kit);
+    let [first, second] = two_senders(plays);
     let mut cases = vec![
         (
             KitRoster::Usual,
@@ -207,7 +209,8 @@ fn order_of_senders(kit: &Kit, one: &str, two: &str) -> Result<(), RuleFailure> 
                 });
             }
             arriving.reverse();
-            played_among(kit, roster, &PlayScript::with(TICKS, arriving))
+            plays
+                .play_among(roster, &PlayScript::with(TICKS, arriving), &mut Straight)
                 .map(|played| values(&played))
         };
 
@@ -238,15 +241,15 @@ fn crowd_name(name: &str) -> RobotName {
 
 /// The last command in the news of a tick is executed, whatever is listed before it and whomever the robot can query, if it is in the tick
 /// after it.
-fn last_of_many(kit: &Kit, one: &str, two: &str) -> Result<(), RuleFailure> {
-    let sender = kit.sender();
+fn last_of_many(plays: &Plays<'_>, one: &str, two: &str) -> Result<(), RuleFailure> {
+    let sender = plays.sender();
     let at = |from: &RobotName, text: &str, tick| ArrivingCommand::new(from, text, tick);
     let [one, two] = [one, two].map(|text| at(&sender, text, LAST));
     let [first, second] = [1, 2].map(|number| one.clone().with_payload(&json!(number)));
     let long = at(&sender, &"x".repeat(MAX_TEXT_BYTES / 2), LAST);
     let operator = RobotName::operator();
     let of_operator = [&one, &two].map(|command| at(&operator, &command.text, LAST));
-    let crowd: Vec<RobotName> = kit.others(KitRoster::Crowd).into_keys().collect();
+    let crowd: Vec<RobotName> = plays.others(KitRoster::Crowd).into_keys().collect();
     let of_crowd = crowd.iter().map(|from| at(from, &one.text, LAST));
     let of_last = crowd
         .last()
@@ -254,8 +257,8 @@ fn last_of_many(kit: &Kit, one: &str, two: &str) -> Result<(), RuleFailure> {
 
     let usual = KitRoster::Usual;
     for (roster, listed, last) in [
-        (usual, vec![one.clone(); many_for(kit)], &two),
-        (usual, vec![two.clone(); many_for(kit)], &one),
+        (usual, vec![one.clone(); many_for(plays)], &two),
+        (usual, vec![two.clone(); many_for(plays)], &one),
         (usual, vec![one.clone(), two.clone()], &one),
         (usual, vec![first], &second),
         (usual, vec![long; MANY_LONG], &two),
@@ -266,10 +269,10 @@ fn last_of_many(kit: &Kit, one: &str, two: &str) -> Result<(), RuleFailure> {
     ] {
         let effect = |last: Option<ArrivingCommand>| {
             let commands = listed.iter().cloned().chain(last).collect();
-            played_among(
-                kit,
+            plays.play_among(
                 roster,
                 &PlayScript::with(CUT_OFF + FEW as Tick, commands),
+                &mut Straight,
             )
         };
         let without = effect(None)?;
@@ -354,8 +357,9 @@ fn vote(
 }
 
 /// The pairs of commands that were tried.
-fn shown(kit: &Kit) -> String {
-    kit.pairs()
+fn shown(plays: &Plays<'_>) -> String {
+    plays
+        .pairs()
         .iter()
         .map(|[one, two]| format!("{one:?} and {two:?}"))
         .collect::<Vec<_>>()
@@ -373,12 +377,12 @@ struct ManyPlays {
 }
 
 impl ManyPlays {
-    fn play(kit: &Kit, text: &str) -> Result<Self, RuleFailure> {
-        let sender = kit.sender();
-        let count = many_for(kit);
+    fn play(plays: &Plays<'_>, text: &str) -> Result<Self, RuleFailure> {
+        let sender = plays.sender();
+        let count = many_for(plays);
         let played = |commands: &mut dyn Iterator<Item = Tick>| {
             let arrivals = arrivals(&sender, commands.map(|tick| (text, tick)));
-            played(kit, &PlayScript::with(LAST_OF_MANY, arrivals))
+            plays.play(&PlayScript::with(LAST_OF_MANY, arrivals))
         };
         Ok(Self {
             text: text.to_owned(),
@@ -393,9 +397,10 @@ impl ManyPlays {
 
 /// Commands are executed as often as the news list them, and then each is answered by a robot that answers each.
 pub(super) fn many(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
-    let mut plays = None;
-    let counted = twice(kit, &mut plays, findings);
-    let answered = many_sent(kit, &mut plays, findings);
+    let plays = &Plays::new(kit);
+    let mut many = None;
+    let counted = twice(plays, &mut many, findings);
+    let answered = many_sent(plays, &mut many, findings);
     if let Err(failure) = answered {
         findings.fail("command.sent", failure);
     }
@@ -404,11 +409,11 @@ pub(super) fn many(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure
 
 /// A command that is listed twice is executed twice.
 fn twice(
-    kit: &Kit,
-    plays: &mut Option<ManyPlays>,
+    plays: &Plays<'_>,
+    many: &mut Option<ManyPlays>,
     findings: &mut Findings,
 ) -> Result<(), RuleFailure> {
-    if kit.is_deterministic.get() == Some(&false) {
+    if plays.is_deterministic.get() == Some(&false) {
         findings.skip(
             "command.twice",
             "the robot does not repeat itself, so that nothing can be compared",
@@ -416,13 +421,13 @@ fn twice(
         return Ok(());
     }
 
-    let none = numbers(&commanded(kit, &[])?);
-    for [text, _] in kit.pairs() {
-        let once = numbers(&commanded(kit, &[(&text, LAST)])?);
-        let apart = numbers(&commanded(kit, &[(&text, LAST - 3), (&text, LAST)])?);
-        let adjacent = numbers(&commanded(kit, &[(&text, LAST - 1), (&text, LAST)])?);
-        let doubled = numbers(&commanded(kit, &[(&text, LAST), (&text, LAST)])?);
-        let blocked = numbers(&commanded_while_blocked(kit, &text)?);
+    let none = numbers(&commanded(plays, &[])?);
+    for [text, _] in plays.pairs() {
+        let once = numbers(&commanded(plays, &[(&text, LAST)])?);
+        let apart = numbers(&commanded(plays, &[(&text, LAST - 3), (&text, LAST)])?);
+        let adjacent = numbers(&commanded(plays, &[(&text, LAST - 1), (&text, LAST)])?);
+        let doubled = numbers(&commanded(plays, &[(&text, LAST), (&text, LAST)])?);
+        let blocked = numbers(&commanded_while_blocked(plays, &text)?);
 
         let mut votes = Votes::default();
         let mut counter = String::new();
@@ -461,9 +466,9 @@ fn twice(
             ));
         }
         if votes.right > 0 {
-            from_two(kit, &text, &none, &once)?;
-            return match kit.part() {
-                KitPart::Alone => demand_many(plays.insert(ManyPlays::play(kit, &text)?)),
+            from_two(plays, &text, &none, &once)?;
+            return match plays.part() {
+                KitPart::Alone => demand_many(many.insert(ManyPlays::play(plays, &text)?)),
                 _ => Ok(()),
             };
         }
@@ -471,7 +476,7 @@ fn twice(
 
     let reason = format!(
         "no variable of the robot counts the commands that it executes, of {}",
-        shown(kit)
+        shown(plays)
     );
     findings.skip("command.twice", &reason);
     Ok(())
@@ -479,13 +484,13 @@ fn twice(
 
 /// The same command of two senders is two commands.
 fn from_two(
-    kit: &Kit,
+    plays: &Plays<'_>,
     text: &str,
     none: &BTreeMap<String, f64>,
     once: &BTreeMap<String, f64>,
 ) -> Result<(), RuleFailure> {
-    let apart = numbers(&commanded_by_two(kit, [(text, LAST - 1), (text, LAST)])?);
-    let together = numbers(&commanded_by_two(kit, [(text, LAST), (text, LAST)])?);
+    let apart = numbers(&commanded_by_two(plays, [(text, LAST - 1), (text, LAST)])?);
+    let together = numbers(&commanded_by_two(plays, [(text, LAST), (text, LAST)])?);
     for (name, first) in once {
         let (Some(before), Some(second), Some(came)) =
             (none.get(name), apart.get(name), together.get(name))
@@ -509,11 +514,11 @@ fn counts(none: &f64, one: &f64, two: &f64) -> bool {
 }
 
 /// As many executions as the news list, also where that is more than a few. A counter that stops early is not one of commands.
-fn demand_many(plays: &ManyPlays) -> Result<(), RuleFailure> {
-    let none = numbers(&plays.none);
-    let apart = numbers(&plays.apart);
-    let together = numbers(&plays.together);
-    for (name, first) in &numbers(&plays.once) {
+fn demand_many(many: &ManyPlays) -> Result<(), RuleFailure> {
+    let none = numbers(&many.none);
+    let apart = numbers(&many.apart);
+    let together = numbers(&many.together);
+    for (name, first) in &numbers(&many.once) {
         let (Some(before), Some(wanted), Some(came)) =
             (none.get(name), apart.get(name), together.get(name))
         else {
@@ -521,12 +526,12 @@ fn demand_many(plays: &ManyPlays) -> Result<(), RuleFailure> {
         };
         // Counted exactly over several ticks: so it counts commands, whatever else it depends on.
         let is_counter =
-            first - before != 0.0 && wanted - before == plays.count as f64 * (first - before);
+            first - before != 0.0 && wanted - before == many.count as f64 * (first - before);
         if is_counter && came < wanted {
             return Err(RuleFailure::new(
                 format!(
                     "{} commands in the news of a tick are all executed: {name} = {wanted}",
-                    plays.count
+                    many.count
                 ),
                 format!("{name} = {came}"),
             ));
@@ -553,7 +558,8 @@ fn numbers(transcript: &Transcript) -> BTreeMap<String, f64> {
 /// News with a long text are read, also by a robot that does not understand it, and so are those with a payload, also with
 /// the largest one: a robot that expects none ignores it.
 pub(super) fn payload(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
-    let [text, _] = kit.texts();
+    let plays = &Plays::new(kit);
+    let [text, _] = plays.texts();
     // With its quotation marks.
     let largest = "x".repeat(MAX_PAYLOAD_BYTES - 2);
     // As deep as a payload may be.
@@ -577,15 +583,19 @@ pub(super) fn payload(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     let understood = payloads
         .iter()
         .map(|(_, payload)| (text.as_str(), Some(payload)));
-    played(kit, &one_by_one(kit, understood))?;
+    plays.play(&one_by_one(plays, understood))?;
 
     // Programs may quote it in a line of their log, which is not to be longer.
-    let room = if kit.stdio.is_program() { QUOTED_BY } else { 0 };
+    let room = if plays.stdio.is_program() {
+        QUOTED_BY
+    } else {
+        0
+    };
     let longest = "x".repeat(MAX_TEXT_BYTES - room);
     // Who cuts what it sends back counts bytes, and leaves no half of a character.
     let two_bytes = "é".repeat(longest.len() / 2);
     // Together they are longer than a text may be.
-    commanded(kit, &[(longest.as_str(), LAST); 4])?;
+    commanded(plays, &[(longest.as_str(), LAST); 4])?;
 
     // Of a text that the robot does not know, it expects no payload.
     let short = "x".repeat(SHORT_TEXT);
@@ -607,17 +617,17 @@ pub(super) fn payload(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     ] {
         unknown.push((what, text, None));
     }
-    demand_counted(kit, &short, &unknown)
+    demand_counted(plays, &short, &unknown)
 }
 
 /// Each of these texts and payloads in the news of a tick of its own.
 fn one_by_one<'t>(
-    kit: &Kit,
+    plays: &Plays<'_>,
     commands: impl IntoIterator<Item = (&'t str, Option<&'t Value>)>,
 ) -> PlayScript {
     let mut arriving = Vec::new();
     for ((text, payload), tick) in commands.into_iter().zip(FIRST..) {
-        let command = ArrivingCommand::new(&kit.sender(), text, tick);
+        let command = ArrivingCommand::new(&plays.sender(), text, tick);
         arriving.push(match payload {
             Some(payload) => command.with_payload(payload),
             None => command,
@@ -628,18 +638,18 @@ fn one_by_one<'t>(
 
 /// Where a variable counts commands that the robot does not know, it counts each of these like a short one.
 fn demand_counted(
-    kit: &Kit,
+    plays: &Plays<'_>,
     short: &str,
     commands: &[(String, &str, Option<&Value>)],
 ) -> Result<(), RuleFailure> {
     let listed = commands.iter().map(|(_, text, payload)| (*text, *payload));
-    let together = numbers(&played(kit, &one_by_one(kit, listed))?);
-    if kit.is_deterministic.get() == Some(&false) {
+    let together = numbers(&plays.play(&one_by_one(plays, listed))?);
+    if plays.is_deterministic.get() == Some(&false) {
         return Ok(());
     }
-    let none = numbers(&commanded(kit, &[])?);
-    let once = numbers(&commanded(kit, &[(short, LAST)])?);
-    let apart = numbers(&commanded(kit, &[(short, LAST - 1), (short, LAST)])?);
+    let none = numbers(&commanded(plays, &[])?);
+    let once = numbers(&commanded(plays, &[(short, LAST)])?);
+    let apart = numbers(&commanded(plays, &[(short, LAST - 1), (short, LAST)])?);
     for (name, first) in &once {
         let (Some(before), Some(second)) = (none.get(name), apart.get(name)) else {
             continue;
@@ -650,7 +660,7 @@ fn demand_counted(
         }
         // Which one it does not count is seen where it comes alone.
         for (what, text, payload) in commands {
-            let alone = played(kit, &one_by_one(kit, [(*text, *payload)]))?;
+            let alone = plays.play(&one_by_one(plays, [(*text, *payload)]))?;
             if numbers(&alone).get(name) == Some(before) {
                 return Err(RuleFailure::new(
                     format!("{what} counts as one of {SHORT_TEXT} bytes: {name} = {first}"),
@@ -664,38 +674,38 @@ fn demand_counted(
 
 /// A robot that answers each of many commands also answers each of them where they are in the news of one tick.
 fn many_sent(
-    kit: &Kit,
-    plays: &mut Option<ManyPlays>,
+    plays: &Plays<'_>,
+    many: &mut Option<ManyPlays>,
     findings: &mut Findings,
 ) -> Result<(), RuleFailure> {
     // How many they are is the same in all parts, and takes long.
-    if kit.part() != KitPart::Alone {
+    if plays.part() != KitPart::Alone {
         return Ok(());
     }
-    let none = sent(&commanded(kit, &[])?);
-    for [text, _] in kit.pairs() {
-        let once = sent(&commanded(kit, &[(&text, LAST)])?);
+    let none = sent(&commanded(plays, &[])?);
+    for [text, _] in plays.pairs() {
+        let once = sent(&commanded(plays, &[(&text, LAST)])?);
         if once <= none {
             continue;
         }
 
-        let plays = match plays.take_if(|plays| plays.text == text) {
-            Some(plays) => plays,
-            None => ManyPlays::play(kit, &text)?,
+        let many = match many.take_if(|many| many.text == text) {
+            Some(many) => many,
+            None => ManyPlays::play(plays, &text)?,
         };
-        let none = sent(&plays.none);
-        let apart = sent(&plays.apart);
-        let together = sent(&plays.together);
+        let none = sent(&many.none);
+        let apart = sent(&many.apart);
+        let together = sent(&many.together);
         // Only one that has an answer to each in several ticks shows that it answers them all.
-        let answers = sent(&plays.once).saturating_sub(none);
-        if answers == 0 || apart != none + plays.count * answers {
+        let answers = sent(&many.once).saturating_sub(none);
+        if answers == 0 || apart != none + many.count * answers {
             continue;
         }
         if together < apart {
             return Err(RuleFailure::new(
                 format!(
                     "{apart} commands in answer to {} in the news of a tick, as to those of several ticks",
-                    plays.count
+                    many.count
                 ),
                 format!("{together} commands"),
             ));
@@ -713,15 +723,15 @@ fn sent(transcript: &Transcript) -> usize {
 }
 
 /// Where the payload of a robot's command makes a difference, that of the operator's does.
-fn demand_payload_of_operator(kit: &Kit, text: &str) -> Result<(), RuleFailure> {
+fn demand_payload_of_operator(plays: &Plays<'_>, text: &str) -> Result<(), RuleFailure> {
     let makes_difference = |from: &RobotName| {
         let plain = ArrivingCommand::new(from, text, LAST);
         let with_payload = plain.clone().with_payload(&json!({ "task": 3 }));
-        let plain = played(kit, &PlayScript::with(TICKS, vec![plain]))?;
-        let with_payload = played(kit, &PlayScript::with(TICKS, vec![with_payload]))?;
+        let plain = plays.play(&PlayScript::with(TICKS, vec![plain]))?;
+        let with_payload = plays.play(&PlayScript::with(TICKS, vec![with_payload]))?;
         Ok::<bool, RuleFailure>(!is_same(&plain, &with_payload))
     };
-    if makes_difference(&kit.sender())? && !makes_difference(&RobotName::operator())? {
+    if makes_difference(&plays.sender())? && !makes_difference(&RobotName::operator())? {
         return Err(RuleFailure::new(
             format!(
                 "the payload of {text:?} from the operator makes a difference, as from a robot"
@@ -734,12 +744,13 @@ fn demand_payload_of_operator(kit: &Kit, text: &str) -> Result<(), RuleFailure> 
 
 /// A command from the operator, who is not a robot of the roster, is executed like any other, and not answered.
 pub(super) fn from_operator(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailure> {
+    let plays = &Plays::new(kit);
     let operator = RobotName::operator();
-    let none = commanded(kit, &[])?;
+    let none = commanded(plays, &[])?;
     let mut is_seen = false;
-    for [text, _] in kit.pairs() {
-        let own = commanded(kit, &[(&text, LAST)])?;
-        let from_operator = commanded_by(&operator, kit, &[(&text, LAST)])?;
+    for [text, _] in plays.pairs() {
+        let own = commanded(plays, &[(&text, LAST)])?;
+        let from_operator = commanded_by(&operator, plays, &[(&text, LAST)])?;
         let answer = from_operator
             .iter()
             .flat_map(|entry| &entry.commands)
@@ -753,16 +764,16 @@ pub(super) fn from_operator(kit: &Kit, findings: &mut Findings) -> Result<(), Ru
 
         // An answer to the sender is an effect that the operator cannot have.
         let only_answers = values(&own) == values(&none);
-        if kit.is_deterministic.get() == Some(&false) || only_answers || is_same(&own, &none) {
+        if plays.is_deterministic.get() == Some(&false) || only_answers || is_same(&own, &none) {
             continue;
         }
 
         is_seen = true;
-        if kit.part() == KitPart::Alone {
-            demand_payload_of_operator(kit, &text)?;
+        if plays.part() == KitPart::Alone {
+            demand_payload_of_operator(plays, &text)?;
         }
         if is_same(&from_operator, &none) {
-            let sender = kit.sender();
+            let sender = plays.sender();
             return Err(RuleFailure::new(
                 format!("{text:?} from the operator is executed like that from {sender}"),
                 "it has no effect at all",
@@ -771,7 +782,7 @@ pub(super) fn from_operator(kit: &Kit, findings: &mut Findings) -> Result<(), Ru
     }
 
     if !is_seen {
-        let reason = format!("no effect of {} is seen", shown(kit));
+        let reason = format!("no effect of {} is seen", shown(plays));
         findings.skip("operator.commands", &reason);
     }
     Ok(())

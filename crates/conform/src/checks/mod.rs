@@ -63,12 +63,14 @@ impl Check {
 const START: [KitPart; 1] = [KitPart::Alone];
 const EPOCHS: [KitPart; 2] = [KitPart::Alone, KitPart::LaterEpoch];
 const RETURN: [KitPart; 1] = [KitPart::Rejoined];
+/// Those of checks that take place in several epochs anyway.
+const SAME_EPOCHS: [KitPart; 2] = [KitPart::Alone, KitPart::Rejoined];
 
 /// Checks that need nothing but the usual ticks before; those that take longest begin.
 const CHECKS: [Check; 44] = [
     rules(&["join.refused"], joining::refused).only(&START),
     rules(&["news.wait"], news::wait),
-    rules(&["command.order"], commands::order),
+    rules(&["command.order"], commands::order).only(&SAME_EPOCHS),
     rules(&["end.gone"], ends::gone_for_a_while),
     rules(&["end.gone"], ends::gone_forever),
     rules(&["end.gone"], ends::back_in_time),
@@ -105,9 +107,9 @@ const CHECKS: [Check; 44] = [
     rules(&["query.asking"], queries::asking),
     rules(&["query.asking"], queries::unreachable),
     rules(&["query.unknown"], queries::unknown),
-    rules(&["command.twice", "command.sent"], commands::many),
-    rules(&["command.payload"], commands::payload),
-    rules(&["operator.commands"], commands::from_operator),
+    rules(&["command.twice", "command.sent"], commands::many).only(&SAME_EPOCHS),
+    rules(&["command.payload"], commands::payload).only(&SAME_EPOCHS),
+    rules(&["operator.commands"], commands::from_operator).only(&SAME_EPOCHS),
     rules(&["clock.duplicate"], repeated::duplicate),
     rules(&["clock.late"], repeated::late),
     rules(&["return.replaced"], returns::replaced),
@@ -123,7 +125,7 @@ const CHECKS: [Check; 44] = [
 /// Checks of programs that `cars exec` runs.
 const STDIO_CHECKS: [Check; 1] = [rules(&[rules::STDIO_END], stdio::end).only(&START)];
 /// Rules whose checks presume that the robot keeps another one: without it they show nothing.
-const PRESUMED: [(&str, &str); 14] = [
+const PRESUMED: [(&str, &str); 20] = [
     // On a loaded machine a clock may come again in any check.
     ("news.wait", "clock.duplicate"),
     ("epoch.late", "clock.duplicate"),
@@ -132,8 +134,15 @@ const PRESUMED: [(&str, &str); 14] = [
     ("operator.commands", "command.payload"),
     ("end.gone", "clock.duplicate"),
     ("command.order", "operator.commands"),
+    // They are played in several epochs.
+    ("command.order", "epoch.init"),
+    ("command.twice", "epoch.init"),
+    ("command.payload", "epoch.init"),
+    ("operator.commands", "epoch.init"),
     ("epoch.init", "clock.duplicate"),
     ("epoch.init", "tick.initial"),
+    ("epoch.init", "news.wait"),
+    ("epoch.init", "tick.newest"),
     ("epoch.init", "return.rejoin"),
     ("return.replaced", "return.rejoin"),
     ("tick.newest", "news.wait"),
