@@ -132,7 +132,7 @@ impl CheckSetting {
             if roster.len() >= RUN_ROBOTS {
                 break;
             }
-            roster.entry(name).or_insert_with(|| self.standing_still());
+            roster.entry(name).or_insert_with(|| self.standing_still(0));
         }
         roster
     }
@@ -152,19 +152,24 @@ impl CheckSetting {
             format!("{number:02}{MARKS}{}", "a".repeat(rest))
         });
         let short = IN_ORDER.iter().flatten().map(|name| (*name).to_owned());
-        for name in long
+        for (number, name) in long
             .chain(short)
             .filter_map(|name| RobotName::new(&name).ok())
+            .enumerate()
         {
-            roster.entry(name).or_insert_with(|| self.standing_still());
+            roster
+                .entry(name)
+                .or_insert_with(|| self.standing_still(number));
         }
         roster
     }
 
-    fn standing_still(&self) -> RosterRobot {
+    /// Each number has a place of its own.
+    fn standing_still(&self, number: usize) -> RosterRobot {
         let [width_m, height_m] = self.field_m;
+        let share = 0.25 + 0.01 * number as f64;
         RosterRobot {
-            location: Point::new(width_m / 4.0, height_m * 0.75),
+            location: Point::new(width_m * share, height_m * 0.75),
             ..RosterRobot::default()
         }
     }

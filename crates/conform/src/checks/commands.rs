@@ -313,6 +313,9 @@ fn shows_last(
     values.any(|(at, value)| *value == two && swapped.get(at).is_some_and(|other| *other == one))
 }
 
+/// Fields of a report that differ between plays anyway, or count what is compared elsewhere.
+const OF_THE_PLAY: [&str; 4] = ["epoch", "generation", "log", "commands"];
+
 /// What the robot reports after the last command, by tick and field.
 fn values(transcript: &Transcript) -> BTreeMap<(Tick, String), Value> {
     let mut values = BTreeMap::new();
@@ -324,7 +327,7 @@ fn values(transcript: &Transcript) -> BTreeMap<(Tick, String), Value> {
                 for (variable, value) in value.as_object().into_iter().flatten() {
                     values.insert((entry.tick, format!("{name}.{variable}")), value.clone());
                 }
-            } else if name != "log" && name != "commands" {
+            } else if !OF_THE_PLAY.contains(&name.as_str()) {
                 values.insert((entry.tick, name.clone()), value.clone());
             }
         }

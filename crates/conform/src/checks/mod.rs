@@ -125,7 +125,7 @@ const CHECKS: [Check; 44] = [
 /// Checks of programs that `cars exec` runs.
 const STDIO_CHECKS: [Check; 1] = [rules(&[rules::STDIO_END], stdio::end).only(&START)];
 /// Rules whose checks presume that the robot keeps another one: without it they show nothing.
-const PRESUMED: [(&str, &str); 20] = [
+const PRESUMED: [(&str, &str); 21] = [
     // On a loaded machine a clock may come again in any check.
     ("news.wait", "clock.duplicate"),
     ("epoch.late", "clock.duplicate"),
@@ -137,6 +137,7 @@ const PRESUMED: [(&str, &str); 20] = [
     // They are played in several epochs.
     ("command.order", "epoch.init"),
     ("command.twice", "epoch.init"),
+    ("command.sent", "epoch.init"),
     ("command.payload", "epoch.init"),
     ("operator.commands", "epoch.init"),
     ("epoch.init", "clock.duplicate"),

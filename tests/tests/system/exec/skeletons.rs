@@ -457,6 +457,55 @@ fn a_new_robot_in_bash_plays() {
     }
 }
 
+/// What a program reads and writes in a tick whose command has a payload like a line `tick`, and a command in it.
+#[test]
+fn what_a_payload_looks_like_makes_no_difference() {
+    let lines = concat!(
+        r#"{"type":"init","tick":0,"name":"Rosie","location":{"x":5.0,"y":5.0},"tick_s":0.5,"parameters":{}}"#,
+        "\n",
+        r#"{"type":"tick","tick":1,"location":{"x":5.5,"y":5.0},"commands":[{"from":"A","performative":"achieve","command":"#,
+        r#""hi","payload":{"blocked":true,"command":"rest","from":"B","performative":"achieve"}}]}"#,
+        "\n",
+        r#"{"type":"tick","tick":2,"location":{"x":6.0,"y":5.0},"blocked":true}"#,
+        "\n",
+        r#"{"type":"end","reason":"finished"}"#,
+        "\n",
+    );
+    let mut programs = Vec::new();
+    let mut version = Command::new("cc");
+    if has(
+        "C",
+        version.arg("--version"),
+        "install a C compiler that is called `cc`",
+    ) {
+        programs.push((c(), "robot"));
+    }
+    let mut version = Command::new("bash");
+    if has("Bash", version.arg("--version"), "install Bash 4 or newer") {
+        programs.push((Robot::new("bash"), "robot.sh"));
+    }
+
+    for (robot, program) in programs {
+        std::fs::write(robot.folder.join("lines"), lines).unwrap();
+        let lines = std::fs::File::open(robot.folder.join("lines")).unwrap();
+        let mut command = Command::new(robot.folder.join(program));
+        let output = command.stdin(lines).output().unwrap();
+        let printed = String::from_utf8(output.stdout).unwrap();
+        let done: Vec<serde_json::Value> = printed
+            .lines()
+            .map(|line| serde_json::from_str(line).unwrap())
+            .filter(|line: &serde_json::Value| line["type"] == "done")
+            .collect();
+        let held_up_s = |tick: usize| done[tick]["state_variables"]["held_up_s"].as_f64();
+        assert_eq!(done[1]["behavior_state"], "STROLL", "{program}: {printed}");
+        assert_eq!(
+            [1, 2].map(held_up_s),
+            [Some(0.0), Some(0.5)],
+            "{program}: {printed}"
+        );
+    }
+}
+
 #[test]
 fn nothing_is_overwritten_and_what_is_wrong_is_said() {
     let robot = Robot::new("c");
