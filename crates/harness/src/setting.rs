@@ -146,7 +146,7 @@ impl CheckSetting {
     ) -> BTreeMap<RobotName, RosterRobot> {
         let mut roster = roster.clone();
         let before = roster.keys().filter(|other| *other < name).count();
-        let missing = (NEWS_FLAGS as usize - 1).saturating_sub(before);
+        let missing = (NEWS_FLAGS - 1).saturating_sub(before);
         let long = (0..missing).map(|number| {
             let rest = MAX_NAME_LEN - 2 - MARKS.len();
             format!("{number:02}{MARKS}{}", "a".repeat(rest))
