@@ -6,7 +6,7 @@ use bus::Declared;
 use protocol::keys::STATE;
 use protocol::messages::{Clock, JoinRequest, KnownSite, Point, StreamReseed, TickUpdate, Welcome};
 use protocol::{Epoch, RobotName, Tick};
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::{peers, returns, waiting};
 use harness::Joining;
@@ -41,8 +41,6 @@ const RESEEDED_AGAIN: Tick = 8;
 const FAR: Tick = 300;
 /// How far from its place in one epoch a robot is placed in a further one.
 const MOVED_M: f64 = 0.25;
-/// By how much numbers differ between epochs.
-const SHRUNK: f64 = 0.875;
 
 /// Who watches: an observer's token, frames and log lines for it, panels, and a person who asks once.
 struct Watched<'k> {
@@ -395,30 +393,16 @@ fn differ(welcome: &mut Welcome, differs: Differing) {
     welcome.stream.push_str("#other");
     welcome.location.x += MOVED_M;
     if differs == Differing::All {
-        welcome.parameters.values_mut().for_each(shrink);
-        welcome.tick_s *= SHRUNK;
-        welcome.body_m *= SHRUNK;
-        welcome.sensing_range_m *= SHRUNK;
+        welcome.parameters.values_mut().for_each(returns::shrink);
+        welcome.tick_s *= returns::SHRUNK;
+        welcome.body_m *= returns::SHRUNK;
+        welcome.sensing_range_m *= returns::SHRUNK;
         welcome.field_m[1] += MOVED_M;
         welcome.known_sites.push(KnownSite {
             name: "another site".to_owned(),
             kind: "site".to_owned(),
             location: welcome.location,
         });
-    }
-}
-
-/// Makes all numbers with a fraction smaller; whole ones may be counts.
-pub(super) fn shrink(value: &mut Value) {
-    match value {
-        Value::Array(values) => values.iter_mut().for_each(shrink),
-        Value::Object(fields) => fields.values_mut().for_each(shrink),
-        Value::Number(number) => {
-            if let Some(float) = number.as_f64().filter(|_| number.is_f64()) {
-                *value = (float * SHRUNK).into();
-            }
-        }
-        _ => {}
     }
 }
 

@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use protocol::messages::{Clock, Correction, Refusal, TickUpdate, Welcome};
 use protocol::{Generation, Tick};
+use serde_json::Value;
 
-use super::epochs;
 use harness::comparison::{demand_same, is_same};
 use harness::findings::Findings;
 use harness::kit::Kit;
@@ -27,6 +27,8 @@ const UNANSWERED: usize = 4;
 const TICKS: Tick = 5;
 /// Streams of a further incarnation, of which a robot cannot know the names.
 const STREAMS: [&str; 3] = ["one", "other", "further"];
+/// By how much numbers of another welcome differ.
+pub(super) const SHRUNK: f64 = 0.875;
 /// No report comes within this time where it is not the robot's turn.
 const QUIET: Duration = Duration::from_millis(300);
 
@@ -222,7 +224,21 @@ pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
 fn change_parameters(welcome: &mut Welcome) {
     let before = welcome.parameters.clone();
     welcome.earlier_parameters.insert(0, before);
-    welcome.parameters.values_mut().for_each(epochs::shrink);
+    welcome.parameters.values_mut().for_each(shrink);
+}
+
+/// Makes all numbers with a fraction smaller; whole ones may be counts.
+pub(super) fn shrink(value: &mut Value) {
+    match value {
+        Value::Array(values) => values.iter_mut().for_each(shrink),
+        Value::Object(fields) => fields.values_mut().for_each(shrink),
+        Value::Number(number) => {
+            if let Some(float) = number.as_f64().filter(|_| number.is_f64()) {
+                *value = (float * SHRUNK).into();
+            }
+        }
+        _ => {}
+    }
 }
 
 /// The robot misses a tick, its news ask it to join again, and it does, as the process that it is, also where the first requests have
