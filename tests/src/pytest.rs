@@ -16,7 +16,7 @@ use crate::{Lab, is_within, objections};
 /// How many processes test at a time. They mostly wait.
 const AT_A_TIME: usize = 2;
 /// Longest that the tests of one process may take.
-const PATIENCE: Duration = Duration::from_secs(540);
+const PATIENCE: Duration = Duration::from_secs(900);
 
 /// Which tests are run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
