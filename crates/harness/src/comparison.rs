@@ -21,6 +21,13 @@ pub struct PlayDifference {
     pub second: String,
 }
 
+impl PlayDifference {
+    /// The failure of what was expected to make no difference.
+    pub fn into_failure(self, expected: &str) -> RuleFailure {
+        RuleFailure::new(format!("{expected}: {}", self.first), self.second)
+    }
+}
+
 /// What a robot did in a tick: its report, and its commands with their targets.
 fn outcome(entry: &PlayedTick) -> Value {
     let mut value = serde_json::json!(entry.report);
@@ -102,9 +109,6 @@ pub fn demand_same(
 
     match difference(usual, other) {
         None => Ok(()),
-        Some(PlayDifference { first, second, .. }) => Err(RuleFailure::new(
-            format!("{what} makes no difference: {first}"),
-            second,
-        )),
+        Some(found) => Err(found.into_failure(&format!("{what} makes no difference"))),
     }
 }

@@ -10,7 +10,7 @@ use serde_json::json;
 
 use super::{peers, returns, waiting};
 use harness::Joining;
-use harness::comparison::{PlayDifference, demand_same, difference};
+use harness::comparison::{demand_same, difference};
 use harness::findings::Findings;
 use harness::kit::{Kit, KitRoster};
 use harness::patience::PATIENCE;
@@ -101,10 +101,8 @@ pub(super) fn same_seed(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFa
     }
     match found {
         None => Ok(()),
-        Some(PlayDifference { first, second, .. }) => Err(RuleFailure::new(
-            format!("another process reports the same for the same seed, whoever watches: {first}"),
-            second,
-        )),
+        Some(found) => Err(found
+            .into_failure("another process reports the same for the same seed, whoever watches")),
     }
 }
 
@@ -119,10 +117,9 @@ pub(super) fn among_many(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure>
     let again = played_among(kit, KitRoster::Crowd, &script)?;
     match difference(&first, &again) {
         None => Ok(()),
-        Some(PlayDifference { first, second, .. }) => Err(RuleFailure::new(
-            format!("another process reports the same among many others: {first}"),
-            second,
-        )),
+        Some(found) => {
+            Err(found.into_failure("another process reports the same among many others"))
+        }
     }
 }
 

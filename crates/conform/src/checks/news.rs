@@ -5,9 +5,10 @@ use std::time::Duration;
 use protocol::messages::{Correction, Point, TickUpdate};
 use protocol::{Generation, Tick};
 
+use super::waiting;
 use harness::findings::Findings;
 use harness::kit::{Kit, KitRoster};
-use harness::report::{KitPart, RuleFailure};
+use harness::report::RuleFailure;
 use harness::script::{
     Disturbance, PlayScript, Straight, demand_usual, play, played_among, with_robot,
 };
@@ -77,13 +78,10 @@ fn all_flags(kit: &Kit) -> Result<(), RuleFailure> {
     harness.more_flags = u32::MAX;
     harness.withholds_news = true;
     harness.open(&TickUpdate::default())?;
-    // A patience of its own would be the same later.
-    let time = if kit.part() == KitPart::Alone {
-        LONG
-    } else {
-        QUIET
-    };
-    harness.pass_while(time, Harness::is_open);
+    harness.pass_while(
+        waiting::observation_time(kit, LONG, QUIET),
+        Harness::is_open,
+    );
     if harness.has_answered(harness.next_tick() - 1) {
         return Err(RuleFailure::new(
             "no report for a clock that has its flag and those of all others, before its news are here",

@@ -11,7 +11,7 @@ use harness::fake_peers::Unhelpful;
 use harness::findings::Findings;
 use harness::kit::Kit;
 use harness::patience::PATIENCE;
-use harness::report::{KitPart, RuleFailure};
+use harness::report::RuleFailure;
 use harness::script::{ArrivingCommand, Disturbance, PlayScript, Straight, play, with_robot};
 use harness::transcript::PlayedTick;
 use harness::{Harness, HarnessOptions};
@@ -252,12 +252,7 @@ pub(super) fn patient(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFail
         return Ok(());
     }
     harness.hide_others();
-    // A patience of its own would be the same later.
-    let silence = if kit.part() == KitPart::Alone {
-        SILENCE
-    } else {
-        BRIEFLY
-    };
+    let silence = waiting::observation_time(kit, SILENCE, BRIEFLY);
     harness.pass_while(silence, Harness::is_open);
     if !harness.is_open() {
         let expected = format!(

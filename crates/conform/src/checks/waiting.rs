@@ -7,7 +7,7 @@ use protocol::messages::{Correction, TickUpdate};
 
 use harness::comparison::demand_same;
 use harness::kit::{Kit, KitRoster};
-use harness::report::RuleFailure;
+use harness::report::{KitPart, RuleFailure};
 use harness::script::{Disturbance, PlayScript, Straight, play, with_robot};
 use harness::{Harness, HarnessOptions};
 
@@ -15,6 +15,14 @@ use harness::{Harness, HarnessOptions};
 const UNDER_WAY: Duration = Duration::from_millis(50);
 /// Ticks within which a robot that queries others at all does so.
 const TICKS: Tick = 24;
+
+/// How long it is looked whether a robot goes on waiting: a patience of its own would be the same in all parts, so only one takes long.
+pub(super) fn observation_time(kit: &Kit, long: Duration, brief: Duration) -> Duration {
+    match kit.part() {
+        KitPart::Alone => long,
+        _ => brief,
+    }
+}
 
 /// A harness on which the other robots put no states, so that a robot that wants to know them must query.
 pub(super) fn of_queries(kit: &Kit) -> Result<Harness<'_>, RuleFailure> {
