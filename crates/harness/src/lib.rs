@@ -13,7 +13,7 @@ pub mod findings;
 pub mod flushing;
 mod harness;
 pub mod kit;
-mod load;
+pub mod load;
 pub mod patience;
 pub mod process;
 pub mod reading;

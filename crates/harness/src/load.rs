@@ -2,9 +2,23 @@
 //! the kit tells a robot that does nothing from a robot that a loaded machine does not let run.
 
 use std::path::Path;
+use std::thread::available_parallelism;
 use std::time::Duration;
 
 use nix::unistd::Pid;
+
+/// So many programs for each processor make a machine busy. A kit by itself makes up to five.
+const BUSY: f64 = 8.0;
+
+/// Whether so many programs of this machine have run or waited for a processor in the last minute that a robot which does
+/// nothing wrong may lose its link. Where the system does not show it, it is taken to be at rest.
+pub fn is_machine_busy() -> bool {
+    // proc(5): the averages over 1, 5 and 15 minutes first.
+    let text = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
+    let average: Option<f64> = text.split(' ').next().and_then(|one| one.parse().ok());
+    let processors = available_parallelism().map_or(1.0, |count| count.get() as f64);
+    average.unwrap_or_default() > BUSY * processors
+}
 
 /// The processes of a group.
 #[derive(Debug, Clone, Copy)]

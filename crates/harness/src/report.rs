@@ -1,5 +1,6 @@
 //! What came of a check, for people (TAP 14) and for programs (JSON).
 
+use std::collections::BTreeSet;
 use std::fmt;
 
 use bus::BusError;
@@ -149,6 +150,8 @@ pub struct CheckReport {
     pub answers: Option<AnswerTimes>,
     /// The part in a run; absent where no rule that was asked for needs it.
     pub in_run: Option<PlayedRun>,
+    /// Rules of checks that failed while the machine was busy, and whose second attempt counts.
+    pub once_more: BTreeSet<&'static str>,
 }
 
 impl CheckReport {
@@ -201,6 +204,7 @@ impl CheckReport {
             "rules": rules,
             "time.answer": self.answers,
             "in_run": self.in_run,
+            "once_more": self.once_more,
         })
     }
 }
@@ -250,6 +254,13 @@ impl fmt::Display for CheckReport {
                 f,
                 "# in a run: {} robots, {} ticks, played {} times, and once undisturbed",
                 run.robots, run.ticks, run.plays
+            )?;
+        }
+
+        for rule in &self.once_more {
+            writeln!(
+                f,
+                "# {rule}: checked once more, because the machine was busy"
             )?;
         }
 

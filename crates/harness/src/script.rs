@@ -148,6 +148,23 @@ impl PlayScript {
         Self { ticks, arrivals }
     }
 
+    /// The same, and up to a tick each word is the last one in one of the last two ticks: a robot that puts an answer off has one left.
+    #[must_use]
+    pub fn busy_until(mut self, kit: &Kit, last: Tick) -> Self {
+        let [one, two] = kit.texts();
+        let from = kit.sender();
+        self.arrivals.retain(|arrival| arrival.tick + 1 < last);
+        for (text, tick) in [
+            (&one, last - 1),
+            (&two, last - 1),
+            (&two, last),
+            (&one, last),
+        ] {
+            self.arrivals.push(ArrivingCommand::new(&from, text, tick));
+        }
+        self
+    }
+
     /// A few quiet ticks.
     pub fn quiet(ticks: Tick) -> Self {
         Self {

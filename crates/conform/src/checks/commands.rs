@@ -30,6 +30,8 @@ const MANY: usize = 520;
 const MANY_LOGGED: usize = 500;
 /// So many long ones are most of what may arrive in a tick.
 const MANY_LONG: usize = 200;
+/// The same for a program, whose log has room for half of them.
+const MANY_LONG_LOGGED: usize = 100;
 const FEW: usize = 7;
 /// The last tick where as many come in few in each tick.
 const LAST_OF_MANY: Tick = FIRST + (MANY / FEW) as Tick;
@@ -40,12 +42,12 @@ const QUOTED_BY: usize = 96;
 /// All kinds of characters that JSON escapes, and such as have two, three and four bytes.
 const ESCAPED_TEXT: &str = " \"a\\b/\t\r\n{\"tick\":9}\u{1}äßﬁ猫🤖 ";
 
-/// How many commands are many for this robot.
-fn many_for(kit: &Kit) -> usize {
+/// How many commands are many for this robot, and how many long ones.
+fn many_for(kit: &Kit) -> [usize; 2] {
     if kit.stdio.is_program() {
-        MANY_LOGGED
+        [MANY_LOGGED, MANY_LONG_LOGGED]
     } else {
-        MANY
+        [MANY, MANY_LONG]
     }
 }
 
@@ -214,11 +216,15 @@ fn order_of_senders(plays: &Plays<'_>, one: &str, two: &str) -> Result<(), RuleF
                 .map(|played| values(&played))
         };
 
-        let votes = vote(
-            &effect([LAST; 3])?,
-            &effect([LAST, LAST - 1, LAST - 2])?,
-            &effect([LAST - 1, LAST, LAST - 2])?,
-        );
+        let mut wanted = effect([LAST, LAST - 1, LAST - 2])?;
+        let other = effect([LAST - 1, LAST, LAST - 2])?;
+        if let [.., before, last] = &commands[..]
+            && shows_last(&wanted, &last.text, &other, &before.text)
+        {
+            // Whatever other effect it has that they arrive together.
+            wanted.retain(|_, value| *value == last.text);
+        }
+        let votes = vote(&effect([LAST; 3])?, &wanted, &other);
         if votes.is_broken() {
             let listed: Vec<String> = commands
                 .iter()
@@ -256,12 +262,13 @@ fn last_of_many(plays: &Plays<'_>, one: &str, two: &str) -> Result<(), RuleFailu
         .map_or_else(|| two.clone(), |from| at(from, &two.text, LAST));
 
     let usual = KitRoster::Usual;
+    let [many, many_long] = many_for(plays);
     for (roster, listed, last) in [
-        (usual, vec![one.clone(); many_for(plays)], &two),
-        (usual, vec![two.clone(); many_for(plays)], &one),
+        (usual, vec![one.clone(); many], &two),
+        (usual, vec![two.clone(); many], &one),
         (usual, vec![one.clone(), two.clone()], &one),
         (usual, vec![first], &second),
-        (usual, vec![long; MANY_LONG], &two),
+        (usual, vec![long; many_long], &two),
         (usual, vec![of_operator[0].clone()], &of_operator[1]),
         (usual, Vec::new(), &at(&sender, &two.text, CUT_OFF)),
         (usual, Vec::new(), &at(&sender, &two.text, OUT_OF_RANGE)),
@@ -310,7 +317,9 @@ fn shows_last(
     one: &str,
 ) -> bool {
     let mut values = straight.iter();
-    values.any(|(at, value)| *value == two && swapped.get(at).is_some_and(|other| *other == one))
+    one != two
+        && values
+            .any(|(at, value)| *value == two && swapped.get(at).is_some_and(|other| *other == one))
 }
 
 /// Fields of a report that differ between plays anyway, or count what is compared elsewhere.
@@ -382,7 +391,7 @@ struct ManyPlays {
 impl ManyPlays {
     fn play(plays: &Plays<'_>, text: &str) -> Result<Self, RuleFailure> {
         let sender = plays.sender();
-        let count = many_for(plays);
+        let [count, _] = many_for(plays);
         let played = |commands: &mut dyn Iterator<Item = Tick>| {
             let arrivals = arrivals(&sender, commands.map(|tick| (text, tick)));
             plays.play(&PlayScript::with(LAST_OF_MANY, arrivals))
@@ -432,43 +441,24 @@ fn twice(
         let doubled = numbers(&commanded(plays, &[(&text, LAST), (&text, LAST)])?);
         let blocked = numbers(&commanded_while_blocked(plays, &text)?);
 
-        let mut votes = Votes::default();
-        let mut counter = String::new();
-        for (name, first) in &once {
-            let (Some(before), Some(second), Some(came)) =
-                (none.get(name), apart.get(name), doubled.get(name))
-            else {
-                continue;
-            };
-
-            // Only a variable that counts commands shows whether there were two executions.
-            let is_counter = counts(before, first, second);
-            for (is_executed, played, uncounted) in [
-                ("in two ticks in turn is executed twice", &adjacent, first),
-                ("is executed where it is blocked", &blocked, before),
-            ] {
-                if is_counter && played.get(name) == Some(uncounted) {
-                    return Err(RuleFailure::new(
-                        format!("{text:?} in its news {is_executed}"),
-                        format!("{name} = {uncounted}"),
-                    ));
-                }
-            }
-            if is_counter && came == second {
-                votes.right += 1;
-            } else if is_counter && came == first {
-                votes.wrong += 1;
-                counter.clone_from(name);
-            }
+        // Of each variable that counts commands: what it is where the command is executed, and where it is not.
+        let mut is_counted = false;
+        for (is_executed, played, is_twice) in [
+            ("that the news list twice is executed twice", &doubled, true),
+            ("in two ticks in turn is executed twice", &adjacent, true),
+            ("is executed where it is blocked", &blocked, false),
+        ] {
+            let counted = once.iter().filter_map(|(name, first)| {
+                let (before, second) = (none.get(name)?, apart.get(name)?);
+                let expected = match is_twice {
+                    true => [second, first],
+                    false => [first, before],
+                };
+                counts(before, first, second).then_some((name, played.get(name)?, expected))
+            });
+            is_counted |= demand_executed(&format!("{text:?} {is_executed}"), counted)?;
         }
-
-        if votes.is_broken() {
-            return Err(RuleFailure::new(
-                format!("a command that the news list twice is executed twice: {text:?}"),
-                format!("{counter} counts it once"),
-            ));
-        }
-        if votes.right > 0 {
+        if is_counted {
             from_two(plays, &text, &none, &once)?;
             return match plays.part() {
                 KitPart::Alone => demand_many(many.insert(ManyPlays::play(plays, &text)?)),
@@ -494,21 +484,35 @@ fn from_two(
 ) -> Result<(), RuleFailure> {
     let apart = numbers(&commanded_by_two(plays, [(text, LAST - 1), (text, LAST)])?);
     let together = numbers(&commanded_by_two(plays, [(text, LAST), (text, LAST)])?);
-    for (name, first) in once {
-        let (Some(before), Some(second), Some(came)) =
-            (none.get(name), apart.get(name), together.get(name))
-        else {
-            continue;
-        };
-        let is_counter = counts(before, first, second);
-        if is_counter && came == first {
-            return Err(RuleFailure::new(
-                format!("{text:?} from two senders in the news of a tick is executed twice"),
-                format!("{name} counts it once"),
-            ));
+    let counted = once.iter().filter_map(|(name, first)| {
+        let (before, second) = (none.get(name)?, apart.get(name)?);
+        counts(before, first, second).then_some((name, together.get(name)?, [second, first]))
+    });
+    let expected = format!("{text:?} from two senders in the news of a tick is executed twice");
+    demand_executed(&expected, counted).map(drop)
+}
+
+/// Whether commands are executed, by the variables that may count them: each with what came, and with what is expected and what is wrong.
+/// A variable may depend on commands in another way, so one that counts all of them is enough. Returns whether there is one.
+fn demand_executed<'n>(
+    expected: &str,
+    counted: impl Iterator<Item = (&'n String, &'n f64, [&'n f64; 2])>,
+) -> Result<bool, RuleFailure> {
+    let mut votes = Votes::default();
+    let mut came = String::new();
+    for (name, value, [right, wrong]) in counted {
+        if value == right {
+            votes.right += 1;
+        } else if value == wrong {
+            votes.wrong += 1;
+            came = format!("{name} = {value}");
         }
     }
-    Ok(())
+
+    if votes.is_broken() {
+        return Err(RuleFailure::new(expected, came));
+    }
+    Ok(votes.right > 0)
 }
 
 /// Whether a variable with these values after no command, after one and after two counts commands.

@@ -10,13 +10,15 @@ use serde_json::json;
 
 use super::{peers, returns, waiting};
 use harness::Joining;
+use harness::body::ROUND;
 use harness::comparison::{demand_same, difference};
 use harness::findings::Findings;
 use harness::kit::{Kit, KitRoster};
 use harness::patience::PATIENCE;
 use harness::report::RuleFailure;
 use harness::script::{
-    ArrivingCommand, Disturbance, PlayScript, Straight, play, played_among, usual, with_robot,
+    ArrivingCommand, CUT_OFF, Disturbance, PlayScript, Straight, demand_usual, play, played_among,
+    usual, with_robot,
 };
 use harness::transcript::PlayedTick;
 use harness::{Harness, HarnessOptions};
@@ -27,18 +29,21 @@ const QUIET: Duration = Duration::from_millis(300);
 const ASKED: Tick = 2;
 /// An epoch that follows the first one, where those between were missed.
 const LATER: Epoch = 4;
-/// Ticks of an epoch that is to leave nothing behind, commands among them; in the last one the robot's move is refused.
+/// Ticks of an epoch that is to leave nothing behind, commands among them: in the last one the robot's move is refused.
 const BUSY: Tick = 25;
+/// The same, and in the last one it can query nobody.
+const BUSY_AND_CUT_OFF: Tick = ROUND + CUT_OFF;
 /// So many ticks after it have news, and no clock.
 const NEVER_GRANTED: Tick = 4;
 /// So many streams and seeds are tried, for so many ticks each.
 const DRAWS: u64 = 16;
-const DRAWN: Tick = 12;
+const SKIPPED_SEEDS: u64 = 6;
+const DRAWN: Tick = 24;
 /// The tick from which on it draws from another stream in the same epoch.
 const RESEEDED: Tick = 4;
 const RESEEDED_AGAIN: Tick = 8;
 /// The tick of an epoch in which a robot asks to join it late.
-const FAR: Tick = 300;
+const FAR: Tick = 70_000;
 /// How far from its place in one epoch a robot is placed in a further one.
 const MOVED_M: f64 = 0.25;
 
@@ -160,19 +165,19 @@ pub(super) fn streams(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFail
     // A robot that draws nothing moves the same way each time, which is right. Wrong is only one that
     // follows the one and not the other.
     let expected = format!("{DRAWS} streams and {DRAWS} seeds give different moves");
-    if are_all_different(&by_seed) && are_all_the_same(&by_stream) {
+    if are_varied(&by_seed) && are_all_the_same(&by_stream) {
         let came = "the name of the stream makes no difference, the seed does";
         findings.fail("determinism.seed", RuleFailure::new(&expected, came));
     }
     let is_in_vain = are_all_the_same(&by_seed) || are_all_the_same(&by_upper_half);
-    if are_all_different(&by_stream) && is_in_vain {
+    if are_varied(&by_stream) && is_in_vain {
         let came = "the seed makes no difference, the name of the stream does";
         findings.fail("determinism.seed", RuleFailure::new(&expected, came));
     }
-    if are_all_different(&by_seed) {
+    if are_varied(&by_seed) {
         demand_reseeded(&mut harness, findings, seed, &stream)?;
     }
-    if are_all_different(&by_stream) {
+    if are_varied(&by_stream) {
         returns::demand_streams(kit, findings)?;
     }
     Ok(())
@@ -186,8 +191,7 @@ fn demand_reseeded(
     stream: &str,
 ) -> Result<(), RuleFailure> {
     let straight = moves(harness, seed, stream.to_owned())?;
-    let reseeds = [(RESEEDED, seed + 1), (RESEEDED_AGAIN, seed + 2)]
-        .map(|(tick, seed)| StreamReseed { tick, seed });
+    let reseeds = reseeds_at([(RESEEDED, seed + 1), (RESEEDED_AGAIN, seed + 2)]);
     harness.template.reseeds = reseeds[..1].to_vec();
     let once = moves(harness, seed, stream.to_owned())?;
     harness.template.reseeds = reseeds.to_vec();
@@ -242,7 +246,26 @@ fn demand_reseeded(
         let expected = format!("{what}, also where it skips the clock of that tick");
         fail(expected, "the same moves as without");
     }
+
+    // Of several that are due the last one counts, whenever the robot draws: one that draws rarely shows it with some seeds.
+    for number in 1..=SKIPPED_SEEDS {
+        let [first, last] = [2 * number, 2 * number + 1].map(|number| seed + number);
+        let due = [(RESEEDED, first), (RESEEDED + 1, last)];
+        let alone = moves_after_skipped(harness, &reseeds_at([(RESEEDED + 2, last)]))?;
+        if moves_after_skipped(harness, &reseeds_at(due))? != alone {
+            let expected = format!("the seed {last} where it skips ticks, with `reseeds` {due:?}");
+            fail(expected, "other moves than with the last of them alone");
+        }
+    }
+    harness.template.reseeds.clear();
     Ok(())
+}
+
+/// From these ticks on these seeds.
+pub(super) fn reseeds_at<const COUNT: usize>(seeds: [(Tick, u64); COUNT]) -> Vec<StreamReseed> {
+    seeds
+        .map(|(tick, seed)| StreamReseed { tick, seed })
+        .to_vec()
 }
 
 /// In which directions the robot moves in a further epoch after it has skipped the tick [`RESEEDED`] and the one that follows.
@@ -265,9 +288,12 @@ fn are_all_the_same(moves: &[Moves]) -> bool {
     moves.iter().all(|other| Some(other) == moves.first())
 }
 
-/// Only where no two are the same is it certain that chance would have shown in the others as well.
-fn are_all_different(moves: &[Moves]) -> bool {
-    (1..moves.len()).all(|at| !moves[..at].contains(&moves[at]))
+/// Whether chance shows: no moves are those of more than half. That it shows nowhere among as many others is then no chance.
+fn are_varied(moves: &[Moves]) -> bool {
+    moves.iter().all(|one| {
+        let same = moves.iter().filter(|other| *other == one);
+        2 * same.count() <= moves.len()
+    })
 }
 
 /// How the robot moves in a further epoch with this seed and stream.
@@ -316,7 +342,7 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     let mut harness = with_robot(kit, HarnessOptions::default())?;
     // Whom it knows from the epoch before is elsewhere in this one.
     harness.fake_peers.displace(true);
-    play(&mut harness, &busy(kit), &mut Straight)?;
+    play(&mut harness, &busy(kit, BUSY), &mut Straight)?;
     harness.fake_peers.displace(false);
     let [text, _] = kit.texts();
     // News of ticks that are never granted must not be taken for those of the next epoch.
@@ -337,18 +363,19 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     demand_same_process(&harness)?;
     let again = again?;
     harness.demand_token_kept("an epoch begins")?;
-    demand_same(
-        kit,
-        "to start over in a further epoch instead of a new process",
-        usual(kit)?,
-        &again,
-    )
+    let what = "to start over in a further epoch instead of a new process";
+    demand_same(kit, what, usual(kit)?, &again)?;
+
+    harness.begin_epoch(harness.epoch() + 1);
+    play(&mut harness, &busy(kit, BUSY_AND_CUT_OFF), &mut Straight)?;
+    harness.begin_epoch(harness.epoch() + 1);
+    demand_usual(&mut harness, what, &mut Straight)
 }
 
 /// A further epoch with another welcome: it goes through it as a process that has no other one. A person may load another scenario
 /// between two epochs, so that all of it differs.
 pub(super) fn other_welcome(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
-    let busy = busy(kit);
+    let busy = busy(kit, BUSY);
     let anew = |differs| {
         let mut harness = Harness::open_run(kit, HarnessOptions::default())?;
         harness.prepare()?;
@@ -366,7 +393,10 @@ pub(super) fn other_welcome(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailu
         }
     };
 
-    let mut harness = with_robot(kit, HarnessOptions::default())?;
+    let mut harness = Harness::open_run(kit, HarnessOptions::default())?;
+    harness.prepare()?;
+    harness.template.reseeds = reseeds_at([(DRAWN / 2, 1), (BUSY - 1, 2)]);
+    harness.admit_first()?;
     play(&mut harness, &busy, &mut Straight)?;
     differ(&mut harness.template, differs);
     harness.begin_epoch(harness.epoch() + 1);
@@ -378,7 +408,7 @@ pub(super) fn other_welcome(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailu
 /// How a welcome differs from that of the epoch before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Differing {
-    /// In seed, stream and place.
+    /// In seed, stream, `reseeds` and place.
     Start,
     /// In the robot's parameters, the field and what is in it, and the length of a tick, too.
     All,
@@ -388,6 +418,7 @@ fn differ(welcome: &mut Welcome, differs: Differing) {
     // Also a robot that takes this seed for none must repeat itself.
     welcome.seed = u64::from(welcome.seed == 0);
     welcome.stream.push_str("#other");
+    welcome.reseeds = reseeds_at([(RESEEDED, 1)]);
     welcome.location.x += MOVED_M;
     if differs == Differing::All {
         welcome.parameters.values_mut().for_each(returns::shrink);
@@ -405,7 +436,7 @@ fn differ(welcome: &mut Welcome, differs: Differing) {
 
 /// A process that has joined again in an epoch goes through the next one as one that joins in that epoch in the place of another.
 pub(super) fn after_rejoining(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
-    let busy = busy(kit);
+    let busy = busy(kit, BUSY);
     let mut anew = Harness::open_run(kit, HarnessOptions::default())?;
     anew.prepare()?;
     anew.play_predecessor(DRAWN)?;
@@ -421,11 +452,11 @@ pub(super) fn after_rejoining(kit: &Kit, _: &mut Findings) -> Result<(), RuleFai
     demand_same(kit, what, &expected, &played)
 }
 
-/// Ticks of an epoch that is to leave nothing behind.
-fn busy(kit: &Kit) -> PlayScript {
+/// Ticks of an epoch that is to leave nothing behind, of which the last is this one.
+fn busy(kit: &Kit, ticks: Tick) -> PlayScript {
     PlayScript {
-        ticks: BUSY,
-        ..PlayScript::usual(kit)
+        ticks,
+        ..PlayScript::usual(kit).busy_until(kit, ticks)
     }
 }
 
@@ -473,7 +504,7 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     play(&mut harness, &PlayScript::quiet(3), &mut Straight)?;
 
     harness.begin_epoch(LATER);
-    // Ticks go on without it, more than a byte counts: from then on only its news can tell it that it takes part.
+    // Ticks go on without it, more than two bytes count: from then on only its news can tell it that it takes part.
     while harness.next_tick() < FAR {
         harness.miss()?;
     }

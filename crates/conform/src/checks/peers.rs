@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use protocol::Tick;
-use protocol::messages::{Clock, Delivery, Report, TickUpdate};
+use protocol::messages::{Clock, Report, TickUpdate};
 
 use super::{waiting, wire};
 use harness::comparison::demand_same;
@@ -18,6 +18,8 @@ use harness::{Harness, HarnessOptions};
 
 /// What was put has arrived after this time, also at a robot that rests.
 const ARRIVED: Duration = Duration::from_millis(100);
+/// Ticks that follow one before which a robot has skipped some.
+const FOLLOWING: Tick = 12;
 /// One tick in so many is disturbed: a query that is made again takes half a second.
 const ROUND: Tick = 9;
 /// A robot that gives up, gives up in less: after a time, or after so many refusals.
@@ -38,27 +40,43 @@ fn shorter(kit: &Kit) -> PlayScript {
 
 /// The clock has gone on twice: it answers the newest one, and never those before. What the news of those before list is lost.
 pub(super) fn newest(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
-    let [text, _] = kit.texts();
-    let command = ArrivingCommand::new(&kit.sender(), &text, 0);
-    let without = after_skipped(&mut waiting::for_news(kit)?, &[])?;
-    let with = after_skipped(&mut waiting::for_news(kit)?, &[command.delivery()])?;
+    if kit.is_deterministic.get() == Some(&false) {
+        return after_skipped(&mut waiting::for_news(kit)?, &[]).map(drop);
+    }
 
-    if kit.is_deterministic.get() != Some(&false) && with != without {
-        return Err(RuleFailure::new(
-            format!(
-                "the same after a command in the news of skipped clocks, which is lost: {without:?}"
-            ),
-            format!("{with:?}"),
-        ));
+    for text in kit.texts() {
+        // In the tick that is skipped last, in the newest one, and in that after it.
+        let [none, skipped, newest, after] = [None, Some(0), Some(1), Some(2)].map(|behind| {
+            let command = |behind| ArrivingCommand::new(&kit.sender(), &text, behind);
+            after_skipped(&mut waiting::for_news(kit)?, behind.map(command).as_slice())
+        });
+        let none = none?;
+        let skipped = skipped?;
+        if skipped != none {
+            return Err(RuleFailure::new(
+                format!(
+                    "the same after {text:?} in the news of skipped clocks, which is lost: {none:?}"
+                ),
+                format!("{skipped:?}"),
+            ));
+        }
+        if newest? == none && after? != none {
+            return Err(RuleFailure::new(
+                format!(
+                    "{text:?} in the news of the newest of three clocks has an effect, as in the tick after it"
+                ),
+                "none at all",
+            ));
+        }
     }
     Ok(())
 }
 
 /// What a robot that waits for its news reports for the newest of three clocks, of which the first is that of the open tick, and for
-/// the one after it. The news of those before list these commands.
+/// those after it. These commands arrive so many ticks after the last one that is skipped, or with 0 in those that are.
 pub(super) fn after_skipped(
     harness: &mut Harness<'_>,
-    commands: &[Delivery],
+    commands: &[ArrivingCommand],
 ) -> Result<Vec<Report>, RuleFailure> {
     // Two clocks more, and only the last one has its news: which of them it answers does not depend on how fast it reads.
     let held = harness.next_tick() - 1;
@@ -75,10 +93,12 @@ pub(super) fn after_skipped(
         correction: Some(harness.body.confirmed()),
         ..TickUpdate::default()
     };
-    let put_news = |harness: &Harness<'_>, tick: Tick, commands: &[Delivery]| {
+    let put_news = |harness: &Harness<'_>, tick: Tick| {
+        let behind = tick.saturating_sub(held + 1);
+        let arriving = commands.iter().filter(|command| command.tick == behind);
         harness.put_news(&TickUpdate {
             tick,
-            commands: commands.to_vec(),
+            commands: arriving.map(ArrivingCommand::delivery).collect(),
             ..news.clone()
         })
     };
@@ -97,9 +117,9 @@ pub(super) fn after_skipped(
         |harness| {
             put_clocks(harness)?;
             // Those of the ticks before come late, before the newest and after them.
-            put_news(harness, held, commands)?;
-            put_news(harness, newest, &[])?;
-            put_news(harness, held + 1, commands)
+            put_news(harness, held)?;
+            put_news(harness, newest)?;
+            put_news(harness, held + 1)
         },
         |harness| harness.has_answered(newest).then_some(()),
     )?;
@@ -115,23 +135,25 @@ pub(super) fn after_skipped(
         }
     }
 
-    let after = newest + 1;
-    harness.fake_peers.begin(harness.epoch(), after);
-    let expected = format!("a report for tick {after}");
-    harness.until_put(
-        &expected,
-        PATIENCE,
-        |harness| {
-            put_news(harness, after, &[])?;
-            harness.put_clock(&Clock {
-                tick: after,
-                ..clock
-            })
-        },
-        |harness| harness.has_answered(after).then_some(()),
-    )?;
+    let last = newest + FOLLOWING;
+    for after in newest + 1..=last {
+        harness.fake_peers.begin(harness.epoch(), after);
+        let expected = format!("a report for tick {after}");
+        harness.until_put(
+            &expected,
+            PATIENCE,
+            |harness| {
+                put_news(harness, after)?;
+                harness.put_clock(&Clock {
+                    tick: after,
+                    ..clock
+                })
+            },
+            |harness| harness.has_answered(after).then_some(()),
+        )?;
+    }
     let mut reports = Vec::new();
-    for tick in [newest, after] {
+    for tick in newest..=last {
         let answers = harness.seen.answers.iter();
         let mut came = answers.map(|answer| &answer.reading.report);
         let report = came.find(|report| (report.epoch, report.tick) == (harness.epoch(), tick));

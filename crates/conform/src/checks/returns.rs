@@ -1,30 +1,34 @@
 //! Incarnations: a process that takes over in the middle of an epoch, and one that has been replaced.
 
 use std::collections::BTreeSet;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use protocol::messages::{Clock, Correction, Refusal, TickUpdate, Welcome};
 use protocol::{Generation, Tick};
 use serde_json::Value;
 
+use super::{epochs, waiting};
 use harness::comparison::{demand_same, is_same};
 use harness::findings::Findings;
 use harness::kit::Kit;
 use harness::patience::PATIENCE;
 use harness::report::RuleFailure;
 use harness::script::{
-    ArrivingCommand, PlayScript, Straight, inherit, play, played, step, usual, with_robot,
+    ArrivingCommand, PlayScript, Straight, inherit, play, played, usual, with_robot,
 };
-use harness::transcript::PlayedTick;
+use harness::transcript::{PlayedTick, Transcript};
 use harness::{Harness, HarnessOptions};
 
 /// The last tick of the predecessor.
 const LAST: Tick = 8;
 const GENERATION: Generation = 2;
-/// How many requests of a robot that joins again have no answer.
+/// How many requests of a robot that joins again have no answer, at least, and for how long, once.
 const UNANSWERED: usize = 4;
+const SILENCE: Duration = Duration::from_secs(11);
 /// Ticks that a further incarnation is played.
 const TICKS: Tick = 5;
+/// Ticks of an incarnation that is to leave nothing behind to the next one.
+const BUSY: Tick = 20;
 /// Streams of a further incarnation, of which a robot cannot know the names.
 const STREAMS: [&str; 3] = ["one", "other", "further"];
 /// By how much numbers of another welcome differ.
@@ -51,6 +55,16 @@ fn returned<'k>(
     change(&mut harness.template);
     harness.admit_first()?;
     Ok(harness)
+}
+
+/// What it reports in the first ticks of an incarnation whose welcome has changes.
+fn played_returned(
+    kit: &Kit,
+    reported: &[PlayedTick],
+    change: impl FnOnce(&mut Welcome),
+) -> Result<Transcript, RuleFailure> {
+    let mut harness = returned(kit, &[LAST], reported, change)?;
+    play(&mut harness, &PlayScript::quiet(TICKS), &mut Straight)
 }
 
 /// A further incarnation that waits for the news that name it.
@@ -161,20 +175,33 @@ fn demand_generation(transcript: &[PlayedTick], generation: Generation) -> Resul
 /// The clock has gone on without it: it joins again as the process that it is, and then does what a new process does. And once more.
 pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     let mut harness = with_robot(kit, HarnessOptions::default())?;
-    let script = PlayScript::usual(kit);
-    for _ in 0..=LAST {
-        step(&mut harness, &script, &mut Straight)?;
-    }
-
-    let mut reported = first_ticks(kit)?.to_vec();
+    let script = PlayScript {
+        ticks: LAST,
+        ..PlayScript::usual(kit).busy_until(kit, LAST)
+    };
+    let mut reported = play(&mut harness, &script, &mut Straight)?;
     let mut last_ticks = Vec::new();
     // A robot may refuse such numbers, and end.
-    let takes_change = returned(kit, &[LAST], &reported, change_parameters)
-        .and_then(|mut anew| play(&mut anew, &PlayScript::quiet(0), &mut Straight))
-        .is_ok();
+    let changed = played_returned(kit, &reported, change_parameters);
+    let takes_change = changed.is_ok();
+    if let Ok(changed) = changed {
+        let alone = played_returned(kit, &reported, |welcome| {
+            change_parameters(welcome);
+            welcome.earlier_parameters.clear();
+        })?;
+        demand_same(
+            kit,
+            "`earlier_parameters` beside `parameters` that it takes",
+            &alone,
+            &changed,
+        )?;
+    }
     for generation in [harness.generation() + 1, harness.generation() + 2] {
         // The welcome of the further incarnation is set before the barrier asks for it.
         inherit(&mut harness, &reported, generation);
+        let next = harness.next_tick();
+        let seeds = [(0, u64::from(generation)), (next + TICKS, 0)];
+        harness.template.reseeds = epochs::reseeds_at(seeds);
         if takes_change {
             change_parameters(&mut harness.template);
         }
@@ -183,7 +210,8 @@ pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         // Its turn is the next tick, whose news name it.
         harness.settle(QUIET);
         demand_inherited(&harness)?;
-        let again = play(&mut harness, &PlayScript::quiet(5), &mut Straight)?;
+        let script = PlayScript::quiet(BUSY).busy_until(kit, harness.next_tick() + BUSY);
+        let again = play(&mut harness, &script, &mut Straight)?;
         demand_generation(&again, generation)?;
         harness.demand_token_kept("it joins again")?;
 
@@ -193,13 +221,15 @@ pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
                 stream,
                 parameters,
                 earlier_parameters,
+                reseeds,
                 ..
             } = &harness.template;
             welcome.stream.clone_from(stream);
             welcome.parameters.clone_from(parameters);
             welcome.earlier_parameters.clone_from(earlier_parameters);
+            welcome.reseeds.clone_from(reseeds);
         })?;
-        let anew = play(&mut anew, &PlayScript::quiet(5), &mut Straight)?;
+        let anew = play(&mut anew, &script, &mut Straight)?;
         demand_same(kit, "to join again instead of a new process", &anew, &again)?;
         reported = again;
     }
@@ -245,8 +275,16 @@ pub(super) fn shrink(value: &mut Value) {
 /// no answer.
 fn join_again(harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
     lose(harness)?;
-    for _ in 0..UNANSWERED {
+    // A first incarnation is kept waiting for longer than a robot that gives up would ask.
+    let silence = match harness.generation() {
+        1 => waiting::observation_time(harness.kit, SILENCE, Duration::ZERO),
+        _ => Duration::ZERO,
+    };
+    let begun = Instant::now();
+    let mut unanswered = 0;
+    while unanswered < UNANSWERED || begun.elapsed() < silence {
         drop(harness.next_rejoin()?);
+        unanswered += 1;
     }
     let joining = harness.next_rejoin()?;
     // That may become its own: only the answer decides whether it has been replaced.
