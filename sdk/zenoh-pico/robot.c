@@ -73,6 +73,17 @@ static z_view_keyexpr_t key_of(const char *format, ...)
 
 /* ---- Reading: what is not as it must be changes nothing (robust.malformed, number.integers). ---- */
 
+/* `null` is as if it were absent (compat.unknown-fields). */
+static void drop_nulls(json_t *object)
+{
+    void *next;
+    const char *field;
+    json_t *value;
+    json_object_foreach_safe(object, next, field, value) {
+        if (json_is_null(value)) json_object_del(object, field);
+    }
+}
+
 /* Payloads may have integers that `json_int_t` cannot hold. Then all are read as doubles, and those of our own turned back. */
 static json_t *parse(const z_loaned_bytes_t *payload)
 {
@@ -89,6 +100,8 @@ static json_t *parse(const z_loaned_bytes_t *payload)
         }
     }
     z_drop(z_move(text));
+    drop_nulls(message);
+    drop_nulls(json_object_get(message, "correction"));
     return message;
 }
 

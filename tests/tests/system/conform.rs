@@ -166,7 +166,17 @@ fn the_robots_of_the_project_conform_with_default_parameters() {
 }
 
 /// Further ways to break a rule, after the one that is named like the rule.
-const OTHERWISE: [&str; 142] = [
+const OTHERWISE: [&str; 152] = [
+    "epoch.init:put-off",
+    "return.rejoin:put-off",
+    "epoch.init:reseeds",
+    "return.rejoin:reseeds",
+    "return.rejoin:earlier",
+    "return.rejoin:impatient",
+    "command.order:exchanged",
+    "tick.newest:deaf",
+    "determinism.seed:rarely",
+    "epoch.late:two-bytes",
     "command.twice:hundred",
     "command.payload:ascii",
     "return.generation:placed",

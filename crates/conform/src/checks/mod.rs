@@ -77,6 +77,8 @@ const SAME_EPOCHS: [KitPart; 2] = [KitPart::Alone, KitPart::Rejoined];
 
 /// Checks that need nothing but the usual ticks before; those that take longest begin.
 const CHECKS: [Check; 44] = [
+    rules(&["epoch.init", "determinism.seed"], epochs::streams),
+    rules(&["return.rejoin"], returns::rejoin).only(&EPOCHS),
     rules(&["join.refused"], joining::refused).only(&START),
     rules(&["news.wait"], news::wait),
     rules(&["command.order"], commands::order).only(&SAME_EPOCHS),
@@ -102,7 +104,6 @@ const CHECKS: [Check; 44] = [
     rules(&["determinism.seed"], epochs::among_many).only(&START),
     rules(&["return.generation"], returns::generation).only(&START),
     rules(&["return.generation"], returns::commanded).only(&START),
-    rules(&["return.rejoin"], returns::rejoin).only(&EPOCHS),
     rules(&["join.ready-last"], joining::ready_last).only(&START),
     rules(
         &[
@@ -128,7 +129,6 @@ const CHECKS: [Check; 44] = [
     rules(&["robust.malformed"], tolerance::malformed),
     rules(&["wire.keys"], tolerance::commands_of_others),
     rules(&["tick.answer"], ticks::unasked),
-    rules(&["epoch.init", "determinism.seed"], epochs::streams),
 ];
 
 /// Checks of programs that `cars exec` runs.

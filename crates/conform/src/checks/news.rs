@@ -104,9 +104,10 @@ fn put_stale(harness: &Harness<'_>, tick: Tick) -> Result<(), RuleFailure> {
         blocked: true,
     });
 
-    let of_other_epoch = (harness.epoch() - 1, tick);
+    // Where they come before the clock, a robot is still in the epoch before at tick 0.
+    let of_other_epoch = (tick > 0).then_some((harness.epoch() - 1, tick));
     let of_other_tick = tick.checked_sub(1).map(|before| (harness.epoch(), before));
-    for (epoch, tick) in of_other_tick.into_iter().chain([of_other_epoch]) {
+    for (epoch, tick) in of_other_tick.into_iter().chain(of_other_epoch) {
         // In another epoch the robot was another incarnation.
         let is_of_other_epoch = epoch != harness.epoch();
         harness.put_news(&TickUpdate {

@@ -14,6 +14,8 @@ use crate::walker::Walker;
 const MAX_EPOCHS: Epoch = 10;
 /// After so many requests without an answer it ends, if it is to.
 const MAX_UNANSWERED: usize = 3;
+/// The same for one that has more patience: it asks every 0.1 s.
+const PATIENT: usize = 50;
 /// The same for requests that are refused.
 const MAX_REFUSALS: usize = 10;
 /// Delay of a declaration that is made too late.
@@ -27,9 +29,7 @@ impl Host {
             .as_ref()
             .map_or(0, |welcome| welcome.generation);
         let flag = self.welcome.as_ref().map_or(0, |welcome| welcome.news_flag);
-        if self.wrong.is("epoch.late:byte") {
-            clock.tick %= 256;
-        }
+        clock.tick = self.wrong.kept_of(clock.tick);
         let is_later = clock.epoch > own && own > 0;
         let is_of_other_epoch = clock.epoch != own && self.wrong.is("end.clock:epoch");
         if self.ignores(clock.end) || clock.end.is_some() && is_of_other_epoch {
@@ -198,10 +198,7 @@ impl Host {
         }
 
         let mut epoch = news.epoch;
-        let mut tick = news.tick;
-        if self.wrong.is("epoch.late:byte") {
-            tick %= 256;
-        }
+        let mut tick = self.wrong.kept_of(news.tick);
         if self.wrong.is("news.wait:epoch") && news.rejoin == Some(generation) {
             epoch = self.last_clock.epoch;
         }
@@ -259,7 +256,12 @@ impl Host {
         match bytes.and_then(|bytes| self.wrong.read(&key, &bytes)) {
             None => {
                 self.unanswered += usize::from(is_again);
-                if self.unanswered >= MAX_UNANSWERED && self.wrong.is("return.rejoin:three") {
+                let has_patience = self.unanswered < MAX_UNANSWERED
+                    || self.unanswered < PATIENT && self.wrong.is("return.rejoin:impatient");
+                if !has_patience
+                    && (self.wrong.is("return.rejoin:three")
+                        || self.wrong.is("return.rejoin:impatient"))
+                {
                     self.leave = Some(Leave::Stopped);
                 }
                 self.drive(lockstep::Participant::unanswered)

@@ -27,6 +27,8 @@ const LATE_TICK: Tick = 36;
 /// What a robot counts on that has little room: commands, and bytes of a text.
 const TEN: usize = 10;
 const SHORT_TEXT: usize = 100;
+/// How often one moves that moves rarely.
+const RARELY: f64 = 0.05;
 /// So many robots are few.
 const FEW: usize = 4;
 /// The same for a robot that has more.
@@ -125,6 +127,11 @@ impl Host {
             if is_further && self.wrong.is("return.rejoin:variables") {
                 walker.received = before.received;
             }
+            if self.wrong.is("epoch.init:put-off")
+                || is_further && self.wrong.is("return.rejoin:put-off")
+            {
+                walker.put_off = before.put_off;
+            }
         }
 
         self.walker = Some(walker);
@@ -165,6 +172,10 @@ impl Host {
                 *count
             });
         }
+        if wrong.is("command.order:exchanged") && deliveries.len() > 2 {
+            let last = deliveries.len() - 1;
+            deliveries.swap(1, last);
+        }
         if wrong.is("command.order:many") && deliveries.len() > HUNDRED {
             // Of many only those that are like the first.
             deliveries.dedup_by(|next, one| next.command != one.command);
@@ -175,6 +186,12 @@ impl Host {
             && one.command != other.command
         {
             deliveries.pop();
+        }
+        let has_skipped = self
+            .last
+            .is_some_and(|last| last.0 == epoch && last.1 + 1 < tick);
+        if wrong.is("tick.newest:deaf") && has_skipped {
+            deliveries.clear();
         }
         if wrong.is("return.generation:deaf") && news.joined.is_some() {
             deliveries.clear();
@@ -247,8 +264,16 @@ impl Host {
         if wrong.is("command.sent:ten") {
             commands.truncate(TEN);
         }
+        if wrong.is("epoch.init:put-off") || wrong.is("return.rejoin:put-off") {
+            commands = std::mem::replace(&mut walker.put_off, commands);
+        }
 
         let mut reseeds = &welcome.reseeds[..];
+        if epoch > 1 && wrong.is("epoch.init:reseeds")
+            || self.has_rejoined && wrong.is("return.rejoin:reseeds")
+        {
+            reseeds = &[];
+        }
         if wrong.is("determinism.seed:reseeds-first") {
             reseeds = welcome.reseeds.get(..1).unwrap_or_default();
         }
@@ -273,7 +298,11 @@ impl Host {
         let step_x_m = (unit(&mut walker.random) - 0.5) * walker.step_m;
         let step_y_m = (unit(&mut walker.random) - 0.5) * walker.step_m;
         walker.proposal = Point::new(walker.at.x + step_x_m, walker.at.y + step_y_m);
-        let angle = unit(&mut walker.random) * 3.0;
+        let mut angle = unit(&mut walker.random) * 3.0;
+        if wrong.is("determinism.seed:rarely") && unit(&mut walker.random) > RARELY {
+            walker.proposal = walker.at;
+            angle = 0.0;
+        }
         let is_awake = tick > LATE_TICK && !walker.is_asleep;
         let turns = wrong.is("number.angles") || wrong.is("number.angles:awake") && is_awake;
         let turn = if turns { 7.0 } else { 0.0 };

@@ -1,6 +1,7 @@
 //! The robot itself.
 
-use protocol::messages::{Point, Welcome};
+use lockstep::Sent;
+use protocol::messages::{CommandText, Point, Welcome};
 use protocol::random::{Stream, stream};
 use serde_json::Value;
 
@@ -25,6 +26,8 @@ pub(crate) struct Walker {
     pub(crate) last: String,
     /// Whether the last word was `rest`, and not `fly`.
     pub(crate) is_asleep: bool,
+    /// Answers that it puts off to the next tick.
+    pub(crate) put_off: Vec<Sent<CommandText>>,
 }
 
 impl Walker {
@@ -40,7 +43,7 @@ impl Walker {
         } else {
             seed
         };
-        let name = if wrong.is("determinism.seed:stream") {
+        let name = if wrong.is("determinism.seed:stream") || wrong.is("determinism.seed:rarely") {
             welcome.name.as_str()
         } else {
             &welcome.stream
@@ -51,7 +54,11 @@ impl Walker {
         } else {
             name.to_owned()
         };
-        let step_m = welcome.parameters.get("step_m").and_then(Value::as_f64);
+        let parameters = match welcome.earlier_parameters.first() {
+            Some(earlier) if wrong.is("return.rejoin:earlier") => earlier,
+            _ => &welcome.parameters,
+        };
+        let step_m = parameters.get("step_m").and_then(Value::as_f64);
 
         Self {
             random: stream(seed, &name),
@@ -64,6 +71,7 @@ impl Walker {
             sent: 0,
             last: String::new(),
             is_asleep: false,
+            put_off: Vec::new(),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! What the robot does wrong.
 
-use protocol::{Message, decode};
+use protocol::{Message, Tick, decode};
 use serde_json::{Value, json};
 
 /// What it does wrong: a rule, or a rule and a way to break it.
@@ -10,6 +10,15 @@ pub(crate) struct Wrong(pub(crate) String);
 impl Wrong {
     pub(crate) fn is(&self, rule: &str) -> bool {
         self.0 == rule
+    }
+
+    /// What it keeps of a tick.
+    pub(crate) fn kept_of(&self, tick: Tick) -> Tick {
+        match self.0.as_str() {
+            "epoch.late:byte" => tick % (1 << 8),
+            "epoch.late:two-bytes" => tick % (1 << 16),
+            _ => tick,
+        }
     }
 
     /// Reads a message.
