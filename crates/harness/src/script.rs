@@ -5,7 +5,7 @@ use std::cell::RefCell;
 use std::ops::Deref;
 use std::time::Duration;
 
-use protocol::messages::{Delivery, Payload, Performative, PublicState, TickUpdate};
+use protocol::messages::{Delivery, Payload, Performative, PublicState, StreamReseed, TickUpdate};
 use protocol::{Generation, RobotName, Tick};
 use serde_json::Value;
 
@@ -247,6 +247,14 @@ pub fn inherit(harness: &mut Harness<'_>, reported: &[PlayedTick], generation: G
     if let Some(last) = &harness.template.last_state {
         harness.template.location = last.location;
     }
+}
+
+/// `reseeds` of a welcome: from these ticks on these seeds.
+#[must_use]
+pub fn reseeds_at<const COUNT: usize>(seeds: [(Tick, u64); COUNT]) -> Vec<StreamReseed> {
+    seeds
+        .map(|(tick, seed)| StreamReseed { tick, seed })
+        .to_vec()
 }
 
 /// A process of its own, taken straight through a script.

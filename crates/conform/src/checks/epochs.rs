@@ -18,7 +18,7 @@ use harness::patience::PATIENCE;
 use harness::report::RuleFailure;
 use harness::script::{
     ArrivingCommand, CUT_OFF, Disturbance, PlayScript, Straight, demand_usual, play, played_among,
-    usual, with_robot,
+    reseeds_at, usual, with_robot,
 };
 use harness::transcript::PlayedTick;
 use harness::{Harness, HarnessOptions};
@@ -259,13 +259,6 @@ fn demand_reseeded(
     }
     harness.template.reseeds.clear();
     Ok(())
-}
-
-/// From these ticks on these seeds.
-pub(super) fn reseeds_at<const COUNT: usize>(seeds: [(Tick, u64); COUNT]) -> Vec<StreamReseed> {
-    seeds
-        .map(|(tick, seed)| StreamReseed { tick, seed })
-        .to_vec()
 }
 
 /// In which directions the robot moves in a further epoch after it has skipped the tick [`RESEEDED`] and the one that follows.

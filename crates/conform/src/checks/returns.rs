@@ -7,14 +7,14 @@ use protocol::messages::{Clock, Correction, Refusal, TickUpdate, Welcome};
 use protocol::{Generation, Tick};
 use serde_json::Value;
 
-use super::{epochs, waiting};
+use super::waiting;
 use harness::comparison::{demand_same, is_same};
 use harness::findings::Findings;
 use harness::kit::Kit;
 use harness::patience::PATIENCE;
 use harness::report::RuleFailure;
 use harness::script::{
-    ArrivingCommand, PlayScript, Straight, inherit, play, played, usual, with_robot,
+    ArrivingCommand, PlayScript, Straight, inherit, play, played, reseeds_at, usual, with_robot,
 };
 use harness::transcript::{PlayedTick, Transcript};
 use harness::{Harness, HarnessOptions};
@@ -200,8 +200,11 @@ pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         // The welcome of the further incarnation is set before the barrier asks for it.
         inherit(&mut harness, &reported, generation);
         let next = harness.next_tick();
-        let seeds = [(0, u64::from(generation)), (next + TICKS, 0)];
-        harness.template.reseeds = epochs::reseeds_at(seeds);
+        // What it draws first shows what is left of its random numbers, or the seed that is due.
+        harness.template.reseeds = match generation {
+            GENERATION => reseeds_at([(next + TICKS, 1)]),
+            _ => reseeds_at([(0, 2), (next + TICKS, 3)]),
+        };
         if takes_change {
             change_parameters(&mut harness.template);
         }
