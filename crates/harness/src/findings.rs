@@ -37,6 +37,20 @@ impl Findings {
         verdicts.any(|verdict| matches!(verdict, RuleVerdict::Failed(_)))
     }
 
+    /// Whether any rule was found broken by what a busy machine can cause as well.
+    pub fn may_be_load(&self) -> bool {
+        let mut verdicts = self.0.values();
+        verdicts.any(|verdict| {
+            matches!(
+                verdict,
+                RuleVerdict::Failed(RuleFailure {
+                    may_be_load: true,
+                    ..
+                })
+            )
+        })
+    }
+
     /// Whether the rule was found broken.
     pub fn has_failed(&self, rule: &'static str) -> bool {
         matches!(self.0.get(rule), Some(RuleVerdict::Failed(_)))

@@ -57,6 +57,9 @@ pub struct RuleFailure {
     pub expected: String,
     /// What this one did.
     pub came: String,
+    /// Whether a machine that is busy can have the same effect.
+    #[serde(skip)]
+    pub may_be_load: bool,
 }
 
 impl RuleFailure {
@@ -66,6 +69,15 @@ impl RuleFailure {
             part: KitPart::Alone,
             expected: expected.into(),
             came: came.into(),
+            may_be_load: false,
+        }
+    }
+
+    /// Something that did not come, or a link that was lost: a busy machine can have the same effect.
+    pub fn maybe_of_load(expected: impl Into<String>, came: impl Into<String>) -> Self {
+        Self {
+            may_be_load: true,
+            ..Self::new(expected, came)
         }
     }
 }
@@ -230,6 +242,7 @@ impl fmt::Display for CheckReport {
                     part,
                     expected,
                     came,
+                    ..
                 }) => {
                     writeln!(f, "not ok {number} - {}", rule.name)?;
                     writeln!(f, "  ---")?;

@@ -531,7 +531,10 @@ fn join_again(harness: &mut Harness<'_>) -> Result<Joining, RuleFailure> {
     let epoch = harness.epoch();
     harness.next_join(PATIENCE).map_err(|failure| {
         let expected = format!("another request to join for a clock of epoch {epoch}");
-        RuleFailure::new(expected, failure.came)
+        RuleFailure {
+            expected,
+            ..failure
+        }
     })
 }
 

@@ -104,11 +104,9 @@ fn taken_for_a_while(kit: &Kit) -> Result<(), RuleFailure> {
         harness.refuse_join(joining, Refusal::NameTaken, "another process is this robot");
     }
 
-    let joining = harness.next_join(PATIENCE).map_err(|failure| {
-        RuleFailure::new(
-            "another request to join after its place was taken (name_taken)",
-            failure.came,
-        )
+    let joining = harness.next_join(PATIENCE).map_err(|failure| RuleFailure {
+        expected: "another request to join after its place was taken (name_taken)".to_owned(),
+        ..failure
     })?;
     harness.admit(joining);
     harness.keeps_requests = false;

@@ -132,10 +132,9 @@ fn others_flags(kit: &Kit) -> Result<(), RuleFailure> {
 
     harness.more_flags = !harness.flag();
     harness.open(&TickUpdate::default())?;
-    harness.complete().map(drop).map_err(|failure| {
-        RuleFailure::new(
-            "a report for a clock that has the flags of other robots only, without any news",
-            failure.came,
-        )
+    harness.complete().map(drop).map_err(|failure| RuleFailure {
+        expected: "a report for a clock that has the flags of other robots only, without any news"
+            .to_owned(),
+        ..failure
     })
 }

@@ -234,7 +234,7 @@ impl<'k> Harness<'k> {
             return Ok(());
         }
         let expected = format!("its token stays declared when {when}");
-        Err(RuleFailure::new(expected, "it was undeclared"))
+        Err(RuleFailure::maybe_of_load(expected, "it was undeclared"))
     }
 
     /// From now on the other robots put their states, or do not.
@@ -489,7 +489,8 @@ impl<'k> Harness<'k> {
             if has_ended || limit.is_over(&self.process) {
                 // It may have come since it was looked for: where the kit itself stood still, all in one moment.
                 return found(self).ok_or_else(|| {
-                    RuleFailure::new(expected, format!("it never came; {}", self.process.fate()))
+                    let came = format!("it never came; {}", self.process.fate());
+                    RuleFailure::maybe_of_load(expected, came)
                 });
             }
         }
