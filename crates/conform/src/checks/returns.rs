@@ -200,11 +200,9 @@ pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         // The welcome of the further incarnation is set before the barrier asks for it.
         inherit(&mut harness, &reported, generation);
         let next = harness.next_tick();
-        // What it draws first shows what is left of its random numbers, or the seed that is due.
-        harness.template.reseeds = match generation {
-            GENERATION => reseeds_at([(next + TICKS, 1)]),
-            _ => reseeds_at([(0, 2), (next + TICKS, 3)]),
-        };
+        // What it draws before shows what is left of its random numbers.
+        let seeds = [(next + TICKS, u64::from(generation))];
+        harness.template.reseeds = reseeds_at(seeds);
         if takes_change {
             change_parameters(&mut harness.template);
         }
