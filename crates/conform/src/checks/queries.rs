@@ -117,7 +117,7 @@ fn late_state_of(
 /// What came as an answer, read as a state.
 pub(super) fn state(answer: Option<Reply>, expected: &str) -> Result<PublicState, RuleFailure> {
     match answer {
-        None => Err(RuleFailure::new(expected, "no answer")),
+        None => Err(RuleFailure::maybe_of_load(expected, "no answer")),
         Some(Reply {
             result: Err(reason),
             ..
@@ -330,7 +330,7 @@ fn check_six(
                 result: Err(reason),
                 ..
             }) => return Err(RuleFailure::new(expected, reason)),
-            None => return Err(RuleFailure::new(expected, "no answer")),
+            None => return Err(RuleFailure::maybe_of_load(expected, "no answer")),
         };
         let is_same = wanted.is_some_and(|wanted| {
             (wanted.epoch, wanted.tick) == (came.epoch, came.tick)
