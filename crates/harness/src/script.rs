@@ -148,6 +148,14 @@ impl PlayScript {
         Self { ticks, arrivals }
     }
 
+    /// So many of the usual ticks, which are to leave nothing behind.
+    pub fn busy(kit: &Kit, ticks: Tick) -> Self {
+        Self {
+            ticks,
+            ..Self::usual(kit).busy_until(kit, ticks)
+        }
+    }
+
     /// The same, and up to a tick each word is the last one in one of the last two ticks: a robot that puts an answer off has one left.
     #[must_use]
     pub fn busy_until(mut self, kit: &Kit, last: Tick) -> Self {

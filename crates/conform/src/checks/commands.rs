@@ -441,22 +441,15 @@ fn twice(
         let doubled = numbers(&commanded(plays, &[(&text, LAST), (&text, LAST)])?);
         let blocked = numbers(&commanded_while_blocked(plays, &text)?);
 
-        // Of each variable that counts commands: what it is where the command is executed, and where it is not.
+        let counters = counters(&none, &once, &apart);
         let mut is_counted = false;
-        for (is_executed, played, is_twice) in [
-            ("that the news list twice is executed twice", &doubled, true),
-            ("in two ticks in turn is executed twice", &adjacent, true),
-            ("is executed where it is blocked", &blocked, false),
+        for (is_executed, played, executions) in [
+            ("that the news list twice is executed twice", &doubled, 2),
+            ("in two ticks in turn is executed twice", &adjacent, 2),
+            ("is executed where it is blocked", &blocked, 1),
         ] {
-            let counted = once.iter().filter_map(|(name, first)| {
-                let (before, second) = (none.get(name)?, apart.get(name)?);
-                let expected = match is_twice {
-                    true => [second, first],
-                    false => [first, before],
-                };
-                counts(before, first, second).then_some((name, played.get(name)?, expected))
-            });
-            is_counted |= demand_executed(&format!("{text:?} {is_executed}"), counted)?;
+            let expected = format!("{text:?} {is_executed}");
+            is_counted |= demand_executions(&expected, &counters, played, executions)?;
         }
         if is_counted {
             from_two(plays, &text, &none, &once)?;
@@ -484,26 +477,52 @@ fn from_two(
 ) -> Result<(), RuleFailure> {
     let apart = numbers(&commanded_by_two(plays, [(text, LAST - 1), (text, LAST)])?);
     let together = numbers(&commanded_by_two(plays, [(text, LAST), (text, LAST)])?);
-    let counted = once.iter().filter_map(|(name, first)| {
-        let (before, second) = (none.get(name)?, apart.get(name)?);
-        counts(before, first, second).then_some((name, together.get(name)?, [second, first]))
-    });
     let expected = format!("{text:?} from two senders in the news of a tick is executed twice");
-    demand_executed(&expected, counted).map(drop)
+    let counters = counters(none, once, &apart);
+    demand_executions(&expected, &counters, &together, 2).map(drop)
 }
 
-/// Whether commands are executed, by the variables that may count them: each with what came, and with what is expected and what is wrong.
-/// A variable may depend on commands in another way, so one that counts all of them is enough. Returns whether there is one.
-fn demand_executed<'n>(
+/// A variable that counts commands, as far as is known: its values after none, one and two of them.
+type Counter<'n> = (&'n String, [f64; 3]);
+
+fn counters<'n>(
+    none: &BTreeMap<String, f64>,
+    once: &'n BTreeMap<String, f64>,
+    twice: &BTreeMap<String, f64>,
+) -> Vec<Counter<'n>> {
+    let mut counters = Vec::new();
+    for (name, first) in once {
+        if let (Some(before), Some(second)) = (none.get(name), twice.get(name))
+            && counts(before, first, second)
+        {
+            counters.push((name, [*before, *first, *second]));
+        }
+    }
+    counters
+}
+
+/// Whether a variable with these values after no command, after one and after two counts commands.
+fn counts(none: &f64, one: &f64, two: &f64) -> bool {
+    one != none && one - none == two - one
+}
+
+/// Commands were executed so often, and not once less. A variable may follow commands in another way, so one that counts all of them is
+/// enough. Returns whether there is one.
+fn demand_executions(
     expected: &str,
-    counted: impl Iterator<Item = (&'n String, &'n f64, [&'n f64; 2])>,
+    counters: &[Counter<'_>],
+    played: &BTreeMap<String, f64>,
+    executions: usize,
 ) -> Result<bool, RuleFailure> {
     let mut votes = Votes::default();
     let mut came = String::new();
-    for (name, value, [right, wrong]) in counted {
-        if value == right {
+    for (name, values) in counters {
+        let Some(value) = played.get(*name) else {
+            continue;
+        };
+        if *value == values[executions] {
             votes.right += 1;
-        } else if value == wrong {
+        } else if *value == values[executions - 1] {
             votes.wrong += 1;
             came = format!("{name} = {value}");
         }
@@ -513,11 +532,6 @@ fn demand_executed<'n>(
         return Err(RuleFailure::new(expected, came));
     }
     Ok(votes.right > 0)
-}
-
-/// Whether a variable with these values after no command, after one and after two counts commands.
-fn counts(none: &f64, one: &f64, two: &f64) -> bool {
-    one != none && one - none == two - one
 }
 
 /// As many executions as the news list, also where that is more than a few. A counter that stops early is not one of commands.

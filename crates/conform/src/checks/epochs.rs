@@ -37,8 +37,9 @@ const BUSY_AND_CUT_OFF: Tick = ROUND + CUT_OFF;
 const NEVER_GRANTED: Tick = 4;
 /// So many streams and seeds are tried, for so many ticks each.
 const DRAWS: u64 = 16;
-const SKIPPED_SEEDS: u64 = 6;
 const DRAWN: Tick = 24;
+/// So many seeds are tried where ticks are skipped.
+const SKIPPED_SEEDS: u64 = 6;
 /// The tick from which on it draws from another stream in the same epoch.
 const RESEEDED: Tick = 4;
 const RESEEDED_AGAIN: Tick = 8;
@@ -335,7 +336,7 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     let mut harness = with_robot(kit, HarnessOptions::default())?;
     // Whom it knows from the epoch before is elsewhere in this one.
     harness.fake_peers.displace(true);
-    play(&mut harness, &busy(kit, BUSY), &mut Straight)?;
+    play(&mut harness, &PlayScript::busy(kit, BUSY), &mut Straight)?;
     harness.fake_peers.displace(false);
     let [text, _] = kit.texts();
     // News of ticks that are never granted must not be taken for those of the next epoch.
@@ -360,7 +361,11 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     demand_same(kit, what, usual(kit)?, &again)?;
 
     harness.begin_epoch(harness.epoch() + 1);
-    play(&mut harness, &busy(kit, BUSY_AND_CUT_OFF), &mut Straight)?;
+    play(
+        &mut harness,
+        &PlayScript::busy(kit, BUSY_AND_CUT_OFF),
+        &mut Straight,
+    )?;
     harness.begin_epoch(harness.epoch() + 1);
     demand_usual(&mut harness, what, &mut Straight)
 }
@@ -368,7 +373,7 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
 /// A further epoch with another welcome: it goes through it as a process that has no other one. A person may load another scenario
 /// between two epochs, so that all of it differs.
 pub(super) fn other_welcome(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
-    let busy = busy(kit, BUSY);
+    let busy = PlayScript::busy(kit, BUSY);
     let anew = |differs| {
         let mut harness = Harness::open_run(kit, HarnessOptions::default())?;
         harness.prepare()?;
@@ -429,7 +434,7 @@ fn differ(welcome: &mut Welcome, differs: Differing) {
 
 /// A process that has joined again in an epoch goes through the next one as one that joins in that epoch in the place of another.
 pub(super) fn after_rejoining(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
-    let busy = busy(kit, BUSY);
+    let busy = PlayScript::busy(kit, BUSY);
     let mut anew = Harness::open_run(kit, HarnessOptions::default())?;
     anew.prepare()?;
     anew.play_predecessor(DRAWN)?;
@@ -443,14 +448,6 @@ pub(super) fn after_rejoining(kit: &Kit, _: &mut Findings) -> Result<(), RuleFai
     let played = play(&mut harness, &busy, &mut Straight)?;
     let what = "to have joined again in the epoch before, for one of the same generation";
     demand_same(kit, what, &expected, &played)
-}
-
-/// Ticks of an epoch that is to leave nothing behind, of which the last is this one.
-fn busy(kit: &Kit, ticks: Tick) -> PlayScript {
-    PlayScript {
-        ticks,
-        ..PlayScript::usual(kit).busy_until(kit, ticks)
-    }
 }
 
 /// An epoch begins while it waits for its news, or for another robot's answer: nothing else would ever end that wait.

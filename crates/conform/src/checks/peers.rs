@@ -22,8 +22,7 @@ const ARRIVED: Duration = Duration::from_millis(100);
 const FOLLOWING: Tick = 12;
 /// One tick in so many is disturbed: a query that is made again takes half a second.
 const ROUND: Tick = 9;
-/// A robot that gives up, gives up in less: after a time, or after so many refusals.
-const SILENCE: Duration = Duration::from_secs(11);
+/// A robot that gives up does so after fewer refusals.
 const REFUSALS: usize = 10;
 const BRIEFLY: Duration = Duration::from_secs(1);
 /// Ticks in which the answers of others are compared, fewer than the usual ones.
@@ -274,7 +273,7 @@ pub(super) fn patient(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFail
         return Ok(());
     }
     harness.hide_others();
-    let silence = waiting::observation_time(kit, SILENCE, BRIEFLY);
+    let silence = waiting::observation_time(kit, BRIEFLY);
     harness.pass_while(silence, Harness::is_open);
     if !harness.is_open() {
         let expected = format!(

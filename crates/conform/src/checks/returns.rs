@@ -22,9 +22,8 @@ use harness::{Harness, HarnessOptions};
 /// The last tick of the predecessor.
 const LAST: Tick = 8;
 const GENERATION: Generation = 2;
-/// How many requests of a robot that joins again have no answer, at least, and for how long, once.
+/// How many requests of a robot that joins again have no answer, at least.
 const UNANSWERED: usize = 4;
-const SILENCE: Duration = Duration::from_secs(11);
 /// Ticks that a further incarnation is played.
 const TICKS: Tick = 5;
 /// Ticks of an incarnation that is to leave nothing behind to the next one.
@@ -175,11 +174,7 @@ fn demand_generation(transcript: &[PlayedTick], generation: Generation) -> Resul
 /// The clock has gone on without it: it joins again as the process that it is, and then does what a new process does. And once more.
 pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     let mut harness = with_robot(kit, HarnessOptions::default())?;
-    let script = PlayScript {
-        ticks: LAST,
-        ..PlayScript::usual(kit).busy_until(kit, LAST)
-    };
-    let mut reported = play(&mut harness, &script, &mut Straight)?;
+    let mut reported = play(&mut harness, &PlayScript::busy(kit, LAST), &mut Straight)?;
     let mut last_ticks = Vec::new();
     // A robot may refuse such numbers, and end.
     let changed = played_returned(kit, &reported, change_parameters);
@@ -278,7 +273,7 @@ fn join_again(harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
     lose(harness)?;
     // A first incarnation is kept waiting for longer than a robot that gives up would ask.
     let silence = match harness.generation() {
-        1 => waiting::observation_time(harness.kit, SILENCE, Duration::ZERO),
+        1 => waiting::observation_time(harness.kit, Duration::ZERO),
         _ => Duration::ZERO,
     };
     let begun = Instant::now();

@@ -13,13 +13,15 @@ use harness::{Harness, HarnessOptions};
 
 /// After this time, a robot that received a clock is in its tick.
 const UNDER_WAY: Duration = Duration::from_millis(50);
+/// Longer than the patience that a robot may have of its own, by mistake.
+const LONG: Duration = Duration::from_secs(11);
 /// Ticks within which a robot that queries others at all does so.
 const TICKS: Tick = 24;
 
 /// How long it is looked whether a robot goes on waiting: a patience of its own would be the same in all parts, so only one takes long.
-pub(super) fn observation_time(kit: &Kit, long: Duration, brief: Duration) -> Duration {
+pub(super) fn observation_time(kit: &Kit, brief: Duration) -> Duration {
     match kit.part() {
-        KitPart::Alone => long,
+        KitPart::Alone => LONG,
         _ => brief,
     }
 }
