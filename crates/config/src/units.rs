@@ -62,7 +62,28 @@ pub enum Dimension {
 }
 
 impl Dimension {
-    fn name(self) -> &'static str {
+    /// What a name with a unit measures, such as `patience_s`; `None` if it does not end in a unit.
+    #[must_use]
+    pub fn of_name(name: &str) -> Option<Self> {
+        let (_, unit) = name.rsplit_once('_')?;
+
+        Some(match unit {
+            "m" => Self::Length,
+            "mps" => Self::Speed,
+            "s" => Self::Time,
+            "rad" => Self::Angle,
+            "radps" => Self::TurnRate,
+            "mps2" => Self::Acceleration,
+            "radps2" => Self::TurnAcceleration,
+            "hz" => Self::Frequency,
+            "bps" => Self::BitRate,
+            _ => return None,
+        })
+    }
+
+    /// What it is, with examples of how it is written.
+    #[must_use]
+    pub fn name(self) -> &'static str {
         match self {
             Self::Length => "a length such as \"50 ft\" or \"15 m\"",
             Self::Speed => "a speed such as \"2 ft/s\" or \"0.5 m/s\"",

@@ -30,7 +30,7 @@ use std::path::PathBuf;
 
 use config::bulk::member;
 use config::overrides::merge;
-use config::units::{Length, Speed, Time, quantity};
+use config::units::{Dimension, Length, Speed, Time, quantity};
 use config::{FileError, FixedList, Source, seed, shipped};
 use observe::{Expectation, RunSetting, ScenarioMeasure, TickCondition};
 use protocol::messages::{DisplayUnit, OnLate, Parameters};
@@ -524,6 +524,8 @@ fn spec(
     if let Some(file) = &robot.params_from {
         parameters = named_parameters(file, source, folders)?;
     }
+    check_units(&robot.params)
+        .map_err(|reason| FileError::at(source, Some(span.clone()), &reason))?;
     merge(&mut parameters, &robot.params);
     mood::carry_over(
         &mut parameters,
@@ -563,8 +565,35 @@ fn named_parameters(
     }
 
     source.check_named(file.span(), &path)?;
-    let read = Source::read(&path).and_then(|file| file.parse());
+    let read = Source::read(&path).and_then(|file| {
+        let parameters = file.parse()?;
+        check_units(&parameters).map_err(|reason| FileError::at(&file, None, &reason))?;
+        Ok(parameters)
+    });
     read.map_err(|error| error.named_by(&source.name))
+}
+
+/// Refuses a quantity under the name of a parameter that ends in the unit of another dimension: as a number it would be taken
+/// for what the name says.
+fn check_units(parameters: &toml::Table) -> Result<(), String> {
+    parameters
+        .iter()
+        .try_for_each(|(name, value)| check_unit(name, value))
+}
+
+fn check_unit(name: &str, value: &toml::Value) -> Result<(), String> {
+    match value {
+        toml::Value::Table(table) => check_units(table),
+        toml::Value::Array(values) => values.iter().try_for_each(|value| check_unit(name, value)),
+        toml::Value::String(text) => match (Dimension::of_name(name), quantity(text)) {
+            (Some(named), Some((_, written))) if named != written => Err(format!(
+                "the parameter `{name}` is {text:?}, but by its name it is {}",
+                named.name()
+            )),
+            _ => Ok(()),
+        },
+        _ => Ok(()),
+    }
 }
 
 /// Where in the file is what can keep a hall from being placed.

@@ -759,6 +759,37 @@ fn own_parameters_replace_single_keys_of_tables_of_the_file() {
     assert_eq!(dynamics["label_cuts"], serde_json::json!([0.5]));
 }
 
+#[test]
+fn a_quantity_is_of_the_kind_that_the_name_of_its_parameter_says() {
+    let with = |parameters: &str| {
+        parse(&format!(
+            "[[robot]]\nname = \"A\"\nat = [\"5 m\", \"5 m\"]\nparams = {{ {parameters} }}\n"
+        ))
+    };
+    let wrong = [
+        ("patience_s = \"5 ft\"", "it is a time"),
+        ("dynamics = { tau_s = \"1 m\" }", "it is a time"),
+        ("table_m = [\"1 m\", \"1 s\"]", "it is a length"),
+        ("v_mps = \"1 m/s2\"", "it is a speed"),
+        ("a_mps2 = \"1 m/s\"", "it is an acceleration"),
+        ("heading_rad = \"1 deg/s\"", "it is an angle"),
+        ("turn_radps = \"1 deg\"", "it is a turn rate"),
+        ("turn_radps2 = \"1 deg/s\"", "it is a turn acceleration"),
+        ("band_hz = \"1 s\"", "it is a frequency"),
+        ("rate_bps = \"1 Hz\"", "it is a bit rate"),
+    ];
+    for (parameters, reason) in wrong {
+        let text = shown(&with(parameters).unwrap_err());
+        assert!(text.contains(reason), "{parameters}: {text}");
+    }
+
+    let right = "patience_s = \"5 min\", a = \"5 ft\", note_s = \"soon\", other_s = 5, table_m = [\"1 m\", \"1 ft\"]";
+    let scenario = with(right).unwrap();
+    let robot = scenario.robots.values().next().unwrap();
+    assert_eq!(robot.parameters["patience_s"], 300.0);
+    assert_eq!(robot.parameters["note_s"], "soon");
+}
+
 /// A scenario with robot A and these expectations.
 fn expecting(entries: &str) -> Result<Scenario, FileError> {
     parse(&format!(

@@ -29,7 +29,7 @@ pub(super) fn files(lab: &Lab, seed: u64) -> usize {
         check.current_dir(root()).arg("check").arg(&file);
         let what = format!("cars check of a file in {kind}");
         let (checked, printed) = ends_within(LIMIT, check, &what);
-        assert_ended(&what, checked, &printed, seed, kind);
+        assert_ended(&what, checked, &[0, 1], &printed, seed, kind);
         assert!(printed.contains("damaged.toml"), "{what}: {printed}");
 
         let mut run = Command::new(programs().join("cars"));
@@ -37,7 +37,8 @@ pub(super) fn files(lab: &Lab, seed: u64) -> usize {
         run.arg(&file).arg("--out").arg(lab.out());
         let what = format!("cars run of a file in {kind}");
         let (ran, printed) = ends_within(LIMIT, run, &what);
-        assert_ended(&what, ran, &printed, seed, kind);
+        // Within 2 s a scenario need not do what it expects.
+        assert_ended(&what, ran, &[0, 1, 2], &printed, seed, kind);
         if checked == Some(1) && ran == Some(1) {
             // A damaged launch file may name another scenario.
             let is_named = printed.contains("damaged.toml") || printed.contains("cannot read ");
@@ -48,9 +49,17 @@ pub(super) fn files(lab: &Lab, seed: u64) -> usize {
     kinds.len()
 }
 
-/// A program that read a damaged file has ended in order.
-fn assert_ended(what: &str, code: Option<i32>, printed: &str, seed: u64, kind: &str) {
-    let is_in_order = matches!(code, Some(0 | 1)) && !printed.contains("panicked");
+/// A program that read a damaged file has ended in order, with one of these statuses.
+fn assert_ended(
+    what: &str,
+    code: Option<i32>,
+    statuses: &[i32],
+    printed: &str,
+    seed: u64,
+    kind: &str,
+) {
+    let is_in_order =
+        code.is_some_and(|code| statuses.contains(&code)) && !printed.contains("panicked");
     assert!(
         is_in_order,
         "{what}: {code:?}\n{printed}\n{}",
