@@ -164,11 +164,7 @@ fn the_exit_status_is_that_of_the_first_required_failure() {
 
 #[test]
 fn ctrl_c_once_ends_all_in_good_order() {
-    for (asking, code) in [
-        (Signal::SIGINT, 130),
-        (Signal::SIGTERM, 143),
-        (Signal::SIGHUP, 129),
-    ] {
+    let ends_in_order = |asking: Signal, code: i32| {
         let folder = Folder::new(IN_ORDER, "touch $DIR/robot; sleep 600", "");
         let launch = folder.cars(&[]).spawn().unwrap();
         folder.wait_for("up");
@@ -176,7 +172,13 @@ fn ctrl_c_once_ends_all_in_good_order() {
         signal(&launch, asking);
         assert_eq!(end(launch).status.code(), Some(code));
         assert_eq!(folder.read("record"), "stopped\n");
-    }
+    };
+
+    std::thread::scope(|scope| {
+        scope.spawn(|| ends_in_order(Signal::SIGINT, 130));
+        scope.spawn(|| ends_in_order(Signal::SIGTERM, 143));
+        scope.spawn(|| ends_in_order(Signal::SIGHUP, 129));
+    });
 }
 
 #[test]
