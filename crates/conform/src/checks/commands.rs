@@ -743,14 +743,15 @@ fn sent(transcript: &Transcript) -> usize {
     transcript.iter().map(|entry| entry.commands.len()).sum()
 }
 
-/// Where the payload of a robot's command makes a difference, that of the operator's does.
+/// Where the payload of a robot's command makes a difference in what is reported, that of the operator's does. An answer to the sender
+/// is an effect that the operator cannot have.
 fn demand_payload_of_operator(plays: &Plays<'_>, text: &str) -> Result<(), RuleFailure> {
     let makes_difference = |from: &RobotName| {
         let plain = ArrivingCommand::new(from, text, LAST);
         let with_payload = plain.clone().with_payload(&json!({ "task": 3 }));
         let plain = plays.play(&PlayScript::with(TICKS, vec![plain]))?;
         let with_payload = plays.play(&PlayScript::with(TICKS, vec![with_payload]))?;
-        Ok::<bool, RuleFailure>(!is_same(&plain, &with_payload))
+        Ok::<bool, RuleFailure>(values(&plain) != values(&with_payload))
     };
     if makes_difference(&plays.sender())? && !makes_difference(&RobotName::operator())? {
         return Err(RuleFailure::new(
@@ -783,7 +784,6 @@ pub(super) fn from_operator(kit: &Kit, findings: &mut Findings) -> Result<(), Ru
             ));
         }
 
-        // An answer to the sender is an effect that the operator cannot have.
         let only_answers = values(&own) == values(&none);
         if plays.is_deterministic.get() == Some(&false) || only_answers || is_same(&own, &none) {
             continue;
