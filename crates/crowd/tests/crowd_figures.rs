@@ -1,6 +1,6 @@
 //! The figure of `docs/crowd.md`: models of walking beside what was measured with people. With `CARS_UPDATE=1` the test writes it.
 
-#[path = "../../pictures/tests/pictures/shipped/mod.rs"]
+#[path = "../../pictures/tests/shipped/mod.rs"]
 mod shipped;
 
 use crowd::checks::{

@@ -2,7 +2,7 @@
 //!
 //! The assertions over more draws are in `crates/radio/tests` and `crates/environment/tests`; this one shows them.
 
-#[path = "../../../pictures/tests/pictures/shipped/mod.rs"]
+#[path = "../../../pictures/tests/shipped/mod.rs"]
 mod shipped;
 
 use std::collections::BTreeSet;

@@ -6,6 +6,8 @@ use observe::{Expectation, Measured, Observation, RunSetting, TickCondition};
 use protocol::RobotName;
 use serde::Deserialize;
 
+use super::written;
+
 fn setting() -> RunSetting {
     RunSetting {
         tick_s: 0.5,

@@ -12,6 +12,8 @@ use protocol::{Event, RobotName};
 use serde::Deserialize;
 use serde_json::Value;
 
+use super::written;
+
 /// Sites T1 to T3 and U. Each task has a stock, and whether it is done; U has a label as well.
 fn setting() -> RunSetting {
     let task = |stock: f64| StateVariables::from([("stock", stock.into()), ("done", false.into())]);

@@ -8,4 +8,3 @@
 mod charts;
 mod diagram;
 mod print;
-mod shipped;

@@ -1,6 +1,6 @@
 //! The components of an emotion: each has the direction that its name says, in the situation that names it.
 
-use super::stage::{Role, Stage, feet};
+use super::stage::{self, Role, Stage, feet};
 use affect::{CausalChain, ClauseKind};
 
 /// Butler in the middle, Leguin at the table, and all commands lost.

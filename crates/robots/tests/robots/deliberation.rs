@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use super::stage::{Role, Stage, feet, reborn};
+use super::stage::{self, Role, Stage, feet, reborn};
 use robot::Robot;
 
 const SEEDS: std::ops::Range<u64> = 0..8;

@@ -2,7 +2,7 @@
 //! `t03`, `t04`, `t19` and `t22` are the affect library's, what takes whole halls (`t12`, `t13`, `t15`, `t20`, `t21`) is in
 //! the system tests, `t24` is the EmotionML export's.
 
-use super::stage::{FT_M, Role, Stage, feet, name};
+use super::stage::{self, FT_M, Role, Stage, feet, name};
 use robots::butler::{self, ButlerAct};
 use robots::leguin;
 use robots::policy::Urge;

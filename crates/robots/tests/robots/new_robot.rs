@@ -6,7 +6,7 @@ mod vera;
 
 use std::sync::Arc;
 
-use super::stage::{Role, Stage, feet};
+use super::stage::{self, Role, Stage, feet};
 use lockstep::{Begin, Turn};
 use robot::{
     PeerNetwork, PublicState, RobotName, Runner, SensedBody, SensedKind, Tick, TickUpdate,

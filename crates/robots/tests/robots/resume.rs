@@ -1,6 +1,6 @@
 //! A robot whose process was lost: the next incarnation takes over what was published, and the task goes on.
 
-use super::stage::{Role, Stage, feet};
+use super::stage::{self, Role, Stage, feet};
 use robot::Robot;
 
 fn pair(butler: Box<dyn Robot>, leguin: Box<dyn Robot>) -> Stage {

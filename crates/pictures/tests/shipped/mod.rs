@@ -1,5 +1,7 @@
 //! Figures that the book shows and a test draws. It is a part of the tests of each crate that measures what its figure shows.
 
+#![expect(clippy::unwrap_used, reason = "helpers of tests")]
+
 use std::path::Path;
 
 use pictures::{ChartPanel, Figure};
