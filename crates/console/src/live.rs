@@ -469,7 +469,7 @@ impl Live {
     }
 
     /// Subscribes to the simulator's liveliness token and to the log, so that a new browser gets the lines before it
-    /// connected. Lines are few; `tests/tests/console.rs` measures what they cost.
+    /// connected. Lines are few; `tests/tests/system/console/launched.rs` measures what they cost.
     fn subscribe_always(self: &Arc<Self>, bus: &Bus) -> Result<[Declared; 2], BusError> {
         let live = self.clone();
         let token = bus.liveliness(&self.keys.alive_sim(), move |_, is_present| {

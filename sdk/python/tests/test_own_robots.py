@@ -237,6 +237,7 @@ def test_a_name_goes_before_a_pattern(place: Place) -> None:
     assert run.summary["robots"]["S1"]["state_variables"]["n"] == 21
 
 
+@pytest.mark.thorough
 def test_a_hunt_finds_what_an_own_robot_does_not_bear(place: Place) -> None:
     told = place.robots().Told
     options: dict[str, Any] = {"plans": 256, "kinds": "lose", "seed": 3}
@@ -276,6 +277,7 @@ def test_an_own_experiment_is_played_by_its_program_only(place: Place, lab: Lab)
     assert "does not start" in str(cars.Experiment(place.folder / "own").report())
 
 
+@pytest.mark.thorough
 def test_processes_play_one_unit_after_another(place: Place, programs: None) -> None:
     told = place.robots().Told
     place.play("here", robots={"*": told})
@@ -313,15 +315,14 @@ def test_a_robot_that_keeps_something_over_init_gets_fresh_processes(place: Plac
     assert place.results("reused") == place.results("fresh")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("how", "reason", "tick_patience"),
     [
-        pytest.param("kill", "signal 9|SIGKILL|killed", None, marks=pytest.mark.thorough),
+        ("kill", "signal 9|SIGKILL|killed", None),
         # As long as no tick of the other units takes, also on a busy machine.
-        pytest.param("stop", "no tick for 10 s after tick 3: Boss is gone", 10, marks=pytest.mark.thorough),
-        pytest.param(
-            "sleep", "no tick for 10 s after tick 3: Boss is there but has not reported", 10, marks=pytest.mark.thorough
-        ),
+        ("stop", "no tick for 10 s after tick 3: Boss is gone", 10),
+        ("sleep", "no tick for 10 s after tick 3: Boss is there but has not reported", 10),
         ("raise", "no way out", None),
     ],
 )

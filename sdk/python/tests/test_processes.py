@@ -86,6 +86,7 @@ def status(lab: Lab, program: list[str], *arguments: str, **more: str) -> int:
     return lab.start([*program, *arguments], **more).wait(PATIENCE_S)
 
 
+@pytest.mark.thorough
 def test_exit_statuses_are_those_of_robots_in_rust(lab: Lab) -> None:
     at = lab.simulator("taken", hall("Butler", "Leguin"), "--paused") | {"CARS_PATIENCE_S": "0.4"}
     nobody = {"CARS_CONNECT": "tcp/127.0.0.1:1", "CARS_PATIENCE_S": "0.3"}

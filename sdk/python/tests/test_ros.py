@@ -91,6 +91,7 @@ def found(monkeypatch: pytest.MonkeyPatch) -> str:
     return path
 
 
+@pytest.mark.thorough
 def test_the_same_run_in_one_process_and_in_a_mixed_launch(lab: Lab, tmp_path: Path, found: str) -> None:
     file = scenario(tmp_path, ROSIE, GOER, LINES, PYTHON, RUST)
     rust = lab.programs / "rover"

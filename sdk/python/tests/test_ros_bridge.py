@@ -138,6 +138,7 @@ def test_a_step_is_exactly_so_many_ticks(lab: Lab, other: Other) -> None:
     lab.ended("bridged")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM])
 def test_during_a_long_step_a_run_is_paused_and_a_bridge_ends(lab: Lab, other: Other, end: signal.Signals) -> None:
     endless = SCENARIO.replace("100 s", "10000000 s")

@@ -45,6 +45,7 @@ def test_an_external_node_answers_each_tick(lab: Lab, answer: str) -> None:
     assert "the same" in lab.cars("verify", "external0", "--out", str(lab.folder))
 
 
+@pytest.mark.thorough
 def test_a_stopped_node_misses_ticks_where_the_scenario_goes_on(lab: Lab) -> None:
     node, adapter = started(lab, "stopped", scenario("400 s", 'on_late = "continue"\ndeadline = "0.2 s"\n'), "stamp", 44)
     events = lab.folder / "stopped" / "events.jsonl"

@@ -50,6 +50,7 @@ def run_with_heads(folder: Path, make: Any = Coin) -> cars.Run:
     raise AssertionError("no run has heads")
 
 
+@pytest.mark.thorough
 def test_the_throw_that_decided_a_run_is_found(tmp_path: Path) -> None:
     run = run_with_heads(tmp_path)
     why = cars.why(run, HEADS, robots={"C*": Coin})

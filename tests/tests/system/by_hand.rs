@@ -302,6 +302,7 @@ fn is_resumed_after_faults(faults: &[(&str, &str)]) {
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn a_killed_run_is_resumed_without_waiting_for_a_fault_by_hand() {
     is_resumed_after_faults(&[("crash", "never"), ("hang", "waiting")]);
 }

@@ -1,5 +1,7 @@
 //! The console's page in a browser: `tests/console`.
 
+mod launched;
+
 use std::path::Path;
 use std::process::Command;
 

@@ -47,6 +47,7 @@ fn the_table_of_many_people_does_not_depend_on_the_number_of_jobs() {
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn a_model_that_fails_a_case_ends_with_1() {
     let case = ["--only", "RiMEA 4", "--runs", "1", "--against", "open"];
     let (status, text) = Lab::new().cars_without_out(&[&CHECK, &case[..]].concat());

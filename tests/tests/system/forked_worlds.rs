@@ -204,6 +204,7 @@ fn ended_by(lab: &Lab, run: &str) -> (u64, serde_json::Value) {
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn a_fork_ends_by_conditions_that_hold_before_at_and_after_its_tick() {
     let parent = Parent::of(WORLD, &[]);
     let Parent { lab, ticks } = &parent;
@@ -327,6 +328,7 @@ fn killed_and_resumed(lab: &Lab, run: &str, launch: &str, ticks: [u64; 2]) -> Ve
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn any_number_of_processes_killed_or_not_give_the_same_world() {
     let parent = Parent::of(WORLD, &[]);
     let lab = &parent.lab;
@@ -426,6 +428,7 @@ radius = "0.2 m"
 "#;
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn worlds_of_robots_that_drive_and_act_are_resumed_as_they_were() {
     let lab = Lab::new();
     let scenario = lab.write("actors.toml", ACTORS);

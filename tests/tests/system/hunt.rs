@@ -61,6 +61,7 @@ fn events_of(lab: &Lab, run: &str, kind: &str) -> Vec<Value> {
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn the_deadlock_from_one_lost_refill_is_found() {
     finds_the_lost_refill("1");
 }

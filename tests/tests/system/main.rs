@@ -38,6 +38,7 @@ mod files;
 mod folders;
 mod fork;
 mod forked_worlds;
+mod handshake;
 mod hunt;
 mod killed;
 mod names;

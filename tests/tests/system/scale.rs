@@ -46,6 +46,7 @@ impl Robot for Speaker {
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn a_hundred_robots_of_one_process_all_speak_to_each_other() {
     let lab = Lab::new();
     let run = "scale";

@@ -303,6 +303,7 @@ fn rumor_round(before: &[f64], arrives: f64) -> Vec<f64> {
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn a_rumor_spreads_as_its_law_says() {
     const ROBOTS: usize = 32;
     const RUMORS: u64 = 1500;

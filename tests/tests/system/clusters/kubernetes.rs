@@ -12,6 +12,7 @@ use super::{Trial, UNITS, checked};
 const UNITS_PER_TASK: usize = 7;
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn the_pods_of_a_job_give_the_results_of_this_machine() {
     let install = "pip install kubernetes-validate";
     if !has_modules("Kubernetes", "kubernetes_validate, yaml", install) {

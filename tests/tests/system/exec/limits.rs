@@ -150,6 +150,7 @@ fn many_states_go_to_one_asker_in_every_tick() {
 
 /// Robots that are run on the middleware's thread and share a link: what they put in one tick is more than its queue holds.
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn two_hundred_robots_of_one_process_get_through_their_ticks() {
     let lab = Lab::new();
     let names: Vec<String> = (0..200).map(|index| format!("B{index}")).collect();

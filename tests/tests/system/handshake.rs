@@ -1,9 +1,6 @@
 //! Sessions whose handshake is held up, plain and secured: an attempt is given up in time, and whenever the rest arrives, the
 //! client has a session that works soon afterwards.
 
-#![expect(clippy::print_stdout, reason = "a test prints what it measures")]
-#![expect(clippy::unwrap_used, reason = "helpers of tests")]
-
 use std::io::{Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::ops::Range;

@@ -1,8 +1,4 @@
-//! The console on a real launch: the messages of its WebSocket, its cost for the run, and, in a browser, the page
-//! (`tests/console`, Python).
-
-#![expect(clippy::print_stdout, reason = "a test prints what it measures")]
-#![expect(clippy::unwrap_used, reason = "helpers of tests")]
+//! The console on a real launch: the messages of its WebSocket, and its cost for the run.
 
 use std::fs::Permissions;
 use std::io::{BufRead, BufReader, Read, Write};
