@@ -27,8 +27,8 @@ use harness::{Harness, HarnessOptions};
 const QUIET: Duration = Duration::from_millis(300);
 /// The tick before which a person asks for its state.
 const ASKED: Tick = 2;
-/// An epoch that follows the first one, where those between were missed.
-const LATER: Epoch = 4;
+/// An epoch that follows the first one, where those between were missed: two bytes of its number are those of the first.
+const LATER: Epoch = 1 + (1 << 16);
 /// Ticks of an epoch that is to leave nothing behind, commands among them: in the last one the robot's move is refused.
 const BUSY: Tick = 25;
 /// The same, and in the last one it can query nobody.

@@ -29,7 +29,7 @@ impl Host {
             .as_ref()
             .map_or(0, |welcome| welcome.generation);
         let flag = self.welcome.as_ref().map_or(0, |welcome| welcome.news_flag);
-        clock.tick = self.wrong.kept_of(clock.tick);
+        (clock.epoch, clock.tick) = self.wrong.kept_of(clock.epoch, clock.tick);
         let is_later = clock.epoch > own && own > 0;
         let is_of_other_epoch = clock.epoch != own && self.wrong.is("end.clock:epoch");
         if self.ignores(clock.end) || clock.end.is_some() && is_of_other_epoch {
@@ -197,8 +197,7 @@ impl Host {
             news.rejoin = None;
         }
 
-        let mut epoch = news.epoch;
-        let mut tick = self.wrong.kept_of(news.tick);
+        let (mut epoch, mut tick) = self.wrong.kept_of(news.epoch, news.tick);
         if self.wrong.is("news.wait:epoch") && news.rejoin == Some(generation) {
             epoch = self.last_clock.epoch;
         }

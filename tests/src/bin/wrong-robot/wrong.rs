@@ -1,6 +1,6 @@
 //! What the robot does wrong.
 
-use protocol::{Message, Tick, decode};
+use protocol::{Epoch, Message, Tick, decode};
 use serde_json::{Value, json};
 
 /// What it does wrong: a rule, or a rule and a way to break it.
@@ -12,12 +12,14 @@ impl Wrong {
         self.0 == rule
     }
 
-    /// What it keeps of a tick.
-    pub(crate) fn kept_of(&self, tick: Tick) -> Tick {
+    /// What it keeps of an epoch and a tick.
+    pub(crate) fn kept_of(&self, epoch: Epoch, tick: Tick) -> (Epoch, Tick) {
         match self.0.as_str() {
-            "epoch.late:byte" => tick % (1 << 8),
-            "epoch.late:two-bytes" => tick % (1 << 16),
-            _ => tick,
+            "epoch.late:byte" => (epoch, tick % (1 << 8)),
+            "epoch.late:two-bytes" => (epoch, tick % (1 << 16)),
+            "epoch.init:byte" => (epoch % (1 << 8), tick),
+            "epoch.init:two-bytes" => (epoch % (1 << 16), tick),
+            _ => (epoch, tick),
         }
     }
 
