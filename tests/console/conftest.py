@@ -15,6 +15,9 @@ SCREENSHOTS = pathlib.Path(os.environ.get("CARS_SCREENSHOTS", ROOT / "target" / 
 
 expect.set_options(timeout=30_000)
 
+# Tests in Rust that run at the same time end all processes of a run with the name of theirs that no other test has marked.
+os.environ["CARS_TEST"] = f"{os.getpid()}/pytest"
+
 
 def pytest_configure(config):
     config.addinivalue_line("markers", "thorough: for CI; a file of such tests says so in its head")

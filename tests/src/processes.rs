@@ -215,13 +215,13 @@ pub fn mark(command: &mut Command) -> &mut Command {
     }
 }
 
-/// Whether another test has started a process.
+/// Whether another test has started a process; a thread without a name knows only those of this process.
 fn is_of_other_test(pid: u32) -> bool {
-    let Some(test) = test() else {
-        return false;
+    let own = match test() {
+        Some(test) => format!("\0{TEST}={test}\0"),
+        None => format!("\0{TEST}={}/", std::process::id()),
     };
-    contains(pid, "environ", &format!("\0{TEST}="))
-        && !contains(pid, "environ", &format!("\0{TEST}={test}\0"))
+    contains(pid, "environ", &format!("\0{TEST}=")) && !contains(pid, "environ", &own)
 }
 
 /// Processes of this test with the name of a run in their environment or arguments.

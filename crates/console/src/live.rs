@@ -28,9 +28,6 @@ const CONNECT_TIMEOUT: Duration = Duration::from_secs(1);
 const CONNECT_RETRY: Duration = Duration::from_millis(200);
 /// How long to wait for the reply to `step`, which comes when its ticks are complete.
 const STEP_TIMEOUT: Duration = Duration::from_secs(600);
-/// How long a request waits for a simulator that the console has not found yet. Both start at the same time, and a page
-/// may be open before one has found the other.
-const FIRST_CONTACT_TIMEOUT: Duration = Duration::from_secs(5);
 /// After this long without a simulator it is not about to be found, and requests do not wait for it.
 const SEARCH: Duration = Duration::from_secs(30);
 /// How long to wait for a requested frame before it is requested again; doubled each time.
@@ -70,7 +67,8 @@ pub(crate) struct Live {
     connect: String,
     keys: Keys,
     feed: Feed,
-    /// How long to wait for a reply of the simulator, which replies to everything but `step` at once.
+    /// How long to wait for a reply of the simulator, which replies to everything but `step` at once, and before that for the
+    /// simulator: both start at the same time, and a page may be open before one has found the other.
     reply_timeout: Duration,
     /// When the console began to look for the simulator.
     started_at: Instant,
@@ -298,7 +296,7 @@ impl Live {
     fn found_simulator(&self) -> Result<&Bus, String> {
         // Only at the beginning: later a request must not wait for a simulator that has ended.
         let rest_of_search = SEARCH.saturating_sub(self.started_at.elapsed());
-        let timeout = FIRST_CONTACT_TIMEOUT.min(rest_of_search);
+        let timeout = self.reply_timeout.min(rest_of_search);
         let waited = self
             .changed
             .wait_timeout_while(self.lock(), timeout, |demand| {

@@ -15,6 +15,9 @@ from lab import Lab
 # A shell that starts the tests in the background has them ignore interrupts, and so would every process that they start.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
+# Tests in Rust that run at the same time end all processes of a run with the name of theirs that no other test has marked.
+os.environ["CARS_TEST"] = f"{os.getpid()}/pytest"
+
 
 @pytest.fixture
 def lab(tmp_path: Path) -> Iterator[Lab]:

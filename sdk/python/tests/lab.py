@@ -38,9 +38,14 @@ def eventually(what: str, ready: Callable[[], T | None], patience_s: float = PAT
         time.sleep(0.01)
 
 
+def is_of_run(variable: str) -> bool:
+    """Whether a variable tells processes of a run, which those of these tests are not to know."""
+    return variable.startswith("CARS_") and variable != "CARS_TEST"
+
+
 def environment(**more: str) -> dict[str, str]:
     """The environment of a process that knows no run but what ``more`` says."""
-    own = {name: value for name, value in os.environ.items() if not name.startswith("CARS_")}
+    own = {name: value for name, value in os.environ.items() if not is_of_run(name)}
     # Scripts find the interpreter of these tests.
     own["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), own.get("PATH", "")])
     return own | more

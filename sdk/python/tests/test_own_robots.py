@@ -16,7 +16,7 @@ from types import ModuleType
 from typing import Any
 
 import pytest
-from lab import Lab, environment, eventually
+from lab import Lab, environment, eventually, is_of_run
 
 import cars
 
@@ -145,7 +145,7 @@ def place(tmp_path: Path) -> Place:
 def programs(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
     """The programs of this build are found, and those that they start know no other run."""
     for name in list(os.environ):
-        if name.startswith("CARS_"):
+        if is_of_run(name):
             monkeypatch.delenv(name)
     monkeypatch.setenv("PATH", os.pathsep.join([str(lab.programs), os.environ["PATH"]]))
 
@@ -361,7 +361,7 @@ except KeyboardInterrupt:
 """
 
 
-@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize("sent", [signal.SIGINT, pytest.param(signal.SIGKILL, marks=pytest.mark.thorough)])
 def test_an_experiment_that_is_ended_leaves_no_process(place: Place, programs: None, sent: signal.Signals) -> None:
     arguments = [str(place.folder / "experiment.toml"), str(place.folder / "out"), str(place.launch())]
     temporary = place.folder / "tmp"

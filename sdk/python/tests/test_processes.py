@@ -170,6 +170,7 @@ def test_the_kit_finds_no_fault_in_plain_zenoh(lab: Lab) -> None:
     assert "not ok" not in found and found.count("\nok ") >= 28, found
 
 
+@pytest.mark.thorough
 def test_the_benchmark_measures(lab: Lab) -> None:
     bench = [sys.executable, str(ROOT / "sdk/python/bench.py"), "--rounds", "1", "--robots", "2", "--ticks", "400"]
     measured = lab.start(bench, CARS_BIN_DIR=str(lab.programs))

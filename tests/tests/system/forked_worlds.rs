@@ -154,6 +154,7 @@ impl Parent {
 }
 
 #[test]
+#[ignore = "thorough: with `-- --include-ignored`"]
 fn forks_without_a_change_at_any_tick_are_the_run() {
     forks_are_the_run(&[("auction", &["--seed", "3"]), (WORLD, &[])]);
 }

@@ -118,6 +118,9 @@ impl Console {
             "tcp/127.0.0.1:1",
             "--run",
             "absent",
+            // For which requests wait here.
+            "--reply-timeout",
+            "0.5",
         ])
     }
 
