@@ -1,5 +1,5 @@
 //! The components of emotions in whole runs: over ten seeds of a shipped scenario each takes several values, and has the
-//! direction that its name says in the situation that names it. Single situations are in `crates/robots/tests/components.rs`.
+//! direction that its name says in the situation that names it. Single situations are in `crates/robots/tests/robots/components.rs`.
 
 use std::collections::{BTreeMap, BTreeSet};
 

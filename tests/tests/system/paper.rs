@@ -1,5 +1,5 @@
 //! The experiment of the paper ("Experimental Results"), over many seeds of the shipped scenario. Tests are numbered as
-//! those of `crates/robots/tests/documented.rs`, of which they show what takes a whole hall. Items are the statements of
+//! those of `crates/robots/tests/robots/documented.rs`, of which they show what takes a whole hall. Items are the statements of
 //! that section of the paper, in its order: 15 is the hall, 27 is Vonda.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -654,7 +654,7 @@ fn shown<'a>(page: &'a str, file: &str) -> &'a str {
     block.split_once("```").unwrap().0
 }
 
-/// Vera, whom `crates/robots/tests/new_robot.rs` plays in memory, started as the page describes.
+/// Vera, whom `crates/robots/tests/robots/new_robot.rs` plays in memory, started as the page describes.
 #[test]
 fn the_robot_of_the_documentation_runs_as_a_process() {
     let (lab, page) = (
