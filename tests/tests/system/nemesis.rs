@@ -441,11 +441,6 @@ fn number(variable: &str) -> Option<u64> {
 #[test]
 #[ignore = "thorough: with `-- --include-ignored`"]
 fn whatever_happens_the_run_goes_on_and_its_record_is_whole() {
-    play_launches();
-}
-
-/// Plays the launches that are always played, or those that the environment states.
-fn play_launches() {
     let begun = Instant::now();
     let length = number("CARS_NEMESIS_S").map(Duration::from_secs);
     let seeds: Box<dyn Iterator<Item = u64>> = match (number("CARS_NEMESIS_SEED"), length) {

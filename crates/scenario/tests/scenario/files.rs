@@ -8,20 +8,7 @@ use scenario::Scenario;
 use scenario::diagnostic::{FileError, Source};
 use scenario::{Changes, GuestRules, OnLate};
 
-fn parse(text: &str) -> Result<Scenario, FileError> {
-    Scenario::parse(
-        &Source {
-            name: "hall.toml".into(),
-            text: text.into(),
-        },
-        Path::new("."),
-    )
-}
-
-/// The error as people see it, without colors.
-fn shown(error: &FileError) -> String {
-    config::render_plain(error, None, 200)
-}
+use super::{parse, shown};
 
 #[test]
 fn units_become_si_and_defaults_are_those_of_the_paper() {

@@ -7,6 +7,8 @@ use config::{Changes, FileError, Source};
 use scenario::{GuestMotion, Scenario, WantGoal};
 use world::{Point, Track};
 
+use super::source;
+
 const ROBOT: &str = "[[robot]]\nname = \"A\"\nat = [\"8 m\", \"8 m\"]\n";
 /// A hall of 10 m by 10 m.
 const FIELD: &str = "[field]\nsize = [\"10 m\", \"10 m\"]\n";
@@ -22,11 +24,7 @@ fn load(file: &str, keys: &str) -> Result<Scenario, FileError> {
 }
 
 fn parse(text: &str) -> Result<Scenario, FileError> {
-    let source = Source {
-        name: "hall.toml".into(),
-        text: text.to_owned(),
-    };
-    Scenario::parse_alone(&source)
+    Scenario::parse_alone(&source(text))
 }
 
 /// What people are shown of an error.

@@ -1,29 +1,12 @@
 //! Layers in scenario files: what they mean, and what people are told when they are wrong.
 
-use std::path::Path;
-
 use protocol::messages::{MAX_LAYER_CELLS, MAX_LAYER_VALUE, MAX_LAYERS, Point};
-use scenario::diagnostic::{FileError, Source};
-use scenario::{Changes, LayerSpec, Scenario};
+use scenario::{Changes, LayerSpec};
+
+use super::{parse, shown, source};
 
 const DUST: &str = "tick = \"0.5 s\"\n[field]\nsize = [\"10 m\", \"8 m\"]\n[[layer]]\nname = \"dust\"\ncell = \"0.5 m\"\n\
                     range = \"1 m\"\npeaks = [{ count = 3, at = \"random\", radius = \"2 m\", height = 4 }]\n";
-
-fn source(text: &str) -> Source {
-    Source {
-        name: "hall.toml".into(),
-        text: text.into(),
-    }
-}
-
-fn parse(text: &str) -> Result<Scenario, FileError> {
-    Scenario::parse(&source(text), Path::new("."))
-}
-
-/// The error as people see it, without colors.
-fn shown(error: &FileError) -> String {
-    config::render_plain(error, None, 200)
-}
 
 fn layer(text: &str) -> LayerSpec {
     parse(text).unwrap().layers["dust"].clone()

@@ -1,20 +1,13 @@
 //! Places: patterns, regions, sizes and walls, as written in a file, drawn from the seed, and written out.
 
 use std::f64::consts::{FRAC_PI_2, PI};
-use std::path::Path;
 
-use config::{Changes, FileError, Source};
+use config::{Changes, Source};
 use protocol::messages::Point;
 use scenario::Scenario;
 use world::{Region, Shape, Wheels};
 
-fn parse(text: &str) -> Result<Scenario, FileError> {
-    let source = Source {
-        name: "hall.toml".into(),
-        text: text.to_owned(),
-    };
-    Scenario::parse(&source, Path::new("."))
-}
+use super::parse;
 
 /// What people are shown.
 fn shown(text: &str) -> String {

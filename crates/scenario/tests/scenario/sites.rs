@@ -1,32 +1,16 @@
 //! Sites in scenario files: what they mean, and what people are told when they are wrong.
 
-use std::path::Path;
-
 use protocol::messages::{
     MAX_KNOWN_SITES, MAX_SITE_TEXT_BYTES, MAX_SITE_VARIABLES, MAX_SITES, MAX_SITES_BYTES, Point,
     StateVariables, Variable, site_bytes,
 };
-use scenario::diagnostic::{FileError, Source};
+use scenario::diagnostic::FileError;
 use scenario::{Changes, OnConflict, Scenario};
+
+use super::{parse, shown, source};
 
 const BULK: &str = "[[site]]\nname = \"T\"\ncount = 3\nkind = \"task\"\nat = \"random\"\nrange = \"1 m\"\n\
                     state = { stock = { start = 30, min = 0, max = 30 }, done = false, label = \"A\" }\n";
-
-fn source(text: &str) -> Source {
-    Source {
-        name: "hall.toml".into(),
-        text: text.into(),
-    }
-}
-
-fn parse(text: &str) -> Result<Scenario, FileError> {
-    Scenario::parse(&source(text), Path::new("."))
-}
-
-/// The error as people see it, without colors.
-fn shown(error: &FileError) -> String {
-    config::render_plain(error, None, 200)
-}
 
 fn changed(text: &str, set: &[&str]) -> Result<Scenario, FileError> {
     let changes = Changes {
