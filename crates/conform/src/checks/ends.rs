@@ -24,8 +24,6 @@ const LONG_GONE_S: u32 = 60;
 const BRIEFLY: Duration = Duration::from_millis(50);
 /// The tick after which the simulator is gone.
 const CUT_AFTER: u64 = 12;
-/// How long no clock comes in a pause: longer than any patience that a robot may have by mistake and that can be waited for here.
-const PAUSED: Duration = Duration::from_secs(12);
 /// How long the simulator's token is away: longer than any lease, as after a cut.
 const CUT: Duration = Duration::from_secs(7);
 
@@ -207,7 +205,7 @@ pub(super) fn paused(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
             entry: &PlayedTick,
         ) -> Result<(), RuleFailure> {
             if entry.tick == CUT_AFTER {
-                harness.pass(PAUSED);
+                harness.pass(waiting::LONG);
                 demand_running(
                     harness,
                     "it waits for the next clock while the simulator is there",
@@ -217,7 +215,7 @@ pub(super) fn paused(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         }
     }
     let mut harness = with_robot(kit, HarnessOptions::default())?;
-    let what = format!("that no clock comes for {} s", PAUSED.as_secs());
+    let what = format!("that no clock comes for {} s", waiting::LONG.as_secs());
     demand_usual(&mut harness, &what, &mut Pause)
 }
 

@@ -18,10 +18,11 @@ mod waiting;
 mod wire;
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::io;
 use std::process::Command;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::thread::Builder;
+use std::thread::{Builder, ScopedJoinHandle};
 
 use harness::HarnessOptions;
 use harness::findings::{Findings, VerdictsByRule};
@@ -43,20 +44,34 @@ struct Check {
     run: RunCheck,
     /// The parts of the kit that it is of.
     parts: &'static [KitPart],
+    /// Whether it mostly waits in the first part, so that it is played beside the others.
+    waits: bool,
 }
 
 /// The parts in which one thing happens at a time; what fails later counts only where nothing fails before.
 const PARTS: [KitPart; 3] = [KitPart::Alone, KitPart::LaterEpoch, KitPart::Rejoined];
 
 const fn rules(rules: &'static [&'static str], run: RunCheck) -> Check {
-    let parts = &PARTS;
-    Check { rules, run, parts }
+    Check {
+        rules,
+        run,
+        parts: &PARTS,
+        waits: false,
+    }
 }
 
 impl Check {
     /// The same check, in these parts only.
     const fn only(self, parts: &'static [KitPart]) -> Self {
         Self { parts, ..self }
+    }
+
+    /// The same check, which waits long.
+    const fn long(self) -> Self {
+        Self {
+            waits: true,
+            ..self
+        }
     }
 
     /// What it finds of a robot.
@@ -78,15 +93,17 @@ const SAME_EPOCHS: [KitPart; 2] = [KitPart::Alone, KitPart::Rejoined];
 /// Checks that need nothing but the usual ticks before; those that take longest begin.
 const CHECKS: [Check; 44] = [
     rules(&["epoch.init", "determinism.seed"], epochs::streams),
-    rules(&["return.rejoin"], returns::rejoin).only(&EPOCHS),
+    rules(&["return.rejoin"], returns::rejoin)
+        .only(&EPOCHS)
+        .long(),
     rules(&["join.refused"], joining::refused).only(&START),
-    rules(&["news.wait"], news::wait),
+    rules(&["news.wait"], news::wait).long(),
     rules(&["command.order"], commands::order).only(&SAME_EPOCHS),
     rules(&["end.gone"], ends::gone_for_a_while),
     rules(&["end.gone"], ends::gone_forever),
     rules(&["end.gone"], ends::back_in_time),
-    rules(&["end.gone"], ends::paused).only(&START),
-    rules(&["query.again"], peers::patient),
+    rules(&["end.gone"], ends::paused).only(&START).long(),
+    rules(&["query.again"], peers::patient).long(),
     rules(&["tick.newest"], peers::newest),
     rules(&["tick.newest"], peers::newer),
     rules(&["query.reply"], peers::reply),
@@ -134,11 +151,12 @@ const CHECKS: [Check; 44] = [
 /// Checks of programs that `cars exec` runs.
 const STDIO_CHECKS: [Check; 1] = [rules(&[rules::STDIO_END], stdio::end).only(&START)];
 /// Rules whose checks presume that the robot keeps another one: without it they show nothing.
-const PRESUMED: [(&str, &str); 21] = [
+const PRESUMED: [(&str, &str); 22] = [
     // On a loaded machine a clock may come again in any check.
     ("news.wait", "clock.duplicate"),
     ("epoch.late", "clock.duplicate"),
     ("query.reply", "clock.duplicate"),
+    ("return.rejoin", "clock.duplicate"),
     ("command.order", "command.payload"),
     ("operator.commands", "command.payload"),
     ("end.gone", "clock.duplicate"),
@@ -224,6 +242,8 @@ struct AllFindings {
 /// The checks that are due, each with the kit of its part, and what they found.
 struct Checks<'k> {
     alone: Vec<(&'k Check, &'k Kit)>,
+    /// Those of the first part that mostly wait.
+    long: Vec<(&'k Check, &'k Kit)>,
     later: Vec<(&'k Check, &'k Kit)>,
     /// In each part, in the order in which it counts.
     found: Mutex<BTreeMap<KitPart, Findings>>,
@@ -257,7 +277,7 @@ impl Checks<'_> {
                 let found = self.again_if_busy(check.rules[0], || check.found(kit));
                 self.add(kit, found);
                 let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
-                (self.progress)(done, self.alone.len() + self.later.len());
+                (self.progress)(done, self.alone.len() + self.long.len() + self.later.len());
             }
         };
         std::thread::scope(|scope| {
@@ -295,6 +315,15 @@ fn again_if(is_busy: impl Fn() -> bool, check: impl Fn() -> Findings) -> (Findin
         return (check(), true);
     }
     (found, false)
+}
+
+/// What a thread does, or is done now if the system has not started it.
+fn joined<T>(thread: io::Result<ScopedJoinHandle<'_, T>>, work: impl FnOnce() -> T) -> T {
+    match thread.map(ScopedJoinHandle::join) {
+        Ok(Ok(done)) => done,
+        Ok(Err(panic)) => std::panic::resume_unwind(panic),
+        Err(_) => work(),
+    }
 }
 
 fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -355,6 +384,7 @@ fn all(
     let kits = PARTS.map(|part| kit.of_part(part));
     let mut checks = Checks {
         alone: Vec::new(),
+        long: Vec::new(),
         later: Vec::new(),
         found: Mutex::default(),
         once_more: Mutex::default(),
@@ -364,17 +394,15 @@ fn all(
     for kit in &kits {
         for check in CHECKS.iter().chain(&STDIO_CHECKS) {
             if check.parts.contains(&kit.part()) && is_wanted(check.rules) {
-                let is_alone = kit.part() == KitPart::Alone;
-                let due = if is_alone {
-                    &mut checks.alone
-                } else {
-                    &mut checks.later
+                let due = match kit.part() {
+                    KitPart::Alone if check.waits => &mut checks.long,
+                    KitPart::Alone => &mut checks.alone,
+                    _ => &mut checks.later,
                 };
                 due.push((check, kit));
             }
         }
     }
-    // It waits most of the time, beside the other checks.
     let play_run = || {
         is_wanted(&run::RULES).then(|| {
             checks.again_if_busy("determinism.seed", || {
@@ -384,14 +412,14 @@ fn all(
             })
         })
     };
+    let play_long = || checks.play(&checks.long);
+    // They wait most of the time, beside the other checks.
     let found_in_run = std::thread::scope(|scope| {
         let run = Builder::new().spawn_scoped(scope, play_run);
+        let long = Builder::new().spawn_scoped(scope, play_long);
         checks.play_all(&kit.of_part(KitPart::Rejoined));
-        match run.map(std::thread::ScopedJoinHandle::join) {
-            Ok(Ok(run)) => run,
-            Ok(Err(panic)) => std::panic::resume_unwind(panic),
-            Err(_) => play_run(),
-        }
+        joined(long, play_long);
+        joined(run, play_run)
     });
 
     // A robot that breaks a rule alone breaks others by it later and in a run, where nothing is for itself.

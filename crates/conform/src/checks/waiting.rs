@@ -13,8 +13,8 @@ use harness::{Harness, HarnessOptions};
 
 /// After this time, a robot that received a clock is in its tick.
 const UNDER_WAY: Duration = Duration::from_millis(50);
-/// Longer than the patience that a robot may have of its own, by mistake.
-const LONG: Duration = Duration::from_secs(11);
+/// Longer than the patience that a robot may have of its own, by mistake: libraries give up after 10 or 30 s.
+pub(super) const LONG: Duration = Duration::from_secs(31);
 /// Ticks within which a robot that queries others at all does so.
 const TICKS: Tick = 24;
 

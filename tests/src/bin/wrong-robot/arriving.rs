@@ -15,7 +15,7 @@ const MAX_EPOCHS: Epoch = 10;
 /// After so many requests without an answer it ends, if it is to.
 const MAX_UNANSWERED: usize = 3;
 /// The same for one that has more patience: it asks every 0.1 s.
-const PATIENT: usize = 50;
+const PATIENT: usize = 250;
 /// The same for requests that are refused.
 const MAX_REFUSALS: usize = 10;
 /// Delay of a declaration that is made too late.

@@ -28,6 +28,16 @@ const QUEUE: usize = 4096;
 /// The simulator is gone for long after this time.
 const LONG_GONE: Duration = Duration::from_secs(5);
 
+/// After this time without a change it gives up what it waits for, if it is to.
+const PATIENCE: Duration = Duration::from_secs(28);
+/// How often it looks at what it waits for.
+const LOOK: Duration = Duration::from_secs(1);
+/// What it does wrong then, by what it waits in: for a clock, for an answer, for its news.
+const IMPATIENT: [(Phase, &str); 3] = [
+    (Phase::Idle, "end.gone:impatient"),
+    (Phase::Asking, "query.again:impatient"),
+    (Phase::AwaitingNews, "news.wait:impatient"),
+];
 /// After so many queries it gives up, if it is to.
 const MAX_QUERIES: usize = 8;
 
@@ -87,6 +97,8 @@ pub(crate) struct Host {
     pub(crate) present: BTreeSet<String>,
     /// States of others by tick, if it is to keep them.
     pub(crate) cache: BTreeMap<(RobotName, Tick), PublicState>,
+    /// What it waits in, since when, and the tick.
+    waits_in: Option<(Phase, Tick, Instant)>,
     /// Since when the simulator is gone.
     gone: Option<Instant>,
     /// Whether it has had no answer to its query, if it is to give up then.
@@ -173,6 +185,7 @@ impl Host {
             newest: None,
             present: BTreeSet::new(),
             cache: BTreeMap::new(),
+            waits_in: None,
             gone: None,
             has_given_up: false,
             losses: 0,
@@ -391,12 +404,32 @@ impl Host {
         Ok(())
     }
 
+    /// Gives up what it has waited for for long, if it is to.
+    fn lose_patience(&mut self) {
+        for (phase, how) in IMPATIENT {
+            if !self.shared.is_in(phase) || !self.wrong.is(how) {
+                continue;
+            }
+
+            let tick = self.last_clock.tick;
+            match self.waits_in {
+                Some((in_phase, of, since)) if (in_phase, of) == (phase, tick) => {
+                    if since.elapsed() > PATIENCE {
+                        self.leave.get_or_insert(Leave::Stopped);
+                        self.has_given_up = true;
+                    }
+                }
+                _ => self.waits_in = Some((phase, tick, Instant::now())),
+            }
+        }
+    }
+
     /// Waits for one event, or for a timer, and handles it.
     pub(crate) fn pump(&mut self) -> Result<(), Failure> {
+        self.lose_patience();
         let next = self.timers.values().min().copied();
-        let rest = next.map_or(Duration::from_secs(1), |at| {
-            at.saturating_duration_since(Instant::now())
-        });
+        let until_next = next.map(|at| at.saturating_duration_since(Instant::now()));
+        let rest = until_next.map_or(LOOK, |rest| rest.min(LOOK));
         match self.events.recv_timeout(rest) {
             Ok(event) => self.handle(event),
             Err(RecvTimeoutError::Timeout) => self.fire_timers(),
