@@ -100,11 +100,16 @@ pub(crate) const SETTINGS: [MiddlewareSetting; 13] = [
 ];
 
 /// Settings in addition, where no link is ever cut, and processes may be slow.
-pub(crate) const PATIENT_SETTINGS: [MiddlewareSetting; 4] = [
+pub(crate) const PATIENT_SETTINGS: [MiddlewareSetting; 5] = [
     setting(
         "transport/link/tx/lease",
         "60000",
         "Whoever is stopped or has no processor is still there.",
+    ),
+    setting(
+        "transport/link/tx/keep_alive",
+        "120",
+        "Still two signs of life in a second: a participant over zenoh-pico gives a link up after its own lease.",
     ),
     setting(
         "transport/link/tx/queue/congestion_control/block/wait_before_close",

@@ -10,14 +10,33 @@ use nix::unistd::Pid;
 /// So many programs for each processor make a machine busy. A kit by itself makes up to five.
 const BUSY: f64 = 8.0;
 
-/// Whether so many programs of this machine have run or waited for a processor in the last minute that a robot which does
-/// nothing wrong may lose its link. Where the system does not show it, it is taken to be at rest.
+/// How often it is looked how many programs run or wait now, and the time between two looks.
+const LOOKS: u32 = 10;
+const BETWEEN_LOOKS: Duration = Duration::from_millis(20);
+
+/// Whether so many programs of this machine run or wait for a processor, on average over the last minute or right now, that a
+/// robot which does nothing wrong may lose its link. Where the system does not show it, it is taken to be at rest.
 pub fn is_machine_busy() -> bool {
-    // proc(5): the averages over 1, 5 and 15 minutes first.
-    let text = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
-    let average: Option<f64> = text.split(' ').next().and_then(|one| one.parse().ok());
     let processors = available_parallelism().map_or(1.0, |count| count.get() as f64);
-    average.unwrap_or_default() > BUSY * processors
+    let mut now = 0.0;
+    for _ in 0..LOOKS {
+        let text = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
+        let (over_a_minute, runnable) = load(&text);
+        if over_a_minute > BUSY * processors {
+            return true;
+        }
+        now += runnable / f64::from(LOOKS);
+        std::thread::sleep(BETWEEN_LOOKS);
+    }
+    now > BUSY * processors
+}
+
+/// How many programs run or wait on average over the last minute, and how many do now: proc(5) has the averages over 1, 5 and
+/// 15 minutes, and then the number now before a slash.
+fn load(text: &str) -> (f64, f64) {
+    let number = |text: Option<&str>| text.and_then(|text| text.parse().ok()).unwrap_or_default();
+    let mut fields = text.split([' ', '/']);
+    (number(fields.next()), number(fields.nth(2)))
 }
 
 /// The processes of a group.
@@ -101,6 +120,12 @@ mod tests {
     use std::process::Command;
 
     use super::*;
+
+    #[test]
+    fn the_load_of_a_minute_and_of_now_are_read() {
+        assert_eq!(load("0.54 16.40 2.10 43/612 70123\n"), (0.54, 43.0));
+        assert_eq!(load(""), (0.0, 0.0));
+    }
 
     #[test]
     fn a_group_that_sleeps_is_idle_and_one_that_computes_is_not() {
