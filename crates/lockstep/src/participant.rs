@@ -77,7 +77,7 @@ struct Asking {
 /// News as they arrived.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 struct ArrivedNews<N> {
-    joined: Option<Generation>,
+    notice: IncarnationNotice,
     news: N,
 }
 
@@ -170,6 +170,16 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         // admitted. It stays declared for as long as the process lives.
         if before.is_none() {
             out.push(ParticipantOutput::DeclareToken);
+        }
+
+        // What was admitted may be lost again already, and its news be faster than the welcome. They are not kept: a welcome
+        // with the same generation must not make it ask for ever.
+        let arrived = self.news.len();
+        self.news.retain(|of, arrived| {
+            of.0 != admission.epoch || arrived.notice.rejoin != Some(admission.generation)
+        });
+        if self.news.len() < arrived {
+            self.join_again(out);
         }
         self.run_if_possible(out);
     }
@@ -284,7 +294,7 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
             return;
         }
         self.news
-            .insert((epoch, tick), ArrivedNews { joined, news });
+            .insert((epoch, tick), ArrivedNews { notice, news });
         // Those of later epochs, which only a welcome confirms, take no room from the others.
         let mut later = self.news.split_off(&(admission.epoch, Tick::MAX));
         for kept in [&mut self.news, &mut later] {
@@ -537,7 +547,7 @@ impl<N: Clone, S: Clone, C: Clone, R: Clone> Participant<N, S, C, R> {
         self.pending = None;
         let arrived = self.news.remove(&at);
         self.news = self.news.split_off(&at);
-        let joined = arrived.as_ref().and_then(|arrived| arrived.joined);
+        let joined = arrived.as_ref().and_then(|arrived| arrived.notice.joined);
         // A clock of tick 0 may be from before this incarnation: only the first one takes part in it without being
         // named.
         let is_first = admission.generation == 1;

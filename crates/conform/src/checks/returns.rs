@@ -233,6 +233,8 @@ pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     // It is lost again before it had its turn.
     join_again(&mut harness)?;
     let lost = harness.generation();
+    // Its welcome is here before the news: they come on ways of their own.
+    harness.settle(QUIET);
     join_again(&mut harness)?;
     let again = play(&mut harness, &PlayScript::quiet(1), &mut Straight)?;
     demand_generation(&again, harness.generation())?;

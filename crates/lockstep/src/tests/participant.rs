@@ -203,6 +203,42 @@ fn a_robot_that_joins_again_forgets_the_tick_that_it_runs() {
 }
 
 #[test]
+fn news_that_are_faster_than_the_welcome_of_a_lost_incarnation_make_it_join_again_once() {
+    let mut robot = running();
+    let mut out = Vec::new();
+    let lost = |generation| IncarnationNotice {
+        joined: Some(generation),
+        rejoin: Some(generation),
+    };
+    let admitted = |generation| Admission {
+        generation,
+        ..ADMISSION
+    };
+    robot.done(Vec::new(), "of tick 1", (), &mut out);
+    robot.news(1, 5, lost(1), (), &mut out);
+    out.clear();
+
+    // The second incarnation is lost in tick 7, and its news and their clock are here before its welcome.
+    robot.news(1, 7, lost(2), (), &mut out);
+    robot.clock(clock(1, 7), &mut out);
+    robot.admitted(admitted(2), [], &mut out);
+    assert_eq!(
+        out,
+        [ParticipantOutput::Join],
+        "no tick is run as the second one"
+    );
+    out.clear();
+    robot.admitted(admitted(2), [], &mut out);
+    assert_eq!(out, [], "a welcome that was repeated makes it ask no more");
+
+    robot.news(1, 8, lost(2), (), &mut out);
+    robot.admitted(admitted(3), [], &mut out);
+    robot.news(1, 9, joined(3), (), &mut out);
+    robot.clock(clock(1, 9), &mut out);
+    assert_eq!(out, [ParticipantOutput::Join, run(1, 9, Begin::TakeOver)]);
+}
+
+#[test]
 fn a_robot_that_is_cut_off_where_an_epoch_begins_returns_as_a_further_incarnation() {
     let mut barrier = gathered(lateness(OnLate::Continue, 3));
     open(&mut barrier, 0);
