@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use protocol::messages::{Clock, Refusal};
-use protocol::{Epoch, Generation, RobotName, Tick};
+use protocol::{Epoch, RobotName, Tick};
 
 use crate::actions::{Begin, Leave, ParticipantOutput, RobotTimer, TickAnswer, Timeouts, Turn};
 use crate::exchange::{IncarnationNotice, Sent};
