@@ -21,6 +21,9 @@ const BESIDE_M: f64 = 0.75;
 /// How far a robot without a script moves in a tick, meters, and after how many ticks it is back.
 const PACE_M: f64 = 0.01;
 const PACES: Tick = 50;
+/// What it is then, and what it does.
+const EMOTIONS: [&str; 3] = ["CALM", "GLAD", "TIRED"];
+const BEHAVIORS: [&str; 2] = ["STAND", "PACE"];
 
 /// A query that one of them received.
 #[derive(Debug, Clone)]
@@ -196,11 +199,11 @@ impl FakePeers {
                 role.location.x + PACE_M * (tick % PACES) as f64,
                 role.location.y,
             ),
-            speed_mps: 0.0,
-            direction_rad: 0.0,
+            speed_mps: (tick % 2) as f64,
+            direction_rad: (tick % 3) as f64,
             state_variables: [("ticks".to_owned(), Variable::Number(tick as f64))].into(),
-            emotion_state: "CALM".to_owned(),
-            behavior_state: "STAND".to_owned(),
+            emotion_state: EMOTIONS[tick as usize % EMOTIONS.len()].to_owned(),
+            behavior_state: BEHAVIORS[tick as usize % BEHAVIORS.len()].to_owned(),
         });
 
         let mut location = state.location;
@@ -335,9 +338,9 @@ impl FakePeers {
             return query.reply_err("nothing is known before tick 1");
         };
 
-        // Who takes it for that of this epoch shows it.
-        if of_epoch != epoch {
-            state.location.x += MISPLACED_M;
+        // Who takes it for the one that was asked for shows it, whatever of it counts for that robot.
+        if is_earlier || of_epoch != epoch {
+            stray(&mut state);
         }
         match state.answer(what) {
             Some(answer) => query.reply(query.key(), self.dress(&answer)),
@@ -361,13 +364,35 @@ impl FakePeers {
         for name in self.names() {
             if let Some(mut state) = self.state_of(name, epoch, before) {
                 if misplaces {
-                    state.location.x += MISPLACED_M;
+                    stray(&mut state);
                 }
                 bus.put(&keys.query(name, STATE), self.dress(&state))?;
             }
         }
 
         Ok(())
+    }
+}
+
+/// Changes all that a state says, but for its epoch and tick.
+fn stray(state: &mut PublicState) {
+    state.location.x += MISPLACED_M;
+    state.speed_mps += 1.0;
+    state.direction_rad = if state.direction_rad > 0.0 { -1.0 } else { 1.0 };
+    state.emotion_state = "ASTRAY".to_owned();
+    state.behavior_state = "STRAY".to_owned();
+    let variables = &state.state_variables;
+    state.state_variables = variables
+        .into_iter()
+        .map(|(name, value)| (name, other(value)))
+        .collect();
+}
+
+fn other(value: &Variable) -> Variable {
+    match value {
+        Variable::Flag(flag) => Variable::Flag(!flag),
+        Variable::Number(number) => Variable::Number(number + 1.0),
+        Variable::Text(text) => Variable::Text(format!("{text} astray").into()),
     }
 }
 

@@ -39,8 +39,9 @@ const LAST_OF_MANY: Tick = FIRST + (MANY / FEW) as Tick;
 const SHORT_TEXT: usize = 90;
 /// Most bytes that a line has in which a text is quoted, beside the text.
 const QUOTED_BY: usize = 96;
-/// All kinds of characters that JSON escapes, and such as have two, three and four bytes.
-const ESCAPED_TEXT: &str = " \"a\\b/\t\r\n{\"tick\":9}\u{1}äßﬁ猫🤖 ";
+/// All kinds of characters that JSON escapes, such as have two, three and four bytes, and such as end lines elsewhere.
+const ESCAPED_TEXT: &str =
+    " \"a\\b/\t\r\n{\"tick\":9}\u{1}\u{b}\u{c}äßﬁ猫🤖\u{85}\u{2028}\u{2029} ";
 
 /// How many commands are many for this robot, and how many long ones.
 fn many_for(kit: &Kit) -> [usize; 2] {
@@ -595,6 +596,7 @@ pub(super) fn payload(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
             "the deepest payload and large numbers",
             json!([u64::MAX, i64::MIN, -0.0, 1e300, deepest]),
         ),
+        ("a payload like messages", like_messages()),
         ("the payload false", json!(false)),
         ("the payload 0", json!(0)),
         ("an empty text as payload", json!("")),
@@ -639,6 +641,18 @@ pub(super) fn payload(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         unknown.push((what, text, None));
     }
     demand_counted(plays, &short, &unknown)
+}
+
+/// A payload with the fields of clocks, news, welcomes and lines for programs, also further within.
+fn like_messages() -> Value {
+    let fields = json!({
+        "type": "end", "end": "stopped", "epoch": 9, "tick": 9, "generation": 9, "joined": 9, "rejoin": 1, "news": 1,
+        "location": { "x": 1.0, "y": 1.0 }, "blocked": true, "from": "A", "command": "b", "commands": [], "reseeds": [],
+    });
+    let mut outer = fields.clone();
+    outer["inner"] = fields;
+    outer["inner"]["type"] = json!("init");
+    outer
 }
 
 /// Each of these texts and payloads in the news of a tick of its own.

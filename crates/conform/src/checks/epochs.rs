@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use bus::Declared;
 use protocol::keys::STATE;
-use protocol::messages::{Clock, JoinRequest, KnownSite, Point, StreamReseed, TickUpdate, Welcome};
+use protocol::messages::{Clock, KnownSite, Point, StreamReseed, TickUpdate, Welcome};
 use protocol::{Epoch, RobotName, Tick};
 use serde_json::json;
 
@@ -45,6 +45,8 @@ const RESEEDED: Tick = 4;
 const RESEEDED_AGAIN: Tick = 8;
 /// The tick of an epoch in which a robot asks to join it late.
 const FAR: Tick = 70_000;
+/// The tick after which a clock strays in.
+const STRAY: Tick = 12;
 /// How far from its place in one epoch a robot is placed in a further one.
 const MOVED_M: f64 = 0.25;
 
@@ -354,11 +356,15 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     let again = play(&mut harness, &PlayScript::usual(kit), &mut WrongWelcome);
     // Before the play itself is judged: a process that has another identity explains what else is
     // wrong.
-    demand_same_process(&harness)?;
+    returns::demand_same_process(&harness)?;
     let again = again?;
     harness.demand_token_kept("an epoch begins")?;
     let what = "to start over in a further epoch instead of a new process";
     demand_same(kit, what, usual(kit)?, &again)?;
+
+    let mut harness = with_robot(kit, HarnessOptions::default())?;
+    let what = "a clock of a further epoch, for which its welcome is that of this one";
+    demand_usual(&mut harness, what, &mut StrayClock)?;
 
     harness.begin_epoch(harness.epoch() + 1);
     play(
@@ -367,7 +373,31 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         &mut Straight,
     )?;
     harness.begin_epoch(harness.epoch() + 1);
+    let what = "to start over in a further epoch instead of a new process";
     demand_usual(&mut harness, what, &mut Straight)
+}
+
+/// In the middle of an epoch comes a clock of one that does not begin: the robot asks, and goes on as what it is.
+struct StrayClock;
+
+impl Disturbance for StrayClock {
+    fn after(&mut self, harness: &mut Harness<'_>, entry: &PlayedTick) -> Result<(), RuleFailure> {
+        if entry.tick != STRAY {
+            return Ok(());
+        }
+        harness.keeps_requests = true;
+        let (epoch, tick) = (harness.epoch() + 1, 0);
+        harness.put_clock(&Clock {
+            epoch,
+            tick,
+            ..Clock::default()
+        })?;
+        let joining = harness.next_join(PATIENCE)?;
+        harness.welcome_to(joining, harness.epoch());
+        harness.keeps_requests = false;
+        harness.settle(QUIET);
+        Ok(())
+    }
 }
 
 /// A further epoch with another welcome: it goes through it as a process that has no other one. A person may load another scenario
@@ -438,6 +468,8 @@ pub(super) fn after_rejoining(kit: &Kit, _: &mut Findings) -> Result<(), RuleFai
     let mut anew = Harness::open_run(kit, HarnessOptions::default())?;
     anew.prepare()?;
     anew.play_predecessor(DRAWN)?;
+    // What its predecessor reported does not count at tick 0.
+    anew.template.last_state = usual(kit)?.last().map(PlayedTick::state);
     anew.begin_epoch(anew.epoch() + 1);
     anew.admit_first()?;
     let expected = play(&mut anew, &busy, &mut Straight)?;
@@ -513,7 +545,7 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     let joining = join_again(&mut harness)?;
     harness.admit(joining);
     harness.keeps_requests = false;
-    demand_same_process(&harness)?;
+    returns::demand_same_process(&harness)?;
     harness.settle(QUIET);
     let expected =
         "admitted in the middle of an epoch, no report before its news name its generation";
@@ -551,27 +583,6 @@ fn demand_silence(harness: &Harness<'_>, expected: &str) -> Result<(), RuleFailu
             format!("a report for tick {} of epoch {epoch}", report.tick),
         )),
     }
-}
-
-/// It asked to join again as the process that it is.
-fn demand_same_process(harness: &Harness<'_>) -> Result<(), RuleFailure> {
-    let expected = "further requests to join with the same name and instance when an epoch begins";
-    let mut first = None;
-    for request in &harness.seen.requests {
-        let request = match request {
-            Ok(JoinRequest { name, instance, .. }) => format!("{name} with instance {instance:?}"),
-            Err(error) => return Err(RuleFailure::new(expected, error)),
-        };
-
-        let first = first.get_or_insert_with(|| request.clone());
-        if *first != request {
-            return Err(RuleFailure::new(
-                expected,
-                format!("{request}, and before {first}"),
-            ));
-        }
-    }
-    Ok(())
 }
 
 fn demand_epoch(transcript: &[PlayedTick], epoch: Epoch) -> Result<(), RuleFailure> {

@@ -199,6 +199,8 @@ pub fn check(
         once_more,
     } = all(&kit, rules, progress)?;
 
+    // A rule that is broken in a check may keep another one from being looked at.
+    let is_incomplete = rules.iter().any(|rule| !verdicts.contains_key(rule.name));
     let mut outcomes = Vec::new();
     for rule in rules::rules() {
         let verdict = verdicts.remove(rule.name);
@@ -206,9 +208,10 @@ pub fn check(
             kit.stdio.is_program() || !rules::STDIO_RULES.contains(&rule)
         } else {
             // What keeps the robot from getting to the wanted rules after joining again is shown, too.
-            let is_again = |failure: &RuleFailure| failure.part == KitPart::Rejoined;
+            let is_shown =
+                |failure: &RuleFailure| failure.part == KitPart::Rejoined || is_incomplete;
             rules.contains(&rule)
-                || matches!(&verdict, Some(RuleVerdict::Failed(failure)) if is_again(failure))
+                || matches!(&verdict, Some(RuleVerdict::Failed(failure)) if is_shown(failure))
         };
         if !is_due {
             continue;

@@ -296,6 +296,7 @@ fn check_newest(harness: &Harness<'_>, tick: Tick, now: &PublicState) -> Result<
         String::new(),
         format!("epoch={epoch}"),
         format!("tick={next}"),
+        format!("epoch={epoch};tick={next}"),
     ] {
         let expected =
             format!("asked with {parameters:?} after tick {tick}, the state of tick {tick}");

@@ -3,8 +3,9 @@
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
-use protocol::messages::{Clock, Correction, Refusal, TickUpdate, Welcome};
-use protocol::{Generation, Tick};
+use protocol::keys::STATE;
+use protocol::messages::{Clock, Correction, PublicState, Refusal, TickUpdate, Welcome};
+use protocol::{Generation, Tick, encode};
 use serde_json::Value;
 
 use super::waiting;
@@ -52,6 +53,8 @@ fn returned<'k>(
     }
     inherit(&mut harness, reported, generation);
     change(&mut harness.template);
+    // What it does must not depend on the moment when it asks.
+    harness.asks_early = true;
     harness.admit_first()?;
     Ok(harness)
 }
@@ -126,33 +129,77 @@ fn generation_after(kit: &Kit, last: Tick, reported: &[PlayedTick]) -> Result<()
         ));
     }
 
-    demand_inherited(&harness)?;
+    demand_inherited(&mut harness)?;
 
     let transcript = play(&mut harness, &PlayScript::quiet(5), &mut Straight)?;
+    demand_generation(&transcript, GENERATION)?;
+
+    // That its predecessor was to join again does not concern it.
+    let asked = harness.seen.requests.len();
+    harness.put_news(&TickUpdate {
+        epoch: 1,
+        tick: harness.next_tick() - 1,
+        rejoin: Some(GENERATION - 1),
+        ..TickUpdate::default()
+    })?;
+    harness.settle(QUIET);
+    if harness.seen.requests.len() > asked {
+        return Err(RuleFailure::new(
+            "no request to join for news with the `rejoin` of its predecessor",
+            "one more",
+        ));
+    }
+    let transcript = play(&mut harness, &PlayScript::quiet(2), &mut Straight)?;
     demand_generation(&transcript, GENERATION)
 }
 
-/// Until its first report it shows what its predecessor reported.
-fn demand_inherited(harness: &Harness<'_>) -> Result<(), RuleFailure> {
+/// Until its first report it shows what its predecessor reported, and the last of it where no tick is named.
+fn demand_inherited(harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
     let states = [
         harness.template.state_before.clone(),
         harness.template.last_state.clone(),
     ];
-    for state in states.into_iter().flatten() {
-        let expected = format!(
-            "queried before its first report, the state of tick {} of its welcome",
-            state.tick
-        );
-        let came =
-            super::queries::state(harness.state_in(state.epoch, state.tick + 1)?, &expected)?;
-        if came != state {
-            return Err(RuleFailure::new(
-                expected,
-                format!("the state of tick {}", came.tick),
-            ));
+    for state in states.iter().flatten() {
+        let parameters = format!("epoch={};tick={}", state.epoch, state.tick + 1);
+        demand_shown(harness, &parameters, state)?;
+    }
+    match &states[1] {
+        Some(last) => demand_shown(harness, "", last),
+        None => Ok(()),
+    }
+}
+
+/// It shows this state, queried in this way, once it has read its welcome.
+fn demand_shown(
+    harness: &mut Harness<'_>,
+    parameters: &str,
+    state: &PublicState,
+) -> Result<(), RuleFailure> {
+    let expected = format!(
+        "queried with {parameters:?} before its first report, the state of tick {} of its welcome",
+        state.tick
+    );
+    let mut came = RuleFailure::maybe_of_load(&expected, "no answer");
+    let shown = harness.until(&expected, PATIENCE, |harness| {
+        match harness
+            .ask(STATE, parameters)
+            .and_then(|answer| super::queries::state(answer, &expected))
+        {
+            Ok(shown) => Some(shown),
+            Err(failure) => {
+                came = failure;
+                None
+            }
+        }
+    });
+    match shown {
+        Err(_) => Err(came),
+        Ok(shown) if shown == *state => Ok(()),
+        Ok(shown) => {
+            let came = format!("the state of tick {}", shown.tick);
+            Err(RuleFailure::new(expected, came))
         }
     }
-    Ok(())
 }
 
 fn demand_generation(transcript: &[PlayedTick], generation: Generation) -> Result<(), RuleFailure> {
@@ -205,7 +252,7 @@ pub(super) fn rejoin(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         last_ticks.push(harness.next_tick() - 1);
         // Its turn is the next tick, whose news name it.
         harness.settle(QUIET);
-        demand_inherited(&harness)?;
+        demand_inherited(&mut harness)?;
         let script = PlayScript::quiet(BUSY).busy_until(kit, harness.next_tick() + BUSY);
         let again = play(&mut harness, &script, &mut Straight)?;
         demand_generation(&again, generation)?;
@@ -297,14 +344,22 @@ fn join_again(harness: &mut Harness<'_>) -> Result<(), RuleFailure> {
     harness.admit(joining);
     harness.keeps_requests = false;
 
-    let mut instances = Vec::new();
-    for request in harness.seen.requests.iter().flatten() {
-        instances.push(&request.instance);
-    }
-    instances.dedup();
-    if instances.len() > 1 {
-        let came = format!("{instances:?}");
-        return Err(RuleFailure::new("the same instance in all requests", came));
+    demand_same_process(harness)
+}
+
+/// It asked to join again as the process that it is, and for the same.
+pub(super) fn demand_same_process(harness: &Harness<'_>) -> Result<(), RuleFailure> {
+    let expected = "further requests to join like the first one, also with the same instance";
+    let mut first = None;
+    for request in &harness.seen.requests {
+        let request = request.as_ref();
+        let request = request.map_err(|error| RuleFailure::new(expected, error))?;
+        let first = first.get_or_insert(request);
+        if *first != request {
+            let text = |request| String::from_utf8_lossy(&encode(request)).into_owned();
+            let came = format!("{}, and before {}", text(request), text(first));
+            return Err(RuleFailure::new(expected, came));
+        }
     }
     Ok(())
 }

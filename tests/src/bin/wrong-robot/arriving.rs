@@ -196,6 +196,9 @@ impl Host {
         {
             news.rejoin = None;
         }
+        if news.rejoin.is_some() && self.wrong.is("return.generation:rejoin") {
+            news.rejoin = Some(generation);
+        }
 
         let (mut epoch, mut tick) = self.wrong.kept_of(news.epoch, news.tick);
         if self.wrong.is("news.wait:epoch") && news.rejoin == Some(generation) {
@@ -237,7 +240,7 @@ impl Host {
             name: self.name.clone(),
             instance,
             bodies: false,
-            ranges: false,
+            ranges: is_again && self.wrong.is("epoch.init:ranges"),
             sdk: "wrong robot".to_owned(),
         };
         let is_later = self.last_clock.epoch > epoch;
@@ -309,6 +312,7 @@ impl Host {
         }
         let admission = Admission::from(&welcome);
         let before = self.welcome.as_ref().map(Admission::from);
+        self.starts_over |= before == Some(admission) && self.wrong.is("epoch.init:restarts");
         if before.is_some_and(|before| before != admission) {
             self.has_rejoined |= before.is_some_and(|before| before.epoch == admission.epoch);
             self.has_begun = false;
