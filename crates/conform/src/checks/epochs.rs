@@ -366,6 +366,19 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     let what = "a clock of a further epoch, for which its welcome is that of this one";
     demand_usual(&mut harness, what, &mut StrayClock)?;
 
+    // An epoch begins and is over before its welcome is here: the one that follows is that of the welcome.
+    harness.keeps_requests = true;
+    harness.put_clock(&Clock {
+        epoch: harness.epoch() + 1,
+        ..Clock::default()
+    })?;
+    let joining = harness.next_join(PATIENCE)?;
+    harness.begin_epoch(harness.epoch() + 2);
+    harness.admit(joining);
+    harness.keeps_requests = false;
+    let what = "that the epoch of the clock was over when it was welcomed";
+    demand_usual(&mut harness, what, &mut Straight)?;
+
     harness.begin_epoch(harness.epoch() + 1);
     play(
         &mut harness,
@@ -468,8 +481,6 @@ pub(super) fn after_rejoining(kit: &Kit, _: &mut Findings) -> Result<(), RuleFai
     let mut anew = Harness::open_run(kit, HarnessOptions::default())?;
     anew.prepare()?;
     anew.play_predecessor(DRAWN)?;
-    // What its predecessor reported does not count at tick 0.
-    anew.template.last_state = usual(kit)?.last().map(PlayedTick::state);
     anew.begin_epoch(anew.epoch() + 1);
     anew.admit_first()?;
     let expected = play(&mut anew, &busy, &mut Straight)?;

@@ -312,6 +312,10 @@ impl Host {
         }
         let admission = Admission::from(&welcome);
         let before = self.welcome.as_ref().map(Admission::from);
+        let is_other = self.last_clock.epoch > 0 && self.last_clock.epoch != admission.epoch;
+        if is_other && self.wrong.is("epoch.init:exactly") {
+            return self.drive(lockstep::Participant::unanswered);
+        }
         self.starts_over |= before == Some(admission) && self.wrong.is("epoch.init:restarts");
         if before.is_some_and(|before| before != admission) {
             self.has_rejoined |= before.is_some_and(|before| before.epoch == admission.epoch);

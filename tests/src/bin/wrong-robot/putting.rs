@@ -133,7 +133,9 @@ impl Host {
     }
 
     fn put_state(&self, state: &PublicState) -> Result<(), Failure> {
-        if self.states.has_subscribers() && !self.wrong.is("tick.state-first:unsubscribed") {
+        let is_silent = self.wrong.is("tick.state-first:unsubscribed")
+            || self.last_clock.panels && self.wrong.is("tick.state-first:panels");
+        if self.states.has_subscribers() && !is_silent {
             let key = self.keys.query(&self.name, STATE);
             self.put_on(&key, encode(state), self.wrong.is("wire.qos:state"))?;
         }

@@ -134,13 +134,6 @@ impl Host {
             }
         }
 
-        if welcome.generation > 1
-            && self.wrong.is("epoch.init:last-state")
-            && let Some(last) = &welcome.last_state
-        {
-            walker.received = u32::try_from(last.tick).unwrap_or_default();
-        }
-
         self.walker = Some(walker);
     }
 
