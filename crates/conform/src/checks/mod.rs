@@ -151,12 +151,13 @@ const CHECKS: [Check; 44] = [
 /// Checks of programs that `cars exec` runs.
 const STDIO_CHECKS: [Check; 1] = [rules(&[rules::STDIO_END], stdio::end).only(&START)];
 /// Rules whose checks presume that the robot keeps another one: without it they show nothing.
-const PRESUMED: [(&str, &str); 22] = [
+const PRESUMED: [(&str, &str); 23] = [
     // On a loaded machine a clock may come again in any check.
     ("news.wait", "clock.duplicate"),
     ("epoch.late", "clock.duplicate"),
     ("query.reply", "clock.duplicate"),
     ("return.rejoin", "clock.duplicate"),
+    ("return.rejoin", "return.generation"),
     ("command.order", "command.payload"),
     ("operator.commands", "command.payload"),
     ("end.gone", "clock.duplicate"),
