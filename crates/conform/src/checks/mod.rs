@@ -151,7 +151,7 @@ const CHECKS: [Check; 44] = [
 /// Checks of programs that `cars exec` runs.
 const STDIO_CHECKS: [Check; 1] = [rules(&[rules::STDIO_END], stdio::end).only(&START)];
 /// Rules whose checks presume that the robot keeps another one: without it they show nothing.
-const PRESUMED: [(&str, &str); 23] = [
+const PRESUMED: [(&str, &str); 24] = [
     // On a loaded machine a clock may come again in any check.
     ("news.wait", "clock.duplicate"),
     ("epoch.late", "clock.duplicate"),
@@ -172,6 +172,7 @@ const PRESUMED: [(&str, &str); 23] = [
     ("epoch.init", "tick.initial"),
     ("epoch.init", "news.wait"),
     ("epoch.init", "tick.newest"),
+    ("epoch.init", "query.reply"),
     ("epoch.init", "return.rejoin"),
     ("return.replaced", "return.rejoin"),
     ("tick.newest", "news.wait"),
