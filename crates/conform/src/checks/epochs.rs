@@ -363,21 +363,15 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     demand_same(kit, what, usual(kit)?, &again)?;
 
     let mut harness = with_robot(kit, HarnessOptions::default())?;
-    let what = "a clock of a further epoch, for which its welcome is that of this one";
-    demand_usual(&mut harness, what, &mut StrayClock)?;
+    let stray = "a clock of a further epoch, for which its welcome is that of this one";
+    demand_usual(&mut harness, stray, &mut StrayClock)?;
 
     // An epoch begins and is over before its welcome is here: the one that follows is that of the welcome.
-    harness.keeps_requests = true;
-    harness.put_clock(&Clock {
-        epoch: harness.epoch() + 1,
-        ..Clock::default()
-    })?;
-    let joining = harness.next_join(PATIENCE)?;
+    let joining = asked_astray(&mut harness)?;
     harness.begin_epoch(harness.epoch() + 2);
     harness.admit(joining);
-    harness.keeps_requests = false;
-    let what = "that the epoch of the clock was over when it was welcomed";
-    demand_usual(&mut harness, what, &mut Straight)?;
+    let over = "that the epoch of the clock was over when it was welcomed";
+    demand_usual(&mut harness, over, &mut Straight)?;
 
     harness.begin_epoch(harness.epoch() + 1);
     play(
@@ -386,7 +380,6 @@ pub(super) fn init(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
         &mut Straight,
     )?;
     harness.begin_epoch(harness.epoch() + 1);
-    let what = "to start over in a further epoch instead of a new process";
     demand_usual(&mut harness, what, &mut Straight)
 }
 
@@ -398,19 +391,24 @@ impl Disturbance for StrayClock {
         if entry.tick != STRAY {
             return Ok(());
         }
-        harness.keeps_requests = true;
-        let (epoch, tick) = (harness.epoch() + 1, 0);
-        harness.put_clock(&Clock {
-            epoch,
-            tick,
-            ..Clock::default()
-        })?;
-        let joining = harness.next_join(PATIENCE)?;
+
+        let joining = asked_astray(harness)?;
         harness.welcome_to(joining, harness.epoch());
-        harness.keeps_requests = false;
         harness.settle(QUIET);
         Ok(())
     }
+}
+
+/// The robot's request to join for a clock of the next epoch, which does not begin.
+fn asked_astray(harness: &mut Harness<'_>) -> Result<Joining, RuleFailure> {
+    harness.keeps_requests = true;
+    harness.put_clock(&Clock {
+        epoch: harness.epoch() + 1,
+        ..Clock::default()
+    })?;
+    let joining = harness.next_join(PATIENCE)?;
+    harness.keeps_requests = false;
+    Ok(joining)
 }
 
 /// A further epoch with another welcome: it goes through it as a process that has no other one. A person may load another scenario

@@ -45,7 +45,7 @@ struct Check {
     /// The parts of the kit that it is of.
     parts: &'static [KitPart],
     /// Whether it mostly waits in the first part, so that it is played beside the others.
-    waits: bool,
+    is_long: bool,
 }
 
 /// The parts in which one thing happens at a time; what fails later counts only where nothing fails before.
@@ -56,7 +56,7 @@ const fn rules(rules: &'static [&'static str], run: RunCheck) -> Check {
         rules,
         run,
         parts: &PARTS,
-        waits: false,
+        is_long: false,
     }
 }
 
@@ -69,7 +69,7 @@ impl Check {
     /// The same check, which waits long.
     const fn long(self) -> Self {
         Self {
-            waits: true,
+            is_long: true,
             ..self
         }
     }
@@ -400,7 +400,7 @@ fn all(
         for check in CHECKS.iter().chain(&STDIO_CHECKS) {
             if check.parts.contains(&kit.part()) && is_wanted(check.rules) {
                 let due = match kit.part() {
-                    KitPart::Alone if check.waits => &mut checks.long,
+                    KitPart::Alone if check.is_long => &mut checks.long,
                     KitPart::Alone => &mut checks.alone,
                     _ => &mut checks.later,
                 };

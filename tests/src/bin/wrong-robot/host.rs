@@ -406,21 +406,21 @@ impl Host {
 
     /// Gives up what it has waited for for long, if it is to.
     fn lose_patience(&mut self) {
-        for (phase, how) in IMPATIENT {
-            if !self.shared.is_in(phase) || !self.wrong.is(how) {
-                continue;
-            }
+        let is_such =
+            |(phase, how): &(Phase, &str)| self.shared.is_in(*phase) && self.wrong.is(how);
+        let Some((phase, _)) = IMPATIENT.into_iter().find(is_such) else {
+            return;
+        };
 
-            let tick = self.last_clock.tick;
-            match self.waits_in {
-                Some((in_phase, of, since)) if (in_phase, of) == (phase, tick) => {
-                    if since.elapsed() > PATIENCE {
-                        self.leave.get_or_insert(Leave::Stopped);
-                        self.has_given_up = true;
-                    }
+        let tick = self.last_clock.tick;
+        match self.waits_in {
+            Some((in_phase, of, since)) if (in_phase, of) == (phase, tick) => {
+                if since.elapsed() > PATIENCE {
+                    self.leave.get_or_insert(Leave::Stopped);
+                    self.has_given_up = true;
                 }
-                _ => self.waits_in = Some((phase, tick, Instant::now())),
             }
+            _ => self.waits_in = Some((phase, tick, Instant::now())),
         }
     }
 
