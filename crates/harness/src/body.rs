@@ -5,11 +5,12 @@ use std::f64::consts::{PI, TAU};
 use protocol::messages::{Correction, Point, Pose, Report, Velocity, Welcome};
 use protocol::{Tick, published_angle};
 
-/// Every so many ticks the same happens to a body again.
-pub const ROUND: Tick = 16;
-/// In a round: it is placed elsewhere, and its moves are refused in two ticks in turn.
+/// Every so many ticks the same happens to a body again. A prime number: whatever a robot does every few ticks meets all of it.
+pub const ROUND: Tick = 17;
+/// In a round: it is placed elsewhere.
 const PLACED: Tick = 5;
-const REFUSED: [Tick; 2] = [9, 10];
+/// In a round: its moves are refused, in two ticks in turn.
+pub const REFUSED: [Tick; 2] = [9, 10];
 /// How far it is placed from where it stood, meters.
 const SHIFT: (f64, f64) = (0.25, 0.125);
 

@@ -45,6 +45,8 @@ pub enum Unhelpful {
     Refusal,
     /// The state of an earlier tick, which says so.
     EarlierState,
+    /// The state of the tick under way, which says so.
+    LaterState,
     /// The state of this tick in the epoch before, which says so.
     EarlierEpoch,
     /// No reply, as where the query was lost.
@@ -326,20 +328,19 @@ impl FakePeers {
             .parameter("tick")
             .and_then(|tick| tick.parse::<Tick>().ok())
             .unwrap_or(now);
-        let is_earlier = unhelpful == Some(Unhelpful::EarlierState);
-        let of_epoch = match unhelpful {
-            Some(Unhelpful::EarlierEpoch) => epoch.saturating_sub(1),
-            _ => epoch,
+        let (of_epoch, of_tick) = match unhelpful {
+            Some(Unhelpful::EarlierState) => (epoch, tick.checked_sub(2)),
+            Some(Unhelpful::LaterState) => (epoch, Some(tick)),
+            Some(Unhelpful::EarlierEpoch) => (epoch.saturating_sub(1), tick.checked_sub(1)),
+            _ => (epoch, tick.checked_sub(1)),
         };
-        let state = tick
-            .checked_sub(1 + u64::from(is_earlier))
-            .and_then(|tick| self.state_of(name, of_epoch, tick));
+        let state = of_tick.and_then(|tick| self.state_of(name, of_epoch, tick));
         let Some(mut state) = state else {
             return query.reply_err("nothing is known before tick 1");
         };
 
         // Who takes it for the one that was asked for shows it, whatever of it counts for that robot.
-        if is_earlier || of_epoch != epoch {
+        if (state.epoch, state.tick + 1) != (epoch, tick) {
             stray(&mut state);
         }
         match state.answer(what) {

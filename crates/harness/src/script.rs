@@ -23,6 +23,8 @@ pub const CUT_OFF: Tick = 14;
 /// The same, because none is in range.
 pub const OUT_OF_RANGE: Tick = 8;
 const FIRST_IN_RANGE: Tick = 6;
+/// The same: no body is near, and the robot senses none.
+const NOBODY: Tick = 11;
 /// The first of the words that come in turn, and how far they are apart, ticks.
 const FIRST_WORD: Tick = 5;
 const WORD_EVERY: usize = 10;
@@ -419,7 +421,7 @@ fn news_of(harness: &mut Harness<'_>, script: &PlayScript, tick: Tick) -> TickUp
         commands: script.deliveries(tick),
         ..TickUpdate::default()
     };
-    if harness.kit.wants_bodies() {
+    if harness.kit.wants_bodies() && tick % ROUND != NOBODY {
         news.bodies = harness.fake_peers.bodies(epoch, tick);
     }
 

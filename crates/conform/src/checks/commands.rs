@@ -202,30 +202,23 @@ fn order_of_senders(plays: &Plays<'_>, one: &str, two: &str) -> Result<(), RuleF
     }
 
     for (roster, commands) in cases {
-        // The tick of the last command comes first, and there may be one too many.
-        let effect = |ticks: [Tick; 3]| {
-            let mut arriving = Vec::new();
-            for (command, tick) in commands.iter().rev().zip(ticks) {
-                arriving.push(ArrivingCommand {
-                    tick,
-                    ..command.clone()
-                });
-            }
-            arriving.reverse();
+        let effect = |arriving: Vec<ArrivingCommand>| {
             plays
                 .play_among(roster, &PlayScript::with(TICKS, arriving), &mut Straight)
                 .map(|played| values(&played))
         };
-
-        let mut wanted = effect([LAST, LAST - 1, LAST - 2])?;
-        let other = effect([LAST - 1, LAST, LAST - 2])?;
-        if let [.., before, last] = &commands[..]
-            && shows_last(&wanted, &last.text, &other, &before.text)
-        {
-            // Whatever other effect it has that they arrive together.
-            wanted.retain(|_, value| *value == last.text);
+        let last = commands.len() - 1;
+        let came = effect(commands.clone())?;
+        // A robot may not obey everyone.
+        if came == effect(commands[..last].to_vec())? {
+            continue;
         }
-        let votes = vote(&effect([LAST; 3])?, &wanted, &other);
+        // What the order means is seen where all are of one sender.
+        let texts = commands.iter().map(|command| (&*command.text, LAST));
+        let mut of_one = arrivals(&plays.sender(), texts);
+        let wanted = effect(of_one.clone())?;
+        of_one.swap(last - 1, last);
+        let votes = vote(&came, &wanted, &effect(of_one)?);
         if votes.is_broken() {
             let listed: Vec<String> = commands
                 .iter()
@@ -640,7 +633,42 @@ pub(super) fn payload(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     ] {
         unknown.push((what, text, None));
     }
-    demand_counted(plays, &short, &unknown)
+    demand_counted(plays, &short, &unknown)?;
+    demand_ignored(plays, &short, &payloads)
+}
+
+/// Where a payload makes no difference to the robot, none does, whatever fields it has.
+fn demand_ignored(
+    plays: &Plays<'_>,
+    text: &str,
+    payloads: &[(&str, Value)],
+) -> Result<(), RuleFailure> {
+    // What it does with payloads is the same in all parts.
+    if plays.part() != KitPart::Alone || plays.is_deterministic.get() == Some(&false) {
+        return Ok(());
+    }
+
+    let plain = ArrivingCommand::new(&plays.sender(), text, LAST);
+    let effect = |command| {
+        let played = plays.play(&PlayScript::with(TICKS, vec![command]))?;
+        Ok::<_, RuleFailure>(values(&played))
+    };
+    let without = effect(plain.clone())?;
+    let mut ignored = None;
+    for (what, payload) in payloads {
+        let makes_difference = effect(plain.clone().with_payload(payload))? != without;
+        match (makes_difference, ignored) {
+            (true, None) => return Ok(()),
+            (true, Some(ignored)) => {
+                return Err(RuleFailure::new(
+                    format!("{what} makes no difference, as {ignored} makes none"),
+                    format!("one, with a text of {SHORT_TEXT} bytes"),
+                ));
+            }
+            (false, _) => ignored = ignored.or(Some(what)),
+        }
+    }
+    Ok(())
 }
 
 /// A payload with the fields of clocks, news, welcomes and lines for programs, also further within.

@@ -10,7 +10,7 @@ use serde_json::json;
 
 use super::{peers, returns, waiting};
 use harness::Joining;
-use harness::body::ROUND;
+use harness::body::{REFUSED, ROUND};
 use harness::comparison::{demand_same, difference};
 use harness::findings::Findings;
 use harness::kit::{Kit, KitRoster};
@@ -30,7 +30,7 @@ const ASKED: Tick = 2;
 /// An epoch that follows the first one, where those between were missed: two bytes of its number are those of the first.
 const LATER: Epoch = 1 + (1 << 16);
 /// Ticks of an epoch that is to leave nothing behind, commands among them: in the last one the robot's move is refused.
-const BUSY: Tick = 25;
+const BUSY: Tick = ROUND + REFUSED[0];
 /// The same, and in the last one it can query nobody.
 const BUSY_AND_CUT_OFF: Tick = ROUND + CUT_OFF;
 /// So many ticks after it have news, and no clock.

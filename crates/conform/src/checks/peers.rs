@@ -176,8 +176,11 @@ pub(super) fn reply(kit: &Kit, findings: &mut Findings) -> Result<(), RuleFailur
         fn before(&mut self, harness: &mut Harness<'_>, tick: Tick) -> Result<(), RuleFailure> {
             harness.withholds_news = self.are_early && tick > 0;
             if self.are_early && tick.is_multiple_of(ROUND) {
-                let replies = [Unhelpful::EarlierState, Unhelpful::EarlierEpoch];
-                harness.fake_peers.be_unhelpful(&replies);
+                harness.fake_peers.be_unhelpful(&[
+                    Unhelpful::EarlierState,
+                    Unhelpful::LaterState,
+                    Unhelpful::EarlierEpoch,
+                ]);
             }
             Ok(())
         }

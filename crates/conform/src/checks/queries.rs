@@ -384,12 +384,16 @@ fn try_refused(harness: &Harness<'_>) -> Result<(), RuleFailure> {
         (of, now + 1000),
         (of - 1, now + 1),
     ];
+    let mut parameters = never
+        .map(|(epoch, tick)| format!("tick={tick};epoch={epoch}"))
+        .to_vec();
+    parameters.extend([of - 1, of + 1].map(|epoch| format!("epoch={epoch}")));
 
-    for (epoch, tick) in never {
+    for parameters in parameters {
         let expected = format!(
-            "after tick {now} of epoch {of}, an error reply in words to tick={tick};epoch={epoch}, at once"
+            "after tick {now} of epoch {of}, an error reply in words to {parameters}, at once"
         );
-        match harness.state_in(epoch, tick)? {
+        match harness.ask(STATE, &parameters)? {
             Some(Reply {
                 result: Err(words), ..
             }) if !words.trim().is_empty() => {}

@@ -217,11 +217,16 @@ pub(super) fn late(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
             // Counted before: ticks of this epoch have been answered once already.
             self.0 = late.map(|of| (of, count_of(harness, of))).into();
             let flag = harness.flag();
+            let generation = harness.generation();
             for (epoch, tick) in late {
+                // In an earlier epoch the same generation may have been another incarnation.
+                let is_earlier = epoch < now;
                 // If it took them for its own, it would stand elsewhere.
                 harness.put_news(&TickUpdate {
                     epoch,
                     tick,
+                    joined: is_earlier.then_some(generation + 1),
+                    rejoin: is_earlier.then_some(generation),
                     correction: Some(Correction {
                         location: Point::new(1.0, 1.0),
                         blocked: true,

@@ -23,6 +23,8 @@ use harness::{Harness, HarnessOptions};
 /// The last tick of the predecessor.
 const LAST: Tick = 8;
 const GENERATION: Generation = 2;
+/// A generation that no two bytes hold: what they keep of it is [`GENERATION`].
+const LARGE_GENERATION: Generation = (1 << 16) + GENERATION;
 /// How many requests of a robot that joins again have no answer, at least.
 const UNANSWERED: usize = 4;
 /// Ticks that a further incarnation is played.
@@ -44,13 +46,24 @@ fn returned<'k>(
     reported: &[PlayedTick],
     change: impl FnOnce(&mut Welcome),
 ) -> Result<Harness<'k>, RuleFailure> {
+    returned_after(kit, last_ticks, 0, reported, change)
+}
+
+/// The same after so many more that no tick has named.
+fn returned_after<'k>(
+    kit: &'k Kit,
+    last_ticks: &[Tick],
+    unnamed: Generation,
+    reported: &[PlayedTick],
+    change: impl FnOnce(&mut Welcome),
+) -> Result<Harness<'k>, RuleFailure> {
     let mut harness = Harness::open_run(kit, HarnessOptions::default())?;
     harness.prepare()?;
-    let mut generation = 1;
     for last in last_ticks {
         harness.play_predecessor(*last)?;
-        generation += 1;
     }
+    harness.pass_incarnations(unnamed);
+    let generation = harness.generation() + 1;
     inherit(&mut harness, reported, generation);
     change(&mut harness.template);
     // What it does must not depend on the moment when it asks.
@@ -87,13 +100,19 @@ fn first_ticks(kit: &Kit) -> Result<&[PlayedTick], RuleFailure> {
 pub(super) fn generation(kit: &Kit, _: &mut Findings) -> Result<(), RuleFailure> {
     let first_ticks = first_ticks(kit)?;
     // Tick 0 is the turn of a first incarnation only.
-    generation_after(kit, 0, &first_ticks[..1])?;
-    generation_after(kit, LAST, first_ticks)
+    generation_after(kit, 0, &first_ticks[..1], GENERATION)?;
+    generation_after(kit, LAST, first_ticks, LARGE_GENERATION)
 }
 
-/// The same after the last tick of its predecessor, which has reported this.
-fn generation_after(kit: &Kit, last: Tick, reported: &[PlayedTick]) -> Result<(), RuleFailure> {
-    let mut harness = returned(kit, &[last], reported, |_| ())?;
+/// The same of this generation, after the last tick of its predecessor, which has reported this.
+fn generation_after(
+    kit: &Kit,
+    last: Tick,
+    reported: &[PlayedTick],
+    generation: Generation,
+) -> Result<(), RuleFailure> {
+    let unnamed = generation - GENERATION;
+    let mut harness = returned_after(kit, &[last], unnamed, reported, |_| ())?;
     // The last tick was its predecessor's; the next one may go on without it.
     harness.repeat();
     harness.put_clock(&Clock {
@@ -102,7 +121,7 @@ fn generation_after(kit: &Kit, last: Tick, reported: &[PlayedTick]) -> Result<()
         ..Clock::default()
     })?;
     // Nor is it the turn of an incarnation that is placed and not named, or whose predecessor is named.
-    for joined in [None, Some(GENERATION - 1)] {
+    for joined in [None, Some(generation - 1)] {
         harness.put_news(&TickUpdate {
             epoch: 1,
             tick: last + 1,
@@ -132,14 +151,14 @@ fn generation_after(kit: &Kit, last: Tick, reported: &[PlayedTick]) -> Result<()
     demand_inherited(&mut harness)?;
 
     let transcript = play(&mut harness, &PlayScript::quiet(5), &mut Straight)?;
-    demand_generation(&transcript, GENERATION)?;
+    demand_generation(&transcript, generation)?;
 
     // That its predecessor was to join again does not concern it.
     let asked = harness.seen.requests.len();
     harness.put_news(&TickUpdate {
         epoch: 1,
         tick: harness.next_tick() - 1,
-        rejoin: Some(GENERATION - 1),
+        rejoin: Some(generation - 1),
         ..TickUpdate::default()
     })?;
     harness.settle(QUIET);
@@ -150,7 +169,7 @@ fn generation_after(kit: &Kit, last: Tick, reported: &[PlayedTick]) -> Result<()
         ));
     }
     let transcript = play(&mut harness, &PlayScript::quiet(2), &mut Straight)?;
-    demand_generation(&transcript, GENERATION)
+    demand_generation(&transcript, generation)
 }
 
 /// Until its first report it shows what its predecessor reported, and the last of it where no tick is named.

@@ -98,6 +98,15 @@ impl Harness<'_> {
         Ok(())
     }
 
+    /// So many incarnations of the robot, played by the kit, have joined and are gone before a tick names one of them.
+    pub fn pass_incarnations(&mut self, count: Generation) {
+        let subject = self.kit.subject();
+        for number in 0..count {
+            self.play(&subject, &format!("{OWN_INSTANCE} of {number}"));
+            self.drive(|barrier, out| barrier.token(&subject, false, out));
+        }
+    }
+
     /// Another process, played by the kit, takes the place of the robot's.
     pub fn play_successor(&mut self) {
         let subject = self.kit.subject();

@@ -109,7 +109,10 @@ impl Shared {
         {
             return query.reply_err("only the newest state is kept");
         }
-        if found.is_err() && self.wrong.is("query.tick:any") {
+        if found.is_err()
+            && (self.wrong.is("query.tick:any")
+                || tick.is_none() && self.wrong.is("query.tick:epoch"))
+        {
             found = newest;
         }
 

@@ -164,6 +164,9 @@ impl Host {
             .welcome
             .as_ref()
             .map_or(0, |welcome| welcome.generation);
+        for named in [&mut news.joined, &mut news.rejoin] {
+            *named = named.map(|of| self.wrong.generation_kept_of(of));
+        }
         if self.wrong.is("return.replaced") && news.joined.is_some_and(|joined| joined > generation)
         {
             news.joined = None;
@@ -207,6 +210,11 @@ impl Host {
         if self.wrong.is("news.wait:any") && self.shared.is_in(Phase::AwaitingNews) {
             epoch = self.last_clock.epoch;
             tick = self.last_clock.tick;
+        }
+
+        let own = self.welcome.as_ref().map_or(0, |welcome| welcome.epoch);
+        if epoch < own && self.wrong.is("clock.late:joined") {
+            (epoch, news.rejoin) = (own, None);
         }
 
         if self.wrong.is("epoch.init:received") || self.wrong.is("tick.newest:news") {
@@ -310,6 +318,7 @@ impl Host {
         {
             welcome.location = before.location;
         }
+        welcome.generation = self.wrong.generation_kept_of(welcome.generation);
         let admission = Admission::from(&welcome);
         let before = self.welcome.as_ref().map(Admission::from);
         let is_other = self.last_clock.epoch > 0 && self.last_clock.epoch != admission.epoch;

@@ -510,6 +510,9 @@ impl Host {
                     if self.wrong.is("query.reply") {
                         tick = self.last_clock.tick.saturating_sub(1);
                     }
+                    if tick == self.last_clock.tick && self.wrong.is("query.reply:later") {
+                        tick = tick.saturating_sub(1);
+                    }
                     let mut epoch = state.epoch;
                     if self.wrong.is("query.reply:epoch") {
                         epoch = self.last_clock.epoch;

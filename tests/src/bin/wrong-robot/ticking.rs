@@ -163,6 +163,9 @@ impl Host {
         if wrong.is("command.order:senders") {
             deliveries.sort_by(|one, other| other.from.cmp(&one.from));
         }
+        if wrong.is("command.order:letters") {
+            deliveries.sort_by_key(|delivery| delivery.from.as_str().to_lowercase());
+        }
         if wrong.is("command.order:interleaved") {
             // The first of each sender, then the second of each.
             let mut counts = BTreeMap::new();
@@ -239,6 +242,11 @@ impl Host {
                 return Err("a payload".into());
             }
             walker.received += 1;
+            if has_payload(&delivery, &|value| value["blocked"] == true)
+                && wrong.is("command.payload:fields")
+            {
+                walker.received += 1;
+            }
             walker.last.clone_from(&delivery.command);
             match delivery.command.as_str() {
                 "rest" => walker.is_asleep = true,

@@ -1,6 +1,6 @@
 //! What the robot does wrong.
 
-use protocol::{Epoch, Message, Tick, decode};
+use protocol::{Epoch, Generation, Message, Tick, decode};
 use serde_json::{Value, json};
 
 /// What it does wrong: a rule, or a rule and a way to break it.
@@ -20,6 +20,15 @@ impl Wrong {
             "epoch.init:byte" => (epoch % (1 << 8), tick),
             "epoch.init:two-bytes" => (epoch % (1 << 16), tick),
             _ => (epoch, tick),
+        }
+    }
+
+    /// What it keeps of a generation.
+    pub(crate) fn generation_kept_of(&self, generation: Generation) -> Generation {
+        match self.0.as_str() {
+            "return.generation:byte" => generation % (1 << 8),
+            "return.generation:two-bytes" => generation % (1 << 16),
+            _ => generation,
         }
     }
 
